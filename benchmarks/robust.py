@@ -1,9 +1,11 @@
 """Speakers, words and lengths outside the training data of the shipped model: accuracy, speed, memory.
 
     python benchmarks/robust.py [--corpora FOLDER] [--model FILE]
-        [--only others|phones|noise|silence|foreign|whole|hour|calls]
+        [--only others|conditions|phones|noise|silence|foreign|whole|hour|calls]
 
 others : GRID clips of other speakers, correlation of opening per clip, audio only and with the words of the file's name
+conditions: the same, audio only, and five clips of s1's validation list, in noise, in a room (0.6 s of reverberation,
+         3 dB under the voice), over a telephone (300 to 3,400 Hz, 8 bits)
 phones : recordings with transcripts of ``speech-open``, phone accuracy against their forced alignment by the general
          models, real-time factors (recognition in one process, warm, median of five), and the share of the speech of
          which words decided
@@ -37,6 +39,7 @@ from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, words_of
 from lipmotion.units.phones import phone_edits
@@ -85,6 +88,30 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
         for condition, values in found.items():
             each = {clip.stem: round(value, 3) for clip, value in zip(clips, values, strict=True)}
             show(f"grid-others, {kind}, {condition}: ACC opening", mean=round(float(np.mean(values)), 3), **each)
+
+
+def conditions(corpora: Path, model: Model, _: Path | None) -> None:
+    """Print the correlation with the tracked openings in noise, in a room and over a telephone."""
+    voices = [read_audio(corpora / "speech-open" / name) for name in SPOKEN]
+    own = [corpora / "grid-s1/clips" / f"{n}.mkv" for n in (corpora / "grid-s1/val.txt").read_text().split()[::5]]
+    for name, clips in {"s1, val": own, "grid-others": sorted((corpora / "grid-others").glob("*.mpg"))}.items():
+        found: dict[str, list[float]] = {}
+        for number, clip in enumerate(clips):
+            tracked, clean = track(clip, crops=False), read_audio(clip)
+            time_s, samples = np.arange(len(clean.samples)) / RATE_HZ, clean.samples
+            decay = np.random.default_rng(number).normal(size=9600) * np.exp(-6.9 * time_s[:9600] / 0.6)
+            echo = np.convolve(samples, decay)[: len(samples)]
+            hertz = np.fft.rfftfreq(len(samples), 1 / RATE_HZ)
+            narrow = np.fft.irfft(np.fft.rfft(samples) * ((hertz > 300) & (hertz < 3400)), len(samples))
+            sounds = {"clean": samples, "room": samples + echo * np.sqrt(0.5) * samples.std() / echo.std()}
+            sounds |= {"telephone": np.round(narrow * 127) / 127}
+            for kind, db in (("white", 20), ("white", 10), ("babble", 20), ("babble", 10)):
+                sounds[f"{kind}, {db} dB"] = noisy_audio(clean, kind, db, voices, number).samples
+            for condition, sound in sounds.items():
+                motion = animate(SpeechRequest(Audio(sound.astype(np.float32), RATE_HZ)), model=model).motion
+                pair = np.interp(tracked.motion.time_s, motion.time_s, motion["opening"]), tracked.motion["opening"]
+                found.setdefault(condition, []).append(np.corrcoef(*(each[tracked.seen] for each in pair))[0, 1])
+        show(f"{name}: ACC opening", **{condition: round(float(np.mean(each)), 3) for condition, each in found.items()})
 
 
 def phones(corpora: Path, model: Model, _: Path | None) -> None:
@@ -285,6 +312,7 @@ def resident_megabytes() -> float:
 
 PARTS = {
     "others": others,
+    "conditions": conditions,
     "phones": phones,
     "noise": noise,
     "silence": silence,

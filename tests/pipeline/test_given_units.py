@@ -138,6 +138,10 @@ def test_phones_that_end_while_somebody_speaks(
     assert all(span.label.confidence is not None for span in spoken)
     assert 0.3 < confidence < 0.8
     assert understood.fit is not None
+    open_s = [span.start_s for span in right if span.start_s >= end_s and not is_silent(span.label.phone)]
+    closed_s = max(span.end_s for span in right if not is_silent(span.label.phone))
+    assert understood.fit.missing[0][0] == pytest.approx(open_s[0], abs=0.1)
+    assert understood.fit.missing[-1][1] == pytest.approx(closed_s, abs=0.1)
     fits = understood.fit.of_frames(len(understood.speech.features.values))
     assert fits[: round(100 * end_s) - 10].mean() > 0.95
     assert fits[round(100 * end_s) :].mean() < 0.6

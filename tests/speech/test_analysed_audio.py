@@ -226,3 +226,15 @@ def test_features_of_silence_take_no_more_memory_than_they_are() -> None:
     assert bands.shape == (audio.frames, 40)
     assert not bands.any()
     assert most < 2 * bands.nbytes
+
+
+@pytest.mark.parametrize("offset", [0.004, -0.02, 0.1])
+def test_a_constant_offset_hides_no_pause(offset: float) -> None:
+    """Not even an offset of the line alone, between zeros; what has none stays as it is, to the bit."""
+    sound = np.concatenate([whole_frames(0), silence(1, 3), whole_frames(1)])
+    plain = of_samples(silence(2), sound)
+    for samples in (np.concatenate([silence(2), sound]) + offset, np.concatenate([silence(2), sound + offset])):
+        audio = of_samples(samples)
+        assert [(p.first, p.own) for p in audio.passages] == [(p.first, p.own) for p in plain.passages]
+        assert audio.mfcc().values == pytest.approx(plain.mfcc().values, abs=0.02)
+    assert np.array_equal(of_samples(sound).samples, sound.astype(np.float32))

@@ -59,7 +59,6 @@ def test_a_lengthened_word_is_the_word_that_is_meant() -> None:
         ("boooooom", "boom"),
         ("noooo", "no"),
         ("sooo", "so"),
-        ("mmmm", "mm"),
         ("loooong", "long"),
         ("yesss", "yes"),
         ("pleeease", "please"),
@@ -78,6 +77,15 @@ def test_a_lengthened_word_is_the_word_that_is_meant() -> None:
     for word in ("aaaaaaargle", "xyyyz", "booker", "bananana"):
         assert not lexicon.lengthened(word)
     assert not Lexicon().known("x" * 5000 + "yyy")
+
+
+def test_sounds_in_letters_are_said_as_these() -> None:
+    for word, phones in (
+        ("brrr", "b er"), ("brr", "b er"), ("psst", "p s t"), ("pfft", "p f t"), ("fff", "f"), ("zzzz", "z"),
+        ("mmm", "m"), ("grrr", "g er"), ("www", said("www")[0]), ("bbc", "b iy b iy s iy"),
+    ):  # fmt: skip
+        assert said(word)[0] == phones
+        assert Lexicon().known(word)
 
 
 def test_a_form_is_said_in_the_words_of_its_readings() -> None:

@@ -54,6 +54,10 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
         ("Note: this is said.", "note this is said", ""),
         ("He said: go\nAt 5:30: run", "he said go at five thirty run", ""),
         ("HELP\nme now", "help me now", ""),
+        ('e "Hello"', "hello", "e"),
+        ('e happy "Hello"\n"A voice."\nm "Hi \\"you\\""', "hello a voice hi you", "e happy, m"),
+        ('she said "hello"', "she said hello", ""),
+        ('Then he went "Hello" and left', "then he went hello and left", ""),
     ],
 )
 def test_markup_and_names_of_speakers_are_named_and_not_spoken(caplog, text, words, named):

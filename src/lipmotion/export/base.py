@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,6 +101,8 @@ MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Regi
 OTHER_JSON = {
     b'"lipmotion.motion"': ".json",
     b'"mouthCues"': ".tsv",
+    b'"viseme":': ".tsv",
+    b'"visemes":': ".tsv",
     b'"facsNames"': ".a2f.json",
     b'"weightMat"': ".a2f.json",
     b"lendShapes": ".jsonl",
@@ -110,6 +113,10 @@ OTHER_JSON = {
 """What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
 JSON_HEAD = 1 << 16
 """How many bytes of a ``.json`` are searched for them."""
+CUE_LINE = re.compile(
+    rb'^"?[0-9][0-9:.,]{0,20}"?(?:[;,]\s?"?[0-9:.,]{1,20}"?)?[;,]\s?"?(?!nan|inf)[A-Za-z_0-9]{0,9}[A-Za-z]"?\s*$', re.M
+)
+"""A line of a ``.csv`` of cues: one or two times, and the name of a shape."""
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -251,14 +258,16 @@ def _reader_of(path: Path) -> Callable[[Path], tuple[Motion, Timeline[Unit]]] | 
 
 
 def _named_by_content(path: Path) -> Path:
-    """Return a path, or for ``.json`` of another program the name that such a file would have otherwise."""
-    if motion_suffix(path) != ".json" or not path.is_file():
+    """Return a path, or for ``.json`` of another program, and cues, the name that such a file would have otherwise."""
+    if motion_suffix(path) not in (".json", ".csv") or not path.is_file():
         return path
     try:
         with path.open("rb") as file:
             head = file.read(JSON_HEAD)
     except OSError:  # reported when it is read
         return path
+    if motion_suffix(path) == ".csv":
+        return Path("a.tsv") if CUE_LINE.search(b"\n".join(head.splitlines()[:2])) else path
     return next((Path(f"a{suffix}") for mark, suffix in OTHER_JSON.items() if mark in head), path)
 
 

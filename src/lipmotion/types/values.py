@@ -21,6 +21,7 @@ _LEFT_OUT = object()
 _HALVES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
 """Halves of characters; \\udc80 to \\udcff are bytes of names of files that are not UTF-8."""
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|(?i:nan|[-+]?inf)")
+_CLOCK = r"(?:([0-9]{1,6}):)?([0-9]{1,2}):([0-9]{1,2}(?:[.,][0-9]{1,9})?)"
 _WHOLE = re.compile("[-+]?[0-9]{1,18}")
 
 
@@ -59,6 +60,15 @@ def number_of(
     if found is None or (finite and not math.isfinite(found)):
         raise InputError(f"{what} {described(text)}, required {required}")
     return found
+
+
+def clock_seconds(text: str, frames_per_s: float = 0) -> float:
+    """Return the seconds of a time as 1:02:03.5, 2:03,5 or, if frames have a rate, 00:02:03:12; NaN: it is none."""
+    found = re.fullmatch(rf"{_CLOCK}(?::(\d+(?:\.\d+)?))?", text.strip())
+    if found is None or (found[4] and not frames_per_s):
+        return math.nan
+    seconds = float(found[3].replace(",", ".")) + float(found[4] or 0) / (frames_per_s or 1)
+    return int(found[1] or 0) * 3600 + int(found[2]) * 60 + seconds
 
 
 def whole_of(text: str, what: str = "the number is", required: str = "a whole number") -> int:

@@ -58,6 +58,8 @@ LONGEST_LINE = 2000
 OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be the long stop".split())
 """Words that are meant rather than those with their vowel twice (``noo``, ``loong``, ``stoop``)."""
 LENGTHENED, REPEATED = re.compile(r"(.)\1\1|^(..+?)\2"), re.compile(r"([a-z]{2,4}?)\1+h?")
+SOUNDED = re.compile(r"(?=.*(.)\1\1|.*rr\Z|p[sf]{2})(?!([^fhmrsvz])\2*\Z)[b-df-hj-np-tv-xz]+\Z")
+"""Sounds in letters: ``brrr``, ``psst``, ``fff``; no dictionary has them, and their letters are not spelled."""
 LONGEST_LENGTHENED, MOST_LENGTHENED = 100, 5
 """A word of more letters, or with more that are doubled, is none of these."""
 VARIANT_NUMBER = re.compile(r"\(\d+\)$")
@@ -112,7 +114,7 @@ class Lexicon:
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
         said = (each in self.user or in_dictionary(each) for each in readings(word)[0])
-        return word in self.user or all(said) or bool(lengthened(word))
+        return word in self.user or all(said) or bool(lengthened(word) or SOUNDED.fullmatch(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
         """Return every pronunciation of a lower-case word, or of a written form (``1995``) in all its readings.
@@ -152,6 +154,8 @@ class Lexicon:
         if variants:
             return tuple(dict.fromkeys(variants))
         by_rules = guess_pronunciation(word)
+        if SOUNDED.fullmatch(word):
+            return (by_rules,)
         return (with_reduced_vowels(word, network_pronunciation(without_accents(word)) or by_rules),)
 
 
@@ -176,7 +180,8 @@ def lengthened(word: str) -> tuple[tuple[str, ...], ...]:
         for run in runs
     ]
     if max(map(len, runs)) > 2 and sum(len(each) > 1 for each in choices) <= MOST_LENGTHENED:
-        known = [each for each in map("".join, product(*choices)) if in_dictionary(each)]
+        shortest = 3 if SOUNDED.fullmatch(plain) else 1  # "sss" is no name of a letter
+        known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and in_dictionary(each)]
         return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
     found = REPEATED.fullmatch(plain)
     return ((found[1],) * found[0].count(found[1]),) if found and in_dictionary(found[1]) else ()

@@ -90,13 +90,14 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
             "give the language of the words (--language), or add it to a lexicon file"
         )
     phones: list[str] = []
-    letters = re.sub(r"([b-df-hj-np-tv-z])\1", r"\1", plain)  # doubled consonants sound once
+    letters = re.sub(r"([b-df-hj-np-tv-z])\1+", r"\1", plain)  # doubled consonants sound once
     at = 0
     while at < len(letters):
         taken, sound = _next_sound(letters, at, begun=bool(phones))
         phones += sound.split()
         at += taken
-    return tuple(phones)
+    has_vowel = re.search("[aeiouy]", plain)
+    return tuple("er" if phone == "r" and not has_vowel else phone for phone in phones)  # the vowel of "brr"
 
 
 def _next_sound(letters: str, at: int, *, begun: bool) -> tuple[int, str]:

@@ -27,6 +27,10 @@ CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]
 """A name in capitals above what is said, as in screenplays."""
 DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
 """A line of a screenplay that is not said."""
+SCRIPT = re.compile(r'[ \t]*(?:([a-z_]\w*)((?:[ \t]+[\w@-]+){0,3})[ \t]+)?"(?:[^"\\\n]|\\.)*"[ \t]*')
+"""A line of a game's script: who speaks, how he looks, and in quotes what is said (``e happy "Hello"``)."""
+NO_TAGS = frozenset("i he she we they you it and then but so or said says".split())
+"""Words that begin a sentence with quotes in it."""
 NO_NAMES = frozenset("note notes warning question answer step tip remember ps p.s example".split())
 MARKED = r"[~%!]+(?:sp|(?:sil|pau|lau|noise|breath|inhal|exhal|cough|throat|lip|smack|sniff|sigh|click|music)\w*)"
 """Sounds with a mark before them: ``~SIL``, ``%noise``, ``!SIL``."""
@@ -84,7 +88,8 @@ def without_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[st
     """Return a text without the names of speakers, and what was left out.
 
     Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
-    ``names``, and two lines or more in capitals above what is said, as in screenplays.
+    ``names``, two lines or more in capitals above what is said, as in screenplays, and what stands before the quotes of
+    a game's script, if all lines are such.
     """
     left_out: list[str] = []
 
@@ -102,7 +107,12 @@ def without_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[st
     cues = list(CUE.finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
         text = DIRECTION.sub(without, CUE.sub(without, text))
-    return SPEAKER.sub(said, text), left_out
+    text = SPEAKER.sub(said, text)
+    lines = [SCRIPT.fullmatch(line) for line in text.splitlines() if line.strip()]
+    tags = [line[1] for line in lines if line and line[1]]
+    if tags and all(lines) and not NO_TAGS & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
+        text = re.sub(r'^[^"\n]+(?=")', without, text, flags=re.MULTILINE)
+    return text, [name for name in left_out if name]
 
 
 def speaker_names(texts: Iterable[str]) -> frozenset[str]:

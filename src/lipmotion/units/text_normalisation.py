@@ -8,7 +8,7 @@ import unicodedata
 from functools import cache
 
 from lipmotion.errors import InputError
-from lipmotion.units.lexicon import in_dictionary, lengthened
+from lipmotion.units.lexicon import SOUNDED, in_dictionary, lengthened
 from lipmotion.units.spelling import normalised_text, plain_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, readings
 
@@ -62,7 +62,7 @@ def tokens_in(text: str) -> tuple[str, ...]:
     for token in (found[0] for found in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
         is_short = not shouted and INITIALS.fullmatch(token) and not in_dictionary(token.lower())
-        is_short = is_short and not lengthened(token.lower())
+        is_short = is_short and not (lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
         tokens.append(token.lower() if is_word and not is_short else token)
     return tuple(tokens)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -57,6 +58,42 @@ def test_milliseconds_are_read_as_such(
     found = read_cues(tmp_path / "a.tsv").cues
     assert [cue.end_s for cue in found] == pytest.approx([float(time) / scale for time in starts[1:]])
     assert ("milliseconds" in caplog.text) == (scale > 1)
+
+
+TABLES = {
+    "clock.csv": "time,mouth\n0:00.00,X\n0:00.50,A\n0:00:01.00,D\n0:02.00,X\n",
+    "comma.tsv": "0,00\tX\n0,50\tA\n1,00\tD\n2,00\tX\n",
+    "semicolon.csv": "0,0;X\n0,5;A\n1,0;D\n2,0;X\n",
+    "commas.csv": "0,00,X\n0,50,A\n1,00,D\n2,00,X\n",
+    "quoted.csv": '"0,0","X"\n"0,5","A"\n"1,0","D"\n"2,0","X"\n',
+    "spans.csv": "start,end,value\n0,0.5,X\n0.5,1,A\n1,2,D\n",
+    "ms.csv": "start,end,value\n0,500,X\n500,1000,A\n1000,2000,D\n",
+    "events.json": json.dumps([{"time": t, "viseme": v} for t, v in ((0, "sil"), (0.5, "PP"), (1, "aa"), (2, "sil"))]),
+    "visemes.json": json.dumps(
+        {"visemes": [{"start": f"{t},0", "end": t + 1, "name": f"viseme_{v}"} for t, v in enumerate(("sil", "aa"))]}
+    ),
+    "comma.json": json.dumps(
+        {"mouthCues": [{"start": f"{t},0", "end": f"{t + 1},0", "value": v} for t, v in enumerate("XD")]}
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_cues_of_tables_and_events_of_visemes(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(TABLES[name])
+    motion, units = read_motion(tmp_path / name)
+    closed = (
+        [("sil", 0.0, 0.5), ("p", 0.5, 1.0)] if "A" in TABLES[name] or "PP" in TABLES[name] else [("sil", 0.0, 1.0)]
+    )
+    found = [(span.label.phone, span.start_s, span.end_s) for span in units]
+    assert found == [(phone, *map(pytest.approx, times)) for phone, *times in (*closed, ("aa", 1.0, 2.0))]
+    assert motion.time_s[-1] == pytest.approx(2.0)
+
+
+def test_a_table_of_motion_is_none_of_cues(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time_s,opening\n0.00,0.5\n0.01,0.6\n0.02,0.7\n")
+    motion, _ = read_motion(tmp_path / "a.csv")
+    assert motion.names == ("opening",)
 
 
 def test_lips_close_in_a_and_are_as_open_as_the_drawings(sheet: CueSheet) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from io import StringIO
 from itertools import islice
@@ -18,6 +17,7 @@ from lipmotion.corpora.labels.tier import (
     LINES,
     OTHER,
     PHONE_LABELS,
+    RECOGNISED_LABEL,
     RECOGNISED_PHONES,
     WORDS,
     LabelTier,
@@ -28,15 +28,14 @@ from lipmotion.corpora.labels.tier import (
     phone_timeline,
     tier_transcript,
     tiers_of_speakers,
-    with_recognised,
     with_words,
 )
 from lipmotion.corpora.labels.timed_lines import line_tiers
-from lipmotion.corpora.labels.xml_labels import is_timed_xml, xml_tiers
+from lipmotion.corpora.labels.xml_labels import READ_ROOTS, ROOT, xml_tiers
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import UNKNOWN_PHONES, phone_named
+from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, phone_named, with_confidences
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 from lipmotion.units.mood_tags import tagged_text, without_known_tags
 from lipmotion.units.text_normalisation import checked_tokens
@@ -52,8 +51,8 @@ FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
 """Suffixes in whose files phones are searched, in order."""
 LARGEST_LABELS = 1 << 24
 """Most bytes of a label file: labels of a day."""
-MOTION, MOTION_HEAD = re.compile(rb'"lipmotion\.motion"|time_s,'), 64
-"""How our own motion files begin, and in how many bytes: a quick answer for large ones."""
+MOTION = re.compile(r'"lipmotion\.motion"|time_s,')
+"""How our own motion files begin: a quick answer for large ones."""
 MASTER = "#!MLF!#"
 """The start of HTK's master label files, which hold the labels of many recordings."""
 MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
@@ -172,8 +171,10 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     units = merged_timelines(
         [with_words(phone_timeline(each, (), where, with_gaps=True), _words_of(each, tiers)) for each in phones]
     )
-    recognised = next((each for each in tiers if each.role == RECOGNISED_PHONES), None)
-    return units if recognised is None else with_recognised(units, recognised)
+    recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
+    found = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
+    rows = (RecognisedPhone(each.start_s, each.end_s, match[1], float(match[2])) for each, match in found if match)
+    return units if recognised is None else with_confidences(units, rows)
 
 
 def speakers_in(path: Path) -> tuple[str, ...]:
@@ -191,11 +192,10 @@ def holds_timings(path: Path) -> bool:
     """Return whether a file has the timings of a voice or an aligner; False: it is another file, or no file at all."""
     if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_LABELS:
         return False
-    with path.open("rb") as file:
-        if MOTION.search(file.read(MOTION_HEAD)):
-            return False
     text = _text(path)
     try:
+        if MOTION.search(text[:64]):
+            return False
         return bool(service_tiers(text, "")) if is_json(text) else line_tiers(text, "") is not None
     except InputError as error:  # said by the reader, if it is damaged by that of motion
         return not isinstance(error, DamagedJsonError)
@@ -203,16 +203,10 @@ def holds_timings(path: Path) -> bool:
 
 def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     """Return the labels of a file; None for JSON of another kind, if that is expected, else an error."""
-    if unknown_json and path.stat().st_size > LARGEST_LABELS:
-        return None
-    text, where = _text(path), str(path)
-    if unknown_json and not is_json(text):
-        return None
-    tiers = _timed_tiers(text, where)
-    if unknown_json and tiers is None:
-        return None
-    if tiers is not None:
-        return _labels(tiers, where)
+    text = "" if unknown_json and path.stat().st_size > LARGEST_LABELS else _text(path)
+    tiers = _timed_tiers(text, str(path)) if is_json(text) or not unknown_json else None
+    if tiers is not None or unknown_json:
+        return None if tiers is None else _labels(tiers, str(path))
     _check_plain(text, path)
     text, tags = tagged_text(text)
     tokens = text.split()
@@ -255,7 +249,7 @@ def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
     try:
         if is_textgrid(text):
             tiers: list[LabelTier] | None = in_seconds(parse_interval_tiers(text, where), where)
-        elif is_timed_xml(text):
+        elif (found := ROOT.match(text)) and found[1] in READ_ROOTS:
             tiers = xml_tiers(text, where)
         elif is_subtitles(text):
             tiers = [subtitle_tier(text, where)]
@@ -364,46 +358,35 @@ def check_plain_text(text: str, where: str) -> None:
 
 def _check_no_labels(text: str, where: str) -> None:
     """Raise InputError for labels, subtitles and documents in forms that are not read."""
-    start = text[:200].lstrip()
-    if "\0" in text:
-        raise InputError(f"{where}: holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text")
-    if start.startswith(MASTER):
-        raise InputError(f"{where}: is a master label file of many recordings; write a .lab beside each")
-    if MARKUP.match(start):
-        raise InputError(f"{where}: begins with {shortened(start[:20])!r}, required the words alone; save it as text")
-    if is_subtitles(text):
-        raise InputError(f"{where}: is a file of subtitles, required the words alone; write them into a text file")
-    found = NO_ARROW.search(text)
-    if found:
-        raise InputError(
-            f"{where}: has the line {shortened(found[0].strip())!r}, two times as in subtitles; required: times as in "
-            "00:00:01,000 --> 00:00:02,500, or the words alone"
-        )
-    if _seems_timed(text):
-        raise InputError(
-            f"{where}: its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels; save it in one of "
-            "these forms, or give the words alone"
-        )
+    start, found = text[:200].lstrip(), NO_ARROW.search(text)
+    line = shortened(found[0].strip()) if found else ""
+    clock = "00:00:01,000 --> 00:00:02,500"
+    timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
+    forms = {
+        "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
+        "is a master label file of many recordings; write a .lab beside each": start.startswith(MASTER),
+        f"begins with {shortened(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
+        "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),
+        f"has the line {line!r}, two times as in subtitles; required: times as in {clock}, or the words alone": found,
+        f"{timed}; save it in one of these forms, or give the words alone": _seems_timed(text),
+    }
+    wrong = next((message for message, is_so in forms.items() if is_so), None)
+    if wrong is not None:
+        raise InputError(f"{where}: {wrong}")
 
 
 def _seems_timed(text: str) -> bool:
     """Return whether most of the first lines begin with a number and some with a time, or half hold two times."""
     lines = numbered = timed = with_two = 0
-    for line in islice(_body(text), JUDGED_LINES):
+    header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
+    body = (line.strip() for line in StringIO(text[header.end() if header else 0 :]))
+    for line in islice(filter(None, body), JUDGED_LINES):
         lines += 1
         numbered += NUMBERED.match(line) is not None
         times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))
         timed += TIME.match(line) is not None
         with_two += times > 1
     return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * with_two >= lines)
-
-
-def _body(text: str) -> Iterator[str]:
-    """Yield the lines that are not blank; of a file with a header, as of ESPS, those after the header."""
-    header = re.search(r"^#$", text[:2000], re.MULTILINE)
-    for line in StringIO(text[header.end() if header else 0 :]):
-        if line.strip():
-            yield line.strip()
 
 
 def _check_plain(text: str, path: Path) -> None:

@@ -26,8 +26,6 @@ LONGEST_SYMBOL = 40
 """Most letters of a phone with all its marks."""
 WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ"}
 """Diphthongs as the Montreal Forced Aligner writes them."""
-NO_SOUND = "<sil>"
-"""What stands for silence among tokens: no sound goes on beyond it."""
 
 
 def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
@@ -51,7 +49,8 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
                 f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
             )
     begun: dict[int, list[str]] = defaultdict(list)
-    tokens = [NO_SOUND if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
+    # no sound goes on beyond silence
+    tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
     for phone, number in token_phones(tokens):
         begun[number].append(phone)
     found: list[TimedLabel] = []
@@ -72,26 +71,22 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
     return found
 
 
-def inventory_labels(labels: Sequence[TimedLabel], where: str) -> tuple[TimedLabel, ...]:
-    """Return phones in time in the notation in which they make sense: as they are, X-SAMPA, or IPA.
+def in_inventory(tier: LabelTier, where: str) -> LabelTier:
+    """Return a tier; one of phones in the phones of the inventory, from those, X-SAMPA or IPA, as they make sense.
 
     Raises InputError: as ``ipa_labels``.
     """
+    labels = tier.labels if tier.role == PHONE_LABELS else ()
     spoken = [WITH_GLIDES.get(label.text, label.text) for label in labels if spoken_as(label.text) is SpokenAs.SPEECH]
     in_inventory = sum(phone_of(text) is not None for text in spoken)
     in_xsampa = sum(bool(xsampa_as_ipa(text)) for text in spoken)
     if in_inventory == len(spoken) or (in_inventory >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
-        return tuple(labels)
+        return tier
     as_ipa = WITH_GLIDES
     if all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
         as_ipa = {text: xsampa_as_ipa(text) or text for text in spoken}
-    return tuple(ipa_labels([replace(label, text=as_ipa.get(label.text, label.text)) for label in labels], where))
-
-
-def in_inventory(tier: LabelTier, where: str) -> LabelTier:
-    """Return a tier; one of phones in the phones of the inventory. Raises InputError: as ``ipa_labels``."""
-    is_phones = tier.role == PHONE_LABELS
-    return replace(tier, labels=inventory_labels(tier.labels, where)) if is_phones else tier
+    symbols = [replace(label, text=as_ipa.get(label.text, label.text)) for label in labels]
+    return replace(tier, labels=tuple(ipa_labels(symbols, where)))
 
 
 def with_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:

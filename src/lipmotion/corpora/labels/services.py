@@ -16,7 +16,6 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from typing import Any, NamedTuple
 
 from lipmotion.corpora.labels.phone_symbols import ipa_labels, with_pauses
@@ -29,14 +28,13 @@ from lipmotion.corpora.labels.tier import (
     LabelTier,
     TimedLabel,
     check_count,
-    clock_seconds,
     in_seconds,
     named_tier,
     unit_of_times,
 )
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import values
-from lipmotion.types.values import number_of, require
+from lipmotion.types.values import clock_seconds, number_of, require
 from lipmotion.units import SILENCE
 from lipmotion.units.spoken_text import check_word_count, spoken_text
 from lipmotion.units.text_normalisation import words_in
@@ -69,7 +67,12 @@ class Times(NamedTuple):
     pieces: bool = False
 
 
+POLLY = Times("time", usual=1000)
+SPEECHIFY = Times("starttime", "endtime", "duration", 1000)
+"""Of marks whose start and end are places in the text."""
 TIMES = (
+    Times("offsetsfrom", "offsetsto", per_s=1000),  # whisper.cpp
+    Times("timestampstart", "timestampend", per_s=1),  # transformers
     Times("startms", "endms", "durationms", 1000, pieces=True),  # Soniox
     Times("starttimems", "endtimems", "durationms", 1000),
     Times("starttime", "endtime", "duration"),  # AWS, Google, Yandex, Speechmatics, Qwen3-ASR, servers of Kokoro
@@ -141,7 +144,7 @@ SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
 """Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
-BLANK = re.compile(r"\s*")
+NOT_BLANK = re.compile(r"\S")
 DIGITS = re.compile(r"(?:PT)?([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
 
 
@@ -177,29 +180,20 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
     where : the file's name, for messages
     Raises InputError: it is damaged (with its line), a symbol in it is not known, or a time is none.
     """
-    documents = list(_documents(text, where))
-    numbered = [(f"line {line}", value) for line, value in documents]
-    if len(documents) == 1 and isinstance(documents[0][1], list):
-        numbered = [(f"item {number}", value) for number, value in enumerate(documents[0][1], 1)]
+    numbered = [(f"line {line}", value) for line, value in _documents(text, where)]
+    if len(numbered) == 1 and isinstance(numbered[0][1], list):
+        numbered = [(f"item {number}", value) for number, value in enumerate(numbered[0][1], 1)]
     objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
     if not objects or any("mouthcues" in item or {"format", "channels"} <= item.keys() for _, item in objects):
         return None
-    readers = (_column_tiers, _duration_tiers, _named_tiers)
-    tiers = next((tiers for reader in readers if (tiers := reader(objects, where)) is not None), None)
-    if tiers is None and len(objects) == len(numbered):
-        rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
-        check_count(len(rows), where)
-        timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
-        lists_of_words = [item["words"] for _, item in objects if isinstance(item.get("words"), list)]
-        missed = sum(isinstance(word, dict) and word.get("case") == MISSED for each in lists_of_words for word in each)
-        if missed and where:
-            LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
-        lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
-        is_empty = bool(lists) and not any(lists)
-        is_text = bool(rows) and all(item.keys() <= TEXT_ALONE for _, item in objects)
-        tiers = _tiers(rows, where) if timed or is_text else [] if is_empty else None
-    elif tiers is not None and not any(tier.labels for tier in tiers):
-        raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
+    for reader in (_column_tiers, _duration_tiers, _named_tiers):
+        tiers = reader(objects, where)
+        if tiers is not None and not any(tier.labels for tier in tiers):
+            raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
+        if tiers is not None:
+            break
+    else:
+        tiers = _listed_tiers(objects, where) if len(objects) == len(numbered) else None
     return tiers and [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
 
 
@@ -208,10 +202,9 @@ def described(text: str, where: str) -> str:
     value = next(_documents(text, where), (1, None))[1]
     first = value[0] if isinstance(value, list) and value else value
     names = list(first) if isinstance(first, dict) else []
-    if "blendshapes" in names:
-        return "holds weights of blendshapes (as Azure's 55), which is motion and no labels; render it"
-    if "mouthcues" in names:
-        return "holds mouth cues, which are motion and no labels; render it"
+    for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
+        if name in names:
+            return f"holds {what}, which is motion and no labels; render it"
     named = ", ".join(map(shortened, names[:8])) or "no names"
     return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
 
@@ -222,15 +215,19 @@ def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
     Names of members are in lower case, without underscores and JavaScript's ``priv``; those of tiers stay.
     Raises DamagedJsonError: with the line.
     """
+
+    def plain(name: str) -> str:
+        return name if " " in name else name.replace("_", "").lower().removeprefix("priv")
+
     decoder = json.JSONDecoder(
-        object_pairs_hook=lambda pairs: {_plain_name(name): value for name, value in pairs},
+        object_pairs_hook=lambda pairs: {plain(name): value for name, value in pairs},
         parse_constant=lambda _: None,  # NaN: missing
     )
-    at, line, counted = _next(text, 0), 1, 0
-    while at < len(text):
-        line, counted = line + text.count("\n", counted, at), at
+    at, line, counted = 0, 1, 0
+    while found := NOT_BLANK.search(text, at):
+        line, counted = line + text.count("\n", counted, found.start()), found.start()
         try:
-            value, at = decoder.raw_decode(text, at)
+            value, at = decoder.raw_decode(text, found.start())
         except json.JSONDecodeError as error:
             raise DamagedJsonError(
                 f"{where}: line {error.lineno}: damaged JSON ({error.msg}); write it again"
@@ -238,17 +235,6 @@ def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         except (ValueError, RecursionError) as error:
             raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
         yield line, value
-        at = _next(text, at)
-
-
-def _plain_name(name: str) -> str:
-    return name if " " in name else name.replace("_", "").lower().removeprefix("priv")
-
-
-def _next(text: str, at: int) -> int:
-    """Return the position of the next character that is not blank."""
-    found = BLANK.match(text, at)
-    return found.end() if found else at
 
 
 def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
@@ -260,31 +246,36 @@ def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     if isinstance(value, dict) and value.keys() & {"seconds", "nanos"}:
         seconds, nanos = (_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
-    if isinstance(value, str):
-        found, clock_s = DIGITS.fullmatch(value.strip()), clock_seconds(value)
-        if found:
-            value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
-        elif not math.isnan(clock_s):
-            return clock_s, 1
-        elif value.strip().lower() in ("", "nan", "null", "none", "n/a"):
-            value = None
-    if value in (None, -1, "-1", "-1.0"):  # some services write -1 where they have none
+    if not isinstance(value, str):
+        missing = value in (None, -1)  # some services write -1 where they have none
+        return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
+    found, clock_s = DIGITS.fullmatch(value.strip()), clock_seconds(value)
+    if found is None and not math.isnan(clock_s):
+        return clock_s, 1
+    if found is not None:
+        value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
+    if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
         return math.nan, per_s
-    if isinstance(value, str):
-        return number_of(value, f"{where}: a time is", "a number of seconds"), per_s
-    return require(values.number(), value, f"{where}: a time"), per_s
+    return number_of(value, f"{where}: a time is", "a number of seconds"), per_s
+
+
+def _seconds(value: Any, where: str, per_s: float = 1) -> float:
+    """Return a time in seconds. Raises InputError: it is missing, or no number."""
+    time, own = _number(value, where)
+    if math.isnan(time):
+        raise InputError(f"{where} has no time")
+    if abs(time / (own or per_s)) > LATEST_S:
+        raise InputError(f"{where}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
+    return time / (own or per_s)
 
 
 def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
     text = next((text for name in TEXTS if name in item and (text := _text(item[name])) is not None), None)
+    role = WORDS if "word" in item or name in WORD_LISTS else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
         found = shortened(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {found}, required a text")
-    if isinstance(item.get("time"), dict):  # Hume, PlayHT
-        item = {**item, **{f"time{edge}": time for edge, time in item["time"].items()}, "time": None}
-    speaker, stamp, offsets = _speaker(item), item.get("timestamp"), item.get("offsets")
-    role = WORDS if "word" in item or name in WORD_LISTS else ""
     if "visemeid" in item or item.get("type") == "viseme":
         text, role = _viseme(item.get("visemeid", item.get("value")), f"{where}: {place}"), PHONE_LABELS
     if text is not None and "markname" in item and not MARK.fullmatch(text):
@@ -292,22 +283,27 @@ def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
             f"{where}: {place} is the mark {shortened(text)!r}, which is no word; name every mark as the word that "
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
         )
-    if isinstance(offsets, dict) and "from" in offsets:  # whisper.cpp
-        item, times = offsets, Times("from", "to", per_s=1000)
-    elif isinstance(stamp, list) and len(stamp) == 2:  # transformers
-        item, times = dict(zip(("start", "end"), stamp, strict=True)), Times("start", "end", per_s=1)
-    else:
-        times = next((row for row in TIMES if (row.start or row.end) in item), UNTIMED)
-        is_mark = item.get("type") in POLLY_KINDS  # its start and end are places in the text
-        if is_mark and item.get("time") is not None:
-            times = Times("time", usual=1000)
-        elif is_mark and {"start", "starttime"} <= item.keys():  # Speechify
-            times = times._replace(per_s=1000)
-    start, per_s = _number(item.get(times.start), f"{where}: {place}", times.per_s)
-    end, per_s = _number(item.get(times.end), f"{where}: {place}", per_s)
-    if math.isnan(end) and times.duration in item:
-        end = start + _number(item[times.duration], f"{where}: {place}")[0]
-    return None if text is None else Row(start, end, text, place, times._replace(per_s=per_s), speaker, role)
+    start, end, times = _times(item, f"{where}: {place}")
+    return None if text is None else Row(start, end, text, place, times, _speaker(item), role)
+
+
+def _times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
+    """Return the start and the end of an item by the first row of ``TIMES`` that it has."""
+    stamp, given = item.get("timestamp"), item
+    if isinstance(stamp, list) and len(stamp) == 2:
+        given = {**given, "timestampstart": stamp[0], "timestampend": stamp[1]}
+    for name in ("time", "offsets"):  # an object of both
+        if isinstance(item.get(name), dict):
+            given = {**given, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
+    times = next((row for row in TIMES if (row.start or row.end) in given), UNTIMED)
+    if item.get("type") in POLLY_KINDS and times not in TIMES[:2]:
+        is_speechify = {"start", "starttime"} <= given.keys()
+        times = POLLY if given.get("time") is not None else SPEECHIFY if is_speechify else times
+    start, per_s = _number(given.get(times.start), where, times.per_s)
+    end, per_s = _number(given.get(times.end), where, per_s)
+    if math.isnan(end) and times.duration in given:
+        end = start + _number(given[times.duration], where)[0]
+    return start, end, times._replace(per_s=per_s)
 
 
 def _text(value: Any) -> str | None:
@@ -335,24 +331,20 @@ def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) ->
     for number, each in enumerate(items[:1] if name in ALTERNATIVES else items, 1):
         is_stamp = isinstance(each, list) and len(each) == 3 and isinstance(each[0], str)  # IBM's
         item = dict(zip(("word", "start", "end"), each, strict=True)) if is_stamp else each
+        found: list[Row] = []
         if isinstance(item, dict):
-            rows += _rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
+            found = _rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
         elif name in ("segments", "words"):
             require(values.members({}), item, f"{where}: {name!r}, item {number}")
+        for row in found:  # a token that is a piece of a word goes on with the one ahead of it
+            piece = name == "tokens" and row.times.pieces and not row.text[:1].isspace()
+            if rows and piece and row.speaker == rows[-1].speaker:
+                end = rows[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
+                rows[-1] = replace(rows[-1], end=end, text=rows[-1].text + row.text)
+            else:
+                rows.append(row)
         check_count(len(rows), where)
-    return _joined(rows) if name == "tokens" else rows
-
-
-def _joined(rows: list[Row]) -> list[Row]:
-    """Return the words of tokens that are pieces of words."""
-    words: list[Row] = []
-    for row in rows:
-        if words and row.times.pieces and not row.text[:1].isspace() and row.speaker == words[-1].speaker:
-            end = words[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
-            words[-1] = replace(words[-1], end=end, text=words[-1].text + row.text)
-        else:
-            words.append(row)
-    return words
+    return rows
 
 
 def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
@@ -373,35 +365,53 @@ def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, dep
     elif not lines and not timed:  # under a name that is not known
         lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS))
         lines = [line for line in lines if line.parts or not math.isnan(line.start)]
-    if not lines:
-        return [] if own is None or item.get("case") == MISSED else [own, *_phones_in(item, own, where)]
+    if not lines and (own is None or item.get("case") == MISSED):
+        return []
+    if not lines and own is not None:  # a word, perhaps with Gentle's phones
+        phones = _durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
+        spans = _in_a_row(phones, own.start, where) if phones else []
+        rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
+        return [own, *(Row(*row, own.times, own.speaker, PHONE_LABELS) for row in rows)]
     if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
         lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
     speaker = own.speaker if own is not None else _speaker(item)
     return [line if line.speaker else replace(line, speaker=speaker) for line in lines]
 
 
-def _phones_in(item: dict[str, Any], word: Row, where: str) -> list[Row]:
-    """Return the phones of a word of Gentle, of which the durations are given."""
-    phones: list[Row] = []
-    start = word.start
-    for number, each in enumerate(item["phones"] if isinstance(item.get("phones"), list) else [], 1):
-        place, fields = f"{word.place}, phone {number}", each if isinstance(each, dict) else {}
-        end = start + _seconds(fields.get("duration"), f"{where}: {place}")
-        name = require(_TEXT, fields.get("phone"), f"{where}: {place}").partition("_")[0]
-        phones.append(replace(word, start=start, end=end, text=name, place=place, role=PHONE_LABELS))
-        start = end
-    return phones
-
-
 def _speaker(item: dict[str, Any]) -> str:
     return next((str(item[name]) for name in SPEAKERS if item.get(name) not in (None, "")), "")
 
 
-def _tiers(rows: list[Row], where: str) -> list[LabelTier]:
-    """Return rows as tiers with times in seconds: of phones, and of the words of each speaker."""
-    phones = [row for row in rows if row.role == PHONE_LABELS]
-    rows = [row for row in rows if row.role != PHONE_LABELS]
+def _viseme(value: Any, where: str) -> str:
+    """Return the phone with the mouth of a viseme of Azure (a number) or of Polly (a name)."""
+    if isinstance(value, str):
+        if value not in POLLY_VISEMES:
+            known = " ".join(POLLY_VISEMES)
+            raise InputError(f"{where}: no viseme of Polly is {shortened(value)!r}; known are: {known}")
+        return POLLY_VISEMES[value]
+    return AZURE_VISEMES[require(values.whole(0, len(AZURE_VISEMES) - 1), value, f"{where}: the viseme")]
+
+
+def _listed_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return lists of items in time: their phones, and the words of each speaker; None: there are none."""
+    rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
+    check_count(len(rows), where)
+    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
+    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
+    if missed and where:
+        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
+    timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
+    if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
+        lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
+        return [] if lists and not any(lists) else None
+    phones = _until_next([row for row in rows if row.role == PHONE_LABELS], [])
+    spoken = [LabelTier(PHONE_LABELS, tuple(_labels(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
+    silences = [row.start for row in phones if row.text == SILENCE]
+    return spoken + _said_tiers(_until_next([row for row in rows if row.role != PHONE_LABELS], silences), where)
+
+
+def _said_tiers(rows: list[Row], where: str) -> list[LabelTier]:
+    """Return a tier of each speaker: of words, if nearly all are single ones, else of lines."""
     half = len(rows) // 2
     first, again = ([(row.text, row.start) for row in part] for part in (rows[:half], rows[half:]))
     if half and first == again and rows[0].speaker != rows[-1].speaker:
@@ -413,78 +423,72 @@ def _tiers(rows: list[Row], where: str) -> list[LabelTier]:
     single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
     role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
-    labels = _labels(rows, role, where, [row.start for row in phones if row.text == SILENCE])
-    for row, label in zip(rows, labels, strict=True):
+    for row, label in zip(rows, _labels(rows, role, where), strict=True):
         by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
-    tiers = [LabelTier(PHONE_LABELS, tuple(_labels(phones, PHONE_LABELS, where, [])), PHONE_LABELS)] if phones else []
-    return tiers + [LabelTier(who or role, tuple(said), role, who) for who, said in by_speaker.items()]
+    return [LabelTier(who or role, tuple(said), role, who) for who, said in by_speaker.items()]
 
 
-def _labels(rows: list[Row], role: str, where: str, silences: list[float]) -> list[TimedLabel]:
-    """Return rows in seconds; an event lasts to the next one or to a silence, the last one is open."""
-    events = [row.start for row in rows if row.times.start in EVENTS]
-    edges = sorted([*events, *silences]) if events else []
-    ended = [
-        replace(row, end=next(iter(edges[bisect_right(edges, row.start) :]), math.inf))
-        if math.isnan(row.end) and edges
-        else row
-        for row in (sorted(rows, key=lambda row: row.start) if edges else rows)
-    ]
-    rows[:] = ended
-    per_s = _per_s([part for row in rows for part in row.parts or (row,)], role, where)
-    return [
-        replace(_label(row, per_s, where), parts=tuple(_label(part, per_s, where) for part in row.parts))
-        for row in rows
-    ]
+def _until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
+    """Return rows, of which events last to the next one or to a silence, and the last one is open."""
+    starts = [row.start for row in rows if row.times.start in EVENTS]
+    if not starts:
+        return rows
+    edges = sorted([*starts, *silences])
+    later = [*edges, math.inf]
+    in_time = sorted(rows, key=lambda row: row.start)
+    return [replace(row, end=later[bisect_right(edges, row.start)]) if math.isnan(row.end) else row for row in in_time]
 
 
-def _label(row: Row, per_s: int, where: str) -> TimedLabel:
-    """Return a row in seconds. Raises InputError: it ends long before it starts, or its time is none."""
-    start_s, end_s = (time / (row.times.per_s or per_s) for time in (row.start, row.end))
-    for time, time_s in ((row.start, start_s), (row.end, end_s)):
-        if LATEST_S < abs(time_s) < math.inf:
-            raise InputError(f"{where}: {row.place}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
-    start_s = math.nan if start_s <= EARLIEST_S else start_s
-    if end_s < start_s - ROUNDING_S:
-        raise InputError(f"{where}: {row.place} ends at {end_s:g} s, before its start at {start_s:g} s; correct it")
-    return TimedLabel(start_s, max(end_s, start_s) if end_s < start_s else end_s, row.text, row.place)
+def _labels(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
+    """Return rows in seconds, in the unit that their names say, or else in the one that their lengths do.
 
-
-def _per_s(rows: Sequence[Row], role: str, where: str) -> int:
-    """Return how many units are a second in rows whose names do not say it."""
-    judged = [row for row in rows if not row.times.per_s and not math.isnan(row.start)]
+    Raises InputError: one ends long before it starts, or its time is none, or the unit is not known.
+    """
+    parts = [part for row in rows for part in row.parts or (row,)]
+    judged = [part for part in parts if not part.times.per_s and not math.isnan(part.start)]
     if any(row.times.usual == 0 for row in judged):
         raise InputError(
             f"{where}: its times are offsets in frames, whose length is not known; required start and end in seconds"
         )
     spans = [(row.start, row.end, row.text) for row in judged]
-    return unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
+    per_s = unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
+
+    def label(row: Row) -> TimedLabel:
+        start_s, end_s = (time / (row.times.per_s or per_s) for time in (row.start, row.end))
+        for time, time_s in ((row.start, start_s), (row.end, end_s)):
+            if LATEST_S < abs(time_s) < math.inf:
+                raise InputError(f"{where}: {row.place}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
+        start_s = math.nan if start_s <= EARLIEST_S else start_s
+        if end_s < start_s - ROUNDING_S:
+            raise InputError(f"{where}: {row.place} ends at {end_s:g} s, before its start at {start_s:g} s; correct it")
+        end_s = start_s if end_s < start_s else end_s
+        return TimedLabel(start_s, end_s, row.text, row.place, tuple(map(label, row.parts)))
+
+    return [label(row) for row in rows]
 
 
-def _seconds(value: Any, where: str, per_s: float = 1) -> float:
-    """Return a time in seconds. Raises InputError: it is missing, or no number."""
-    time, own = _number(value, where)
-    if math.isnan(time):
-        raise InputError(f"{where} has no time")
-    if abs(time / (own or per_s)) > LATEST_S:
-        raise InputError(f"{where}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
-    return time / (own or per_s)
+def _durations(items: Any, text: str, length: str, place: str, per_s: float) -> list[tuple[str, Any, Any, float]]:
+    """Return the items of a list of objects: place, text, length and how many of its units are a second."""
+    fields = [each if isinstance(each, dict) else {} for each in (items if isinstance(items, list) else [])]
+    return [(f"{place} {number}", each.get(text), each.get(length), per_s) for number, each in enumerate(fields, 1)]
+
+
+def _in_a_row(items: Sequence[tuple[str, Any, Any, float]], start_s: float, where: str) -> list[TimedLabel]:
+    """Return labels of which the lengths are given, one after another."""
+    check_count(len(items), where)
+    labels: list[TimedLabel] = []
+    for place, text, length, per_s in items:
+        end_s = start_s + _seconds(length, f"{where}: {place}", per_s)
+        labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
+        start_s = end_s
+    return labels
 
 
 def _word_and_phone_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
     check_count(max(len(words), len(phones)), where)
+    phones = ipa_labels(phones, where)
     tiers = (LabelTier(WORDS, tuple(words), WORDS), LabelTier(PHONE_LABELS, tuple(phones), PHONE_LABELS))
     return [tier for tier in tiers if tier.labels]
-
-
-def _viseme(value: Any, where: str) -> str:
-    """Return the phone with the mouth of a viseme of Azure (a number) or of Polly (a name)."""
-    if isinstance(value, str):
-        if value not in POLLY_VISEMES:
-            known = " ".join(POLLY_VISEMES)
-            raise InputError(f"{where}: no viseme of Polly is {shortened(value)!r}; known are: {known}")
-        return POLLY_VISEMES[value]
-    return AZURE_VISEMES[require(values.whole(0, len(AZURE_VISEMES) - 1), value, f"{where}: the viseme")]
 
 
 def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
@@ -503,8 +507,12 @@ def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
                     pieces += per_s != 1 or "wordstarttimeseconds" in names
     if pieces > 1:
         raise InputError(f"{where}: holds {pieces} pieces whose times each begin at 0; save the sound of each apart")
-    words = found[WORDS] + _words_of_characters(found["characters"])
-    tiers = _word_and_phone_tiers(words, ipa_labels(found[PHONE_LABELS], where), where)
+    characters = found["characters"]
+    owner_of = [number for number, label in enumerate(characters) for _ in label.text]
+    for match in SPOKEN_WORD.finditer("".join(label.text for label in characters).replace("▁", " ")):
+        first, last = characters[owner_of[match.start()]], characters[owner_of[match.end() - 1]]
+        found[WORDS].append(replace(first, end_s=last.end_s, text=match[0]))
+    tiers = _word_and_phone_tiers(found[WORDS], found[PHONE_LABELS], where)
     return in_seconds(tiers, where) if any(found.values()) else None
 
 
@@ -514,25 +522,13 @@ def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: s
     if not all(isinstance(each, list) for each in lists) or len({len(each) for each in lists}) > 1:
         raise InputError(f"{where}: required are the lists {', '.join(names)}, all of one length")
     check_count(len(lists[0]), where)
-    labels = []
     lists += [[*lists[1][1:], math.inf][: len(lists[1])]] if len(lists) == 2 else []
-    for number, (text, start, end) in enumerate(zip(*lists, strict=True), 1):
-        start_s, end_s = (
-            time if time is math.inf else _seconds(time, f"{where} {number}", per_s) for time in (start, end)
-        )
+    labels = []
+    for number, (text, *times) in enumerate(zip(*lists, strict=True), 1):
+        start_s, end_s = (time if time is math.inf else _seconds(time, f"{where} {number}", per_s) for time in times)
         end_s += start_s if "duration" in names[-1] else 0.0
         labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where} {number}"), f"{names[0]} {number}"))
     return labels
-
-
-def _words_of_characters(characters: list[TimedLabel]) -> list[TimedLabel]:
-    """Return the words that characters in time make, without directions in brackets."""
-    owner = [number for number, label in enumerate(characters) for _ in label.text]
-    words = []
-    for match in SPOKEN_WORD.finditer("".join(label.text for label in characters).replace("▁", " ")):
-        first, last = characters[owner[match.start()]], characters[owner[match.end() - 1]]
-        words.append(replace(first, end_s=last.end_s, text=match[0]))
-    return words
 
 
 def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
@@ -543,12 +539,10 @@ def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
         raise InputError(f"{where}: holds {len(kokoro)} sentences, whose times each begin at 0; give those of one")
     if not kokoro and (len(piper) < len(objects)):
         return None
-    rows: list[tuple[str, Any, Any, float]] = []
+    items: list[tuple[str, Any, Any, float]] = []
     for place, item in piper:
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
-        for number, each in enumerate(item["phonemealignments"], 1):
-            fields = each if isinstance(each, dict) else {}
-            rows.append((f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate))
+        items += _durations(item["phonemealignments"], "phoneme", "numsamples", f"{place}, phoneme", rate)
     for item in kokoro:
         letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):
@@ -557,17 +551,11 @@ def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
                 "phonemes"
             )
         pairs = enumerate(zip(letters, item["preddur"], strict=True))
-        rows += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
-    check_count(len(rows), where)
-    lengths_s = [_seconds(length, f"{where}: {place}", per_s) for place, _, length, per_s in rows]
-    edges_s = [0.0, *accumulate(lengths_s)]
-    phones = [
-        TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place)
-        for (place, text, *_), start_s, end_s in zip(rows, edges_s, edges_s[1:], strict=False)
-    ]
+        items += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
+    phones = _in_a_row(items, 0.0, where)
     words = [row for item in kokoro for row in _rows({"tokens": item.get("tokens")}, "", where)]
-    timed = [_label(row, 1, where) for row in words if not math.isnan(row.start)]
-    return _word_and_phone_tiers(timed, ipa_labels(phones, where), where)
+    timed = _labels([row for row in words if not math.isnan(row.start)], WORDS, where)
+    return _word_and_phone_tiers(timed, phones, where)
 
 
 def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:

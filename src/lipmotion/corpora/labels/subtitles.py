@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from io import StringIO
 
-from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count, clock_seconds
+from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count
 from lipmotion.errors import InputError, shortened
+from lipmotion.types.values import clock_seconds
 from lipmotion.units.spoken_text import speaker_names, spoken_text
 
 TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
@@ -26,7 +27,7 @@ FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{
 NO_ARROW = re.compile(rf"^\s{{0,20}}{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$", re.MULTILINE)
 """A line of two times without an arrow that is known; times of day, as 5:30, do not count."""
 TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
-SBV = re.compile(rf"{TIME}\s?,\s?{TIME}\s*?$", re.MULTILINE)
+SBV = re.compile(rf"\A{TIME}\s?,\s?{TIME}\s*?$", re.MULTILINE)
 """The times of YouTube's own format, ``0:00:01.000,0:00:02.500``."""
 WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
@@ -38,11 +39,8 @@ ROW = re.compile(r"(\d{1,12})\t(\d{1,12})\t(.*)")
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
-SUBSTATION = re.compile(r"\s*\[Script Info\]", re.IGNORECASE)
-"""The start of a file of SubStation Alpha."""
-DIALOGUE = re.compile(rf"^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.MULTILINE)
-"""The start of a line that is shown: its layer, its start, its end. Editors may save the lines without the header."""
-FORMAT_LINE, DIALOGUE_LINE = "format:", "dialogue:"
+SUBSTATION = re.compile(rf"\A\s*\[(?i:Script Info)\]|^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.MULTILINE)
+"""SubStation Alpha: its first line, or, where an editor saved none, a line that is shown, with its start and end."""
 DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text".split()
 """The fields of a line where no line ``Format:`` says them."""
 STYLES = re.compile(r"(\{[^{}]{0,200}\})")
@@ -52,24 +50,15 @@ BREAK = re.compile(r"\\[Nnh]")
 """Line breaks and hard blanks within the text."""
 LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
 """What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
-LYRICS = re.compile(rf"(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]")
+LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]")
 """The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``."""
 LYRICS_LINE = re.compile(rf"((?:\[{TIME}\]\s{{0,4}}){{1,100}}).*")
 
 
 def is_subtitles(text: str) -> bool:
     """Return whether a text is a file of subtitles or lyrics, or Whisper's table of lines."""
-    return (
-        text.startswith(("WEBVTT", HEADER))
-        or _is_substation(text)
-        or CUE.search(text) is not None
-        or SBV.match(text) is not None
-        or LYRICS.match(text) is not None
-    )
-
-
-def _is_substation(text: str) -> bool:
-    return SUBSTATION.match(text) is not None or DIALOGUE.search(text) is not None
+    found = (form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
+    return text.startswith(("WEBVTT", HEADER)) or any(found)
 
 
 def subtitle_tier(text: str, where: str) -> LabelTier:
@@ -80,13 +69,9 @@ def subtitle_tier(text: str, where: str) -> LabelTier:
     where : the file's name, for messages
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words.
     """
-    if text.startswith(HEADER):
-        cues = _rows(text, where)
-    elif LYRICS.match(text):
-        cues = _lyrics(text, where)
-    else:
-        cues = _substation_cues(text, where) if _is_substation(text) else _cues(text, where)
-    labels = (replace(cue, parts=_words(cue)) for cue in _without_repetitions(list(cues)))
+    read = _rows if text.startswith(HEADER) else _lyrics if LYRICS.search(text) else _cues
+    cues = list((_dialogue if read is _cues and SUBSTATION.search(text) else read)(text, where))
+    labels = (replace(cue, parts=_words(cue)) for cue in _without_repetitions(cues))
     return LabelTier("subtitles", tuple(labels), LINES)
 
 
@@ -177,14 +162,10 @@ def _without_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
         return cues
     kept = cues[:1]
     for before, cue, shown, lines in zip(cues, cues[1:], plain, plain[1:], strict=False):
-        near = cue.start_s <= before.end_s + NEAR_S
-        kept.append(replace(cue, text="\n".join(cue.text.split("\n")[_repeated(shown, lines) if near else 0 :])))
+        most = min(len(lines), len(shown)) if cue.start_s <= before.end_s + NEAR_S else 0
+        repeated = next((n for n in range(most, 0, -1) if shown[-n:] == lines[:n]), 0)
+        kept.append(replace(cue, text="\n".join(cue.text.split("\n")[repeated:])))
     return kept
-
-
-def _repeated(shown: tuple[str, ...], lines: tuple[str, ...]) -> int:
-    """Return how many of the first lines are the last ones that were shown before."""
-    return next((n for n in range(min(len(lines), len(shown)), 0, -1) if shown[-n:] == lines[:n]), 0)
 
 
 def _words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
@@ -202,10 +183,10 @@ def _words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
     )
 
 
-def _substation_cues(text: str, where: str) -> Iterator[TimedLabel]:
-    """Yield the dialogue of a file, without drawings; comments, styles and what else it holds are left out.
+def _dialogue(text: str, where: str) -> Iterator[TimedLabel]:
+    """Yield the dialogue of SubStation Alpha, without drawings; comments, styles and what else it holds are left out.
 
-    The tags of styles (``{\\an8}``, ``{\\i1}``) stay in the text: ``spoken_text`` takes them out, as of all subtitles.
+    The tags of styles (``{\\an8}``, ``{\\i1}``) are left out too. The text is the last field, and may hold commas.
     where : the file's name, for messages
     Raises InputError: a line of dialogue with too few fields, times that are none, or an end before the start, with its
     line; too many lines.
@@ -213,34 +194,23 @@ def _substation_cues(text: str, where: str) -> Iterator[TimedLabel]:
     fields, in_events = DEFAULT_FIELDS, True
     for number, row in enumerate(StringIO(text), 1):
         line = row.strip()
+        name, _, rest = line.partition(":")
         if line.startswith("["):
             in_events = line.lower() == "[events]"
-        elif in_events and line.lower().startswith(FORMAT_LINE):
-            fields = [name.strip().lower() for name in line[len(FORMAT_LINE) :].split(",")]
-        elif in_events and line.lower().startswith(DIALOGUE_LINE):
+        elif in_events and name.lower() == "format":
+            fields = [field.strip().lower() for field in rest.split(",")]
+        elif in_events and name.lower() == "dialogue":
             check_count(number, where)
-            yield _dialogue(line, number, fields, where)
-
-
-def _dialogue(line: str, number: int, fields: list[str], where: str) -> TimedLabel:
-    """Return one line of dialogue; the text is the last field, and may hold commas."""
-    values = line[len(DIALOGUE_LINE) :].split(",", maxsplit=len(fields) - 1)
-    by_name = dict(zip(fields, values, strict=False))
-    start, end = (re.fullmatch(TIME, by_name.get(name, "").strip()) for name in ("start", "end"))
-    if start is None or end is None or len(values) < len(fields):
-        wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
-        raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
-    shown = BREAK.sub("\n", _without_drawings(by_name.get("text", values[-1])))
-    return TimedLabel(clock_seconds(start[1]), clock_seconds(end[1]), shown, f"line {number}")
-
-
-def _without_drawings(text: str) -> str:
-    """Return a text without drawings and without tags."""
-    shown, drawing = [], False
-    for number, part in enumerate(STYLES.split(text)):
-        if number % 2:  # a tag
-            modes = DRAWING_MODE.findall(part)
-            drawing = modes[-1] != "0" if modes else drawing
-        elif not drawing:
-            shown.append(part)
-    return "".join(shown)
+            values = rest.split(",", maxsplit=len(fields) - 1)
+            by_name = dict(zip(fields, values, strict=False))
+            start, end = (re.fullmatch(TIME, by_name.get(edge, "").strip()) for edge in ("start", "end"))
+            if start is None or end is None or len(values) < len(fields):
+                wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
+                raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
+            shown, drawing = "", False
+            for place, part in enumerate(STYLES.split(by_name.get("text", values[-1]))):
+                modes = DRAWING_MODE.findall(part) if place % 2 else []  # of a tag
+                drawing = modes[-1] != "0" if modes else drawing
+                shown += "" if drawing or place % 2 else part
+            times = (clock_seconds(start[1]), clock_seconds(end[1]))
+            yield TimedLabel(*times, BREAK.sub("\n", shown), f"line {number}")

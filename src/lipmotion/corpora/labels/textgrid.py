@@ -13,8 +13,6 @@ TOKEN = re.compile(
 )
 """What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
 MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
-LONGEST_COUNT = 18
-"""Most digits of a count."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
@@ -41,19 +39,24 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
         _take(tokens, "text")
         if _take(tokens, "text") != "TextGrid":
             raise InputError(f"{where}: a Praat file of another kind; save a TextGrid")
-        _pass_range(tokens)
+        _take(tokens, "number"), _take(tokens, "number")  # from when to when it lasts
         tier_count = _count(tokens) if _take(tokens, "flag") == "exists" else 0
         for number in range(1, tier_count + 1):
             place = f"tier {number}"
             kind, name = _take(tokens, "text"), _take(tokens, "text")
             place = f"tier {shortened(name)!r}"
-            _pass_range(tokens)
+            _take(tokens, "number"), _take(tokens, "number")
             count = _count(tokens)
             total += count
             check_count(total, where)
-            labels = [_label(tokens, kind, f"{place}, interval {i + 1}", where) for i in range(count)]
-            if kind == INTERVALS:
-                tiers.append(named_tier(name, labels))
+            if count and kind not in (INTERVALS, POINTS):
+                raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
+            labels = []
+            for position in (f"{place}, interval {i + 1}" for i in range(count)):
+                start_s = required_time(_take(tokens, "number"), position, where)
+                end_s = required_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
+                labels.append(TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), position))
+            tiers += [named_tier(name, labels)] if kind == INTERVALS else []
         place = "what follows the last tier"
         if next(tokens, None) is not None:
             raise _DamagedError("more is there than the counts say")
@@ -68,39 +71,18 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
     while match := TOKEN.search(text, at):
         at = match.end()
         if match.lastgroup == "text":
-            at = _text_end(text, at)
+            while (
+                text[at : at + 1] == '"' and (closing := text.find('"', at + 1)) > 0
+            ):  # written twice: one in the text
+                at = closing + 1
             yield "text", text[match.start() + 1 : at - 1]
         elif match.lastgroup:
             yield match.lastgroup, match[match.lastgroup]
 
 
-def _text_end(text: str, at: int) -> int:
-    """Return the end of a text in quotes, from the end of its second quote: quotes in it are written twice."""
-    while text[at : at + 1] == '"':
-        closing = text.find('"', at + 1)
-        if closing < 0:
-            break
-        at = closing + 1
-    return at
-
-
-def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str) -> TimedLabel:
-    if kind not in (INTERVALS, POINTS):
-        raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
-    start_s = required_time(_take(tokens, "number"), place, where)
-    end_s = required_time(_take(tokens, "number"), place, where) if kind == INTERVALS else start_s
-    return TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), place)
-
-
-def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:
-    """Skip the start and end time of a file or a tier."""
-    for _ in range(2):
-        _take(tokens, "number")
-
-
 def _count(tokens: Iterator[tuple[str, str]]) -> int:
     value = _take(tokens, "number")
-    if not (value.isascii() and value.isdecimal()) or len(value) > LONGEST_COUNT:
+    if re.fullmatch("[0-9]{1,18}", value) is None:
         raise _DamagedError(f"there stands number {value[:40]}, required a count")
     return int(value)
 

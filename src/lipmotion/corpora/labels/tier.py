@@ -19,10 +19,8 @@ from lipmotion.units import (
     RECOGNISED,
     SILENCE,
     UNKNOWN_PHONES,
-    RecognisedPhone,
     is_silent,
     phone_named,
-    with_confidences,
     with_reduced_vowels,
 )
 from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS
@@ -59,32 +57,24 @@ ROUNDING_S = 1e-3
 """Times may differ by this much: they are written with three digits or more."""
 WHOLE_WORD_S = 0.03
 """A span of unknown phones whose ends are so near to those of a word is all of it."""
-IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
+IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 GLOTTAL_STOP = "q"
 """TIMIT's: a sound of the throat, with any lips."""
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
-CLOCK = r"(?:(\d{1,6}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d{1,9})?)"
-"""A time of day, or of a file: hours, which may be missing, minutes, and seconds."""
 MOST_LABELS = 250_000
 """Most labels of a file: phones of five hours of speech."""
-TYPICAL_S = {PHONE_LABELS: 0.08}
-TYPICAL_WORD_S = 0.3
+TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3
 """How long a phone, and a word, alone or of a line, last."""
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 """If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
 WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
 """The same for whole numbers of words and phones, which may be frames (0), too; lines in seconds last that long."""
 TICKS_PER_S = 10_000_000
-UNITS = {
-    1: "seconds",
-    100: "hundredths of a second",
-    1000: "milliseconds",
-    1_000_000: "microseconds",
-    TICKS_PER_S: "ticks of 100 ns",
-}
+UNITS = {1: "seconds", 100: "hundredths of a second", 1000: "milliseconds", 1_000_000: "microseconds"}
+UNITS[TICKS_PER_S] = "ticks of 100 ns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,15 +120,6 @@ def check_count(count: int, where: str) -> None:
         raise InputError(f"{where}: more than {MOST_LABELS} labels; give those of one recording")
 
 
-def clock_seconds(text: str, frames_per_s: float = 0) -> float:
-    """Return the seconds of a time as 1:02:03.5, 2:03,5 or, if frames have a rate, 00:02:03:12; NaN: it is none."""
-    found = re.fullmatch(rf"{CLOCK}(?::(\d+(?:\.\d+)?))?", text.strip())
-    if found is None or (found[4] and not frames_per_s):
-        return math.nan
-    seconds = float(found[3].replace(",", ".")) + float(found[4] or 0) / (frames_per_s or 1)
-    return int(found[1] or 0) * 3600 + int(found[2]) * 60 + seconds
-
-
 def required_time(text: str, place: str, where: str) -> float:
     """Return a time from its text, also with a decimal comma. Raises InputError: it is none, or not finite."""
     return number_of(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
@@ -160,7 +141,7 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
     whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
     if len(lengths) < 1 + (usual == 1):
         return usual if whole else 1
-    times = median(lengths) / TYPICAL_S.get(role, TYPICAL_WORD_S)
+    times = median(lengths) / (TYPICAL_PHONE_S if role == PHONE_LABELS else TYPICAL_WORD_S)
     limits = WHOLE_LIMITS if whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
     per_s = next((per_s for limit, per_s in limits if times < limit), TICKS_PER_S)
     if not whole and per_s != 1000:
@@ -174,23 +155,21 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
     return per_s
 
 
-def in_seconds(tiers: list[LabelTier], where: str) -> list[LabelTier]:
+def in_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[LabelTier]:
     """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
 
+    per_s : how many of their units are a second; 0: how long words last decides
     Raises InputError: as ``unit_of_times``.
     """
     said = [tier for tier in tiers if tier.role != OTHER]
     judged = next((tier for tier in said if tier.role == WORDS or holds_phones(tier)), next(iter(said), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
     role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
-    per_s = unit_of_times(spans, role, where)
-    return [scaled_tier(tier, per_s) for tier in tiers]
-
-
-def scaled_tier(tier: LabelTier, per_s: float) -> LabelTier:
-    """Return a tier in seconds, of whose units of time so many are a second."""
-    labels = (replace(label, start_s=label.start_s / per_s, end_s=label.end_s / per_s) for label in tier.labels)
-    return replace(tier, labels=tuple(labels))
+    per_s = per_s or unit_of_times(spans, role, where)
+    scaled = [
+        [replace(each, start_s=each.start_s / per_s, end_s=each.end_s / per_s) for each in t.labels] for t in tiers
+    ]
+    return [replace(tier, labels=tuple(labels)) for tier, labels in zip(tiers, scaled, strict=True)]
 
 
 def holds_phones(tier: LabelTier) -> bool:
@@ -217,13 +196,6 @@ def tiers_of_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     if shared_s > SHARED_TIME * spoken_s:
         return tiers
     return [replace(tier, speaker=tier.name, role=LINES) if tier in unknown else tier for tier in tiers]
-
-
-def with_recognised(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
-    """Return phones in time in which those of a tier of recognised ones have their confidence; the others are known."""
-    found = [(label, RECOGNISED_LABEL.fullmatch(label.text)) for label in tier.labels]
-    rows = (RecognisedPhone(label.start_s, label.end_s, match[1], float(match[2])) for label, match in found if match)
-    return with_confidences(units, rows)
 
 
 def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
@@ -303,7 +275,13 @@ def phone_timeline(
     """
     _check_order(tier.labels, where, with_gaps=with_gaps)
     labels = _whole_phones(tier.labels)
-    phones = [_required_phone(label, where) for label in labels]
+    phones: list[str] = []
+    for label in labels:
+        phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
+        if phone is None:
+            found = f"{label.position} is {label.text[:40]!r}"
+            raise InputError(f"{where}: {found}, which is no phone; the phones are: {' '.join(PHONES)}")
+        phones.append(phone)
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words and not marked:
         phones = _reduced(labels, phones, words)
@@ -324,15 +302,13 @@ def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -
             raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
         if label.end_s < label.start_s:
             raise _reversed(label, where)
-        if label.start_s < end_s - ROUNDING_S:
+        late_s, found = label.start_s - end_s, f"{where}: {label.position} starts at {label.start_s:g} s, "
+        if late_s < -ROUNDING_S:
+            raise InputError(f"{found}before the one ahead of it ends ({end_s:g} s); labels must not overlap")
+        if number and not with_gaps and late_s > ROUNDING_S:
             raise InputError(
-                f"{where}: {label.position} starts at {label.start_s:g} s, before the one ahead of it ends ({end_s:g} "
-                "s); labels must not overlap"
-            )
-        if number and not with_gaps and label.start_s > end_s + ROUNDING_S:
-            raise InputError(
-                f"{where}: {label.position} starts at {label.start_s:g} s, the one before it ends at {end_s:g} "
-                "s; phones must follow each other without a gap: label silence as sil"
+                f"{found}the one before it ends at {end_s:g} s; phones must follow each other without a gap: label "
+                "silence as sil"
             )
         end_s = label.end_s
 
@@ -350,29 +326,14 @@ def merged_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
     return Timeline(tuple(merged))
 
 
-def _inner(text: str) -> str | None:
-    """Return the phone in the middle of a triphone or full-context label; None for other labels."""
-    match = IN_CONTEXT.fullmatch(text)
-    return match[1] if match else None
-
-
 def phone_of(text: str) -> str | None:
     """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
     text = STATE_NUMBER.sub("", text)
-    name = phone_named(text) or phone_named(_inner(text) or "")
+    inner = IN_CONTEXT.sub(r"\1", text)
+    name = phone_named(text) or phone_named(inner)
     if name is not None or text == GLOTTAL_STOP:
         return name or "hh"
-    kind = spoken_as(_inner(text) or text)
-    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(kind)
-
-
-def _required_phone(label: TimedLabel, where: str) -> str:
-    phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
-    if phone is None:
-        raise InputError(
-            f"{where}: {label.position} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"
-        )
-    return phone
+    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(spoken_as(inner))
 
 
 def _whole_phones(labels: Sequence[TimedLabel]) -> list[TimedLabel]:

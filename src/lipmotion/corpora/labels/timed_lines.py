@@ -26,7 +26,6 @@ from lipmotion.corpora.labels.tier import (
     named_tier,
     phone_of,
     required_time,
-    scaled_tier,
 )
 from lipmotion.errors import InputError, shortened
 
@@ -81,7 +80,10 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     lines = [line for _, line in islice(_lines(text), MOST_LABELS + 1)] if starts else []
     last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
     if last and float(last[1]) >= SHORTEST_TICKS:
-        return [_from_starts(text, where)]
+        rows = list(_fitted(text, STARTS, "start label", where))
+        edges_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
+        spans = zip(edges_s, edges_s[1:], rows, strict=False)
+        return [LabelTier("labels", tuple(TimedLabel(a, b, row[1], f"line {number}") for a, b, (number, row) in spans))]
     first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
     for form in (STM, CTM):
         found = form.fullmatch(first)
@@ -131,17 +133,9 @@ def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
     is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(label.text == TIMIT_SILENCE for label in labels)
     short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
     if is_timit or not short:
-        return scaled_tier(tier, TIMIT_HZ if short else TICKS_PER_S)
+        return in_seconds([tier], where, TIMIT_HZ if short else TICKS_PER_S)[0]
     role = PHONE_LABELS if all(phone_of(label.text) for label in labels) else WORDS
     return in_seconds([replace(tier, role=role)], where)[0]
-
-
-def _from_starts(text: str, where: str) -> LabelTier:
-    rows = list(_fitted(text, STARTS, "start label", where))
-    starts_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows]
-    spans = zip(rows, starts_s, [*starts_s[1:], math.inf], strict=True)
-    labels = (TimedLabel(start_s, end_s, row[1], f"line {number}") for (number, row), start_s, end_s in spans)
-    return LabelTier("labels", tuple(labels))
 
 
 def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
@@ -206,12 +200,10 @@ def _table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
             row = {
                 kind: fields[column] for kind, column in columns.items() if column < len(fields) or kind != "speaker"
             }
-            start_s = required_time(row["start"], place, where)
-            end_s = required_time(row.get("end") or row["duration"], place, where)
-        except InputError:
-            raise
+            times = (row["start"], row.get("end") or row["duration"])
         except (ValueError, IndexError, KeyError, csv.Error) as error:
             raise InputError(f"{where}: {place} is {shortened(line)!r}; required, as in line 1: {header}") from error
+        start_s, end_s = (required_time(time, place, where) for time in times)
         end_s += 0.0 if row.get("end") else start_s
         key = (row.get("kind", named), row.get("speaker", ""))
         kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))

@@ -8,19 +8,15 @@ from collections import defaultdict
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from lipmotion.corpora.labels.tier import LINES, OTHER, LabelTier, TimedLabel, check_count, clock_seconds, named_tier
+from lipmotion.corpora.labels.tier import LINES, OTHER, LabelTier, TimedLabel, check_count, named_tier
 from lipmotion.errors import InputError, shortened
+from lipmotion.types.values import clock_seconds
 
 ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
+"""The first element of XML; those of ``READ_ROOTS`` hold labels in time."""
 READ_ROOTS = ("ANNOTATION_DOCUMENT", "tt", "transcript", "timedtext")
 OFFSET_TIME = re.compile(r"(\d+(?:\.\d+)?)(h|ms|m|s|f|t)?")
 NEAR_S, DEEPEST = 0.01, 20
-
-
-def is_timed_xml(text: str) -> bool:
-    """Return whether a text is XML with labels in time, by its first element."""
-    found = ROOT.match(text)
-    return found is not None and found[1] in READ_ROOTS
 
 
 def xml_tiers(text: str, where: str) -> list[LabelTier]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from statistics import median
@@ -11,16 +12,20 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.export.cues.cue_shapes import PHONE_SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.types import Span, Timeline
-from lipmotion.types.values import number_of
+from lipmotion.types.values import clock_seconds, number_of
 from lipmotion.units.mouth_chart import BLAIR, LETTERS, REST, SHAPES
 
 LOG = logging.getLogger("lipmotion")
+_OCULUS = "sil:X PP:A FF:G TH:B DD:B kk:B CH:B SS:B nn:B RR:B aa:D E:C ih:B oh:E ou:F I:B O:E U:F"
 _FLEMING_DOBBS = "mbp:A nltdr:B fv:G th:B gk:B sh:F o:E ehsz:C aa:D iy:B rest:X"
 FLEMING_DOBBS = dict(pair.split(":") for pair in _FLEMING_DOBBS.split())
 PHONES = {"rest": REST, "hh": "C"} | {
     f"{phone}{stress}": parts[0].best[0] for phone, parts in PHONE_SHAPES.items() for stress in ("", 0, 1, 2)
 }
 """Shapes by the names of other sets, for which Moho and Papagayo have switches."""
+OCULUS = {name.lower(): shape for name, _, shape in (pair.partition(":") for pair in _OCULUS.split())}
+"""Shapes by the names of Meta's 15 visemes (``viseme_PP``), old and new."""
+PREFIX = "viseme_"
 LONGEST_S = 86_400.0
 MOST_CUES = 250_000
 MILLISECONDS = 20.0
@@ -29,25 +34,31 @@ MILLISECONDS = 20.0
 
 def shape_of(name: str, names: dict[str, str], place: str) -> str:
     """Return the shape of a name. Raises InputError: it is none, with its place."""
-    found = names.get(name.strip().lower())
+    found = names.get(name.strip().lower().removeprefix(PREFIX))
     if found is None:
         known = " ".join(dict.fromkeys(names))
         raise InputError(f"{place}: no mouth shape is {shortened(name)!r}; the shapes are: {known}")
     return found
 
 
-def chart_of(names: Iterable[str]) -> dict[str, str]:
+def chart_of(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, str]:
     """Return the shapes by the names of one set that programs offer: the first that has all of them.
 
-    Preston Blair's, Rhubarb's letters, Fleming and Dobbs', or the phones of CMU's dictionary, with stress or without.
+    The usual one, Preston Blair's, Rhubarb's letters, Fleming and Dobbs', Meta's visemes, or the phones of CMU's
+    dictionary, with stress or without.
     """
-    given = {name.strip().lower() for name in names}
-    return next((chart for chart in (BLAIR, LETTERS, FLEMING_DOBBS, PHONES) if given <= {*chart}), BLAIR)
+    given = {name.strip().lower().removeprefix(PREFIX) for name in names}
+    return next((chart for chart in (usual, BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES) if given <= {*chart}), usual)
 
 
 def cue_time(text: str, place: str) -> float:
-    """Return a time in seconds, or a number of frames. Raises InputError: it is none, with its place."""
-    value = number_of(text, f"{place}: the time is", "a number from 0 on")
+    """Return a time in seconds, as 1.5, 1,5 or 0:01.5, or a number of frames.
+
+    Raises InputError: it is none, with its place.
+    """
+    value = clock_seconds(text)
+    if math.isnan(value):
+        value = number_of(text.replace(",", "."), f"{place}: the time is", "a number from 0 on")
     if not 0 <= value <= LONGEST_S * 1000:
         raise InputError(f"{place}: the time is {value:g}, required a number from 0 to {LONGEST_S * 1000:g}")
     return value

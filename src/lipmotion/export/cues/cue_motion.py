@@ -27,6 +27,7 @@ from lipmotion.units.mouth_chart import REST, SHAPES
 DAT = ".dat"
 PARSERS: Mapping[str, Callable[[str], CueSheet]] = {
     ".tsv": rhubarb_tsv.parse,
+    ".csv": rhubarb_tsv.parse,
     ".xml": rhubarb_xml.parse,
     ".json": rhubarb_json.parse,
     DAT: moho_dat.parse,

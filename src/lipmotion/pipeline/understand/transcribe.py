@@ -25,10 +25,12 @@ from lipmotion.speech.recognition.network.posteriors import (
     posterior_stretches,
     recording_posteriors,
 )
-from lipmotion.speech.recognition.recognised_speech import PHONE_POSTERIORS
+from lipmotion.speech.recognition.recognised_speech import PHONE_POSTERIORS, WORD_POSTERIORS
 from lipmotion.speech.recognition.recogniser import Recogniser, network_of
 from lipmotion.speech.recognition.transcript_evidence import (
     LEAST_GAP_S,
+    SURE_COSTS,
+    WORD_COSTS,
     OtherSpeech,
     TranscriptEvidence,
     WordEvidence,
@@ -118,7 +120,8 @@ def transcribe(
         warn_of_misfit(fit)
         return Transcription(units, fit)
     heard, sure = heard_phones(name, analysed(audio))
-    evidence = transcript_evidence(heard, POSTERIOR_STEP / FRAME_RATE_HZ, units)
+    costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
+    evidence = transcript_evidence(heard, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
     if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
         fit = fit.with_evidence(evidence)
         warn_of_misfit(fit)

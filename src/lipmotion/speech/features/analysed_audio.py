@@ -23,6 +23,8 @@ SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
 QUIETEST = 0.1
 """So large a share of a passage, its most silent frames, say what silence is like in it."""
+OFFSET_SHARE = 0.02
+"""An offset of so small a share of the level of the sound hides no pause."""
 SILENT_ENERGY = -17.0
 """The log energy between passages: 80 dB beneath their loudest moments."""
 
@@ -253,7 +255,26 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
     features : of the recording, from ``mfcc``, if they are known; they are not computed then
     """
     if not isinstance(audio, AnalysedAudio):
-        audio = AnalysedAudio(audio.samples, audio.rate_hz)
+        audio = AnalysedAudio(_without_offset(audio.samples), audio.rate_hz)
     if features is not None:
         audio._mfcc.setdefault(1.0, features)
     return audio
+
+
+def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return samples without a constant offset, which would make pauses as loud as speech; digital silence stays.
+
+    It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
+    """
+    count = len(samples) // HOP if samples.ndim == 1 else 0
+    frames, offsets = samples[: count * HOP].reshape(count, HOP), np.zeros(count + 1, np.float32)
+    with np.errstate(all="ignore"):  # what is not finite is refused later
+        means, powers = frames.mean(axis=1, dtype=np.float64), np.einsum("ti,ti->t", frames, frames) / HOP
+        spread, sound = powers - means**2, np.flatnonzero(powers)
+        for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
+            quiet = part[np.argsort(spread[part], kind="stable")[: int(len(part) * QUIETEST) + 1]]
+            offset, heard = np.median(means[quiet]), np.median(spread[quiet])
+            if max(heard, OFFSET_SHARE**2 * powers[part].mean(), 0) < offset**2 < np.inf:
+                offsets[part] = offset
+    offsets[-1] = offsets[count - 1]
+    return samples - np.repeat(offsets, HOP)[: len(samples)] if offsets.any() else samples

@@ -126,7 +126,11 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
     spoken = [span for span in units if not is_silent(span.label.phone)]
     if log_posteriors is not None:
         found = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
-        missing, idle, wrong = found.missing, found.idle, found.wrong
+        idle, wrong = found.idle, found.wrong
+        loud = _joined(
+            [(at, at + 1 / FRAME_RATE_HZ) for at in np.flatnonzero(frames_above(audio.log_energy)) / FRAME_RATE_HZ]
+        )
+        missing = tuple(_unlabelled(stretch, spoken, loud) for stretch in found.missing)
     else:
         quiet = quiet_frames(audio.log_energy)
         silent = _joined([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
@@ -134,6 +138,17 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
         missing, wrong = transcript_fit(audio, units).missing, ()
     fit = TranscriptFit(0.0, missing, sum(span.duration_s for span in spoken), None, idle, wrong)
     return replace(fit, speech_s=fit.speech_s + fit.missing_s)
+
+
+def _unlabelled(
+    stretch: tuple[float, float], spoken: list[Span[Unit]], loud: tuple[tuple[float, float], ...]
+) -> tuple[float, float]:
+    """Return all the sound around a stretch in which phones are heard, as far as no phone is given."""
+    start_s, end_s = stretch
+    before_s = max((span.end_s for span in spoken if span.end_s <= start_s), default=0.0)
+    after_s = min((span.start_s for span in spoken if span.start_s >= end_s), default=np.inf)
+    around = [each for each in loud if each[0] < end_s and each[1] > start_s] or [stretch]
+    return max(min(around[0][0], start_s), before_s), min(max(around[-1][1], end_s), after_s)
 
 
 def _joined(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

@@ -26,6 +26,8 @@ from lipmotion.units import PHONES, SIMILAR_PHONES, is_silent
 
 GAP_COST, WORD_COST, PHONE_COST = 6.0, 9.0, 1.0
 """What it costs, in nats, that anything is said; that words are left out there; and each phone of these words."""
+WORD_COSTS, SURE_COSTS = (WORD_COST, PHONE_COST), (4.0, 0.5)
+"""The last two; and where a recogniser is sure of what it hears, so that a single wrong word is noticed."""
 LEAST_HEARD = 1.0
 """Something is said in a frame in which any phone is so many nats more probable than none."""
 LEAST_GAP_S = 0.1
@@ -100,13 +102,16 @@ class TranscriptEvidence:
         return self.said_share < LEAST_SAID_SHARE
 
 
-def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit]) -> TranscriptEvidence:
+def transcript_evidence(
+    log_posteriors: Array, frame_s: float, units: Timeline[Unit], costs: tuple[float, float] = WORD_COSTS
+) -> TranscriptEvidence:
     """Return what the posteriors say of a transcript.
 
     log_posteriors : natural logarithms, of ``PHONES`` in their order and of the blank, the last [shape=(T, 48)]
     frame_s : seconds from frame to frame
     units   : the phones of the transcript, aligned with the recording; of their times only the silences count, where a
               long recording is divided, and those of words that are not said
+    costs   : of words that are left out, and of each of their phones
     Raises ValueError: the posteriors are not of all phones, or end before the phones.
     """
     spoken_s = max((span.end_s for span in units if not is_silent(span.label.phone)), default=0.0)
@@ -119,7 +124,7 @@ def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[U
     others: list[OtherSpeech] = []
     for part in _parts(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
         at, stop = round(part.start_s / frame_s), round(part.end_s / frame_s)
-        path = _best_path(log_posteriors[at : None if part.is_last else stop], part.columns())
+        path = _best_path(log_posteriors[at : None if part.is_last else stop], part.columns(), costs)
         for (begin, end), (left, back) in path.free:
             start_s, end_s = (at + begin) * frame_s, (at + end) * frame_s
             others.append(OtherSpeech(start_s, end_s, len(words) + left, len(words) + back))
@@ -180,8 +185,9 @@ STAYED, BEGAN, SKIPPED = range(3)
 """How it came to say anything there: it did before; it begins; a word more is left out."""
 
 
-def _best_path(log_posteriors: Array, words: Sequence[Columns]) -> _Path:
+def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float]) -> _Path:
     """Return the best path that says words, leaves some of them out, and says anything between them."""
+    word_cost, phone_cost = costs
     columns = np.concatenate([np.zeros(0, np.intp), *words])
     frames, count = len(log_posteriors), len(columns)
     edges = np.cumsum([0, *map(len, words)])
@@ -208,11 +214,11 @@ def _best_path(log_posteriors: Array, words: Sequence[Columns]) -> _Path:
         begun = arrived[edges] - GAP_COST
         ways[t, 0] = np.where(begun > free, BEGAN, STAYED)
         free = np.maximum(free, begun)
-        first = np.append(-np.inf, free[:-1] + PHONE_COST * edges[:-1] - WORD_COST)  # one word is left out
-        going = instead + PHONE_COST * edges
+        first = np.append(-np.inf, free[:-1] + phone_cost * edges[:-1] - word_cost)  # one word is left out
+        going = instead + phone_cost * edges
         further = np.maximum.accumulate(np.maximum(going, first))
         ways[t, 1] = np.where(going >= further, STAYED, np.where(first >= further, BEGAN, SKIPPED))
-        instead = further - PHONE_COST * edges + anything[t]
+        instead = further - phone_cost * edges + anything[t]
         free = free + anything[t]
         before = np.where(same, blank[:-1], arrived[:-1])
         entered[t] = before > phone[1:]
