@@ -297,7 +297,7 @@ class StateTrace:
 
 @dataclass(frozen=True, eq=False)
 class ReducedVariance:
-    """Variances of P channels, stored as those of Q dimensions to save memory in long recordings.
+    """Variances of P channels, stored as those of Q dimensions to save memory: recordings last for hours.
 
     reduced : float array [shape=(T, Q)], variances of the dimensions
     mixing  : float array [shape=(Q, P)]; ``reduced @ mixing`` are the variances of the channels
@@ -401,7 +401,7 @@ class Generation:
 
     @property
     def variance(self) -> NDArray[np.floating[Any]]:
-        """Variance of every channel in every frame [shape=(T, P)]; in long recordings, computed at every access."""
+        """Variance of every channel in every frame [shape=(T, P)], computed at every access where it is reduced."""
         return self.variance_of(slice(None))
 
     @property
@@ -435,8 +435,10 @@ class Generation:
     def with_motion(self, motion: Motion) -> Generation:
         """Return the generation with other motion; channels after its own have the variance 0."""
         added = len(motion.channels) - len(self.motion.channels)
-        spread = np.pad(self.variance, ((0, 0), (0, added))) if added else self.spread
-        return replace(self, motion=motion, spread=spread)
+        if isinstance(self.spread, ReducedVariance):
+            mixing = np.pad(self.spread.mixing, ((0, 0), (0, added)))
+            return replace(self, motion=motion, spread=replace(self.spread, mixing=mixing))
+        return replace(self, motion=motion, spread=np.pad(self.spread, ((0, 0), (0, added))))
 
     def resampled(self, rate_hz: float) -> Generation:
         """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
