@@ -80,6 +80,7 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         post("/api/training", training.begin),
         post("/api/training/stop", training.stop),
         post("/api/training/again", training.again),
+        post("/api/training/restore", training.restore),
         post("/api/voice", training.voice),
         Route("/", packaged),
         Route("/{name:path}", packaged),

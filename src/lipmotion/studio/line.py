@@ -31,7 +31,7 @@ from lipmotion.pipeline.session import own_pronunciations
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
-from lipmotion.studio.folder import ProjectFolder, RevisionError, revision_of, summary_of
+from lipmotion.studio.folder import ProjectFolder, check_revision, revision_of, summary_of
 from lipmotion.studio.meshes import with_turn
 from lipmotion.studio.project import digest_of
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
@@ -182,8 +182,7 @@ class OpenLine:
         return revision_of(self.folder.line(self.number), self.summary)
 
     def _check(self, revision: int) -> None:
-        if revision != self.revision:
-            raise RevisionError("the line has been changed elsewhere: in another window, or by a request before")
+        check_revision("the line", self.revision, revision)
 
     def _changed(self, file: EditFile, revision: int, *, keeps: bool = False) -> dict[str, Any]:
         """Go over to other edits: compute, then write, then keep them; nothing, where somebody else was first.

@@ -8,6 +8,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import Response
 
+from lipmotion.studio import asked
 from lipmotion.studio.asked import content_of, member, text
 from lipmotion.studio.project import MOST_LINES
 from lipmotion.studio.studio import Studio
@@ -49,11 +50,18 @@ class TrainingReplies:
         await self._desk.beside(self._trainer.again)
         return await self._told(201)
 
+    async def restore(self, request: Request) -> Response:
+        """The last good copy of what was made, where that is damaged."""
+        await content_of(request)
+        await self._desk.beside(self._trainer.restore)
+        return await self._told()
+
     async def voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""
-        name = text(await content_of(request), "voice")
+        content = await content_of(request)
+        name, revision = text(content, "voice"), asked.whole(content, "revision")
         path, voice = await self._desk.beside(lambda: self._studio.voice_model(name))
-        self._studio.use_voice(path, voice)
+        self._studio.use_voice(path, voice, revision)
         return await self._told()
 
     async def _told(self, status: int = 200) -> Response:
@@ -68,8 +76,11 @@ class TrainingReplies:
         voices = [{"name": name, "used": path == used} for name, path in self._studio.voices().items()]
         return {
             "job": trainer.document(),
+            "damage": trainer.damage,
+            "restorable": bool(trainer.damage) and trainer.is_restorable,
             "earlier": trainer.earlier(),
             "voices": voices,
+            "revision": project.voice_revision,
             "faces": [path.relative_to(project.path).as_posix() for path in trainer.made(FACE).values()],
             "videos": listed,
             "count": len(videos),
