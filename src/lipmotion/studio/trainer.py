@@ -107,9 +107,13 @@ class Trainer:
             return None if self._wanted is None else {**_wanted_document(self._wanted), **self.short_document()}
 
     def short_document(self) -> dict[str, Any]:
-        """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s`` and what was told."""
+        """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s`` and what was told.
+
+        ``left_s`` is by the last estimate; 0: it takes longer than that; None: not known yet
+        """
         with self._lock:
-            return dict(self._told) | ({"left_s": self._left_s()} if self.is_working else {})
+            left_s = None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
+            return dict(self._told) | ({"left_s": left_s} if self.is_working else {})
 
     def earlier(self) -> list[dict[str, Any]]:
         """Return the last voice and the last face that were made, as ``document``, where that is another one."""
@@ -126,7 +130,8 @@ class Trainer:
     def made(self, kind: str) -> dict[str, Path]:
         """Return the files of the voices or the faces of the project by their names."""
         folder, suffix = PLACES[kind]
-        return {path.stem: path for path in sorted((self._folder.path / folder).glob(f"*{suffix}")) if _is_whole(path)}
+        found = sorted((self._folder.path / folder).glob(f"*{suffix}"))
+        return {path.stem: path for path in found if path.is_file() and not path.name.startswith(".")}
 
     def begin(self, kind: str, name: str, lines: Sequence[int], options: VoiceOptions) -> None:
         """Begin to make a voice or a face.
@@ -250,7 +255,8 @@ class Trainer:
             if "stage" in told:
                 self._go_on(told["stage"], min(told["share"], MOST_UNFINISHED))
             elif "report" in told:
-                self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": self._made_file()}}
+                file = self._wanted.file if self._wanted else ""
+                self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": file}}
                 if self._wanted:
                     self._made[self._wanted.kind] = TrainingJob(self._wanted, self._told)
             elif "error" in told and self.is_working:
@@ -262,9 +268,6 @@ class Trainer:
             elif "noted" in told:
                 _append(self._told["warnings"], f"{told['noted']}: {told['reason']}")
 
-    def _made_file(self) -> str:
-        return self._wanted.file if self._wanted else ""
-
     def _go_on(self, stage: str, share: float) -> None:
         """Tell how far it is; where it has gone on, estimate anew when it will be done, if it goes on as until now."""
         now_s = self._clock()
@@ -273,10 +276,6 @@ class Trainer:
         elif share > max(self._told["share"], self._first_share):
             self._ends_s = now_s + (now_s - self._begun_s) * (1 - share) / (share - self._first_share)
         self._told |= {"stage": stage, "share": max(share, self._told["share"])}
-
-    def _left_s(self) -> int | None:
-        """Return how many seconds are left, by the last estimate; 0: it takes longer than that; None: not known yet."""
-        return None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
 
     def _write(self) -> None:
         make_folder(self._file.parent)
@@ -299,9 +298,9 @@ class Trainer:
         try:
             last, made = _read(self._file)
         except InputError as error:
-            told = f"put the last good copy, {self._copy}, in its place: restore it on the page, or copy it there"
-            if not self.is_restorable:
-                told = f"there is no good copy; remove the folder {self._file.parent}: voices and faces stay"
+            told = f"there is no good copy; remove the folder {self._file.parent}: voices and faces stay"
+            if self.is_restorable:
+                told = f"restore the last good copy on the page, or put it in its place: {self._copy}"
             self.damage = f"what is known of the training is damaged, and is left as it is: {error}; {told}"
             LOG.warning("%s", self.damage)
             return
@@ -364,10 +363,6 @@ _STATE = members(
 
 def _numbered(name: str, number: int) -> str:
     return name if number == 1 else f"{name}-{number}"
-
-
-def _is_whole(path: Path) -> bool:
-    return path.is_file() and not path.name.startswith(".")
 
 
 def _wanted_document(wanted: Wanted) -> dict[str, Any]:

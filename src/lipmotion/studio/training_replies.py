@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from dataclasses import fields
 from typing import Any
 
@@ -38,23 +39,15 @@ class TrainingReplies:
         await self._desk.beside(lambda: self._trainer.begin(kind, name, lines, options))
         return await self._told(201)
 
-    async def stop(self, request: Request) -> Response:
-        """The end of what is being made."""
-        await content_of(request)
-        await self._desk.beside(self._trainer.stop)
-        return await self._told()
+    def after(self, act: Callable[[], None], status: int = 200) -> Callable[[Request], Awaitable[Response]]:
+        """Return what replies once something was done: what is made was stopped, gone on with, or restored."""
 
-    async def again(self, request: Request) -> Response:
-        """What was stopped, gone on with."""
-        await content_of(request)
-        await self._desk.beside(self._trainer.again)
-        return await self._told(201)
+        async def replied(request: Request) -> Response:
+            await content_of(request)
+            await self._desk.beside(act)
+            return await self._told(status)
 
-    async def restore(self, request: Request) -> Response:
-        """The last good copy of what was made, where that is damaged."""
-        await content_of(request)
-        await self._desk.beside(self._trainer.restore)
-        return await self._told()
+        return replied
 
     async def voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""

@@ -446,17 +446,19 @@ class Generation:
         Raises InputError: the rate is not more than 0.
         """
         motion = self.motion.resampled(rate_hz)
-        spread = self._spread_at(motion.time_s)
+        spread = self.changed_spread(lambda rows: between_frames(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
         return replace(
             self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])
         )
 
-    def _spread_at(self, time_s: NDArray[np.float64]) -> NDArray[np.floating[Any]] | ReducedVariance:
+    def changed_spread(
+        self, change: Callable[[NDArray[np.floating[Any]]], NDArray[np.floating[Any]]]
+    ) -> NDArray[np.floating[Any]] | ReducedVariance:
+        """Return the variances with other rows, which a function makes of those of all frames."""
         if isinstance(self.spread, ReducedVariance):
-            reduced = between_frames(self.spread.reduced, self.motion.rate_hz, time_s)
-            return replace(self.spread, reduced=reduced)
-        return between_frames(self.spread, self.motion.rate_hz, time_s)
+            return replace(self.spread, reduced=change(self.spread.reduced))
+        return change(self.spread)
 
 
 class SpokenText(NamedTuple):
