@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 from lipmotion.errors import ExportError, InputError, LipMotionError
@@ -97,8 +98,17 @@ def revision_of(line: ProjectLine, edits: EditsSummary) -> int:
     It follows from the content, and is the same after a restart: a change names the revision that its author saw.
     """
     versions = [[version.number, *version.steps] for version in line.versions]
-    seen = as_json([line.transcript, line.mark, versions, edits.state])
-    return int(sha256(seen.encode()).hexdigest()[:8], 16) >> 1
+    return _revision([line.transcript, line.mark, versions, edits.state])
+
+
+def _revision(seen: Any) -> int:
+    return int(sha256(as_json(seen).encode()).hexdigest()[:8], 16) >> 1
+
+
+def check_revision(what: str, now: int, seen: int) -> None:
+    """Raise RevisionError if something has another revision now than the author of a change has seen."""
+    if now != seen:
+        raise RevisionError(f"{what} has been changed elsewhere: in another window, or by a request before")
 
 
 class ProjectFolder:
@@ -150,8 +160,7 @@ class ProjectFolder:
         """
         with self.lock:
             line = self.line(number)
-            if revision_of(line, self.summary(line)) != revision:
-                raise RevisionError("the line has been changed elsewhere: in another window, or by a request before")
+            check_revision("the line", revision_of(line, self.summary(line)), revision)
             yield line
 
     def summary(self, line: ProjectLine) -> EditsSummary:
@@ -216,10 +225,7 @@ class ProjectFolder:
         """Write a line's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
         path, copy = self.edits(line), self._copy(line)
         with self.lock, made_folders([path.parent, copy.parent]):
-            # What fails between the two leaves what was acknowledged, and never a copy alone: that would be a damage.
-            first, second = (copy, path) if path.exists() else (path, copy)
-            write_edits(file, first)
-            _copy_file(first, second)
+            write_twice(path, copy, lambda first: write_edits(file, first))
             self._summaries[line.number] = self._written(line), summary_of(file)
 
     def adopt(self, line: ProjectLine, file: EditFile) -> EditFile:
@@ -238,7 +244,7 @@ class ProjectFolder:
             self.write_edits(line, file)
         elif not copy.exists() or copy.read_bytes() != path.read_bytes():  # others may have edited it
             with self.lock, made_folders([copy.parent]):
-                _copy_file(path, copy)
+                copy_file(path, copy)
         return file
 
     def remove_edits(self, line: ProjectLine) -> None:
@@ -271,11 +277,7 @@ class ProjectFolder:
             if not self.is_restorable(line):
                 self.read_edits(line)  # says what is damaged
                 raise InputError("the edits of the line are not damaged; nothing is restored")
-            with whole_file(path) as temporary:
-                shutil.copyfile(self._copy(line), temporary)
-                if path.exists():
-                    path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))
-        LOG.warning("%s: was damaged, and is restored from %s", path, self._copy(line))
+            restore(path, self._copy(line))
 
     def change(self, changed: Callable[[Project], Project], *, save: bool = True) -> None:
         """Replace the project by what a function makes of it; ``save``: write it at once.
@@ -406,11 +408,25 @@ class ProjectFolder:
                 temporary.write_text(votes_text(votes), encoding="utf-8")
             return votes
 
-    def add_pronunciation(self, word: str, phones: tuple[str, ...]) -> None:
-        """Write a pronunciation into the project's lexicon, ahead of earlier ones. Raises ExportError: cannot be."""
+    @property
+    def voice_revision(self) -> int:
+        """The revision of the voice that moves the lines, as ``revision_of`` is that of a line."""
+        return _revision(self.project.model)
+
+    def word_revision(self, word: str) -> int:
+        """Return the revision of the project's pronunciations of a word, as ``revision_of`` is that of a line."""
+        return _revision([word, self.lexicon().user.get(word, ())])
+
+    def add_pronunciation(self, word: str, phones: tuple[str, ...], revision: int) -> None:
+        """Write a pronunciation into the project's lexicon, ahead of earlier ones.
+
+        revision : of the word, as it was seen
+        Raises RevisionError: there is another one since. ExportError: it cannot be written.
+        """
         with self.lock:
-            own = {word: (phones, *self.lexicon().user.get(word, ()))}
-            user = {**self.lexicon().user, **{each: tuple(dict.fromkeys(variants)) for each, variants in own.items()}}
+            check_revision(f"the word {word}", self.word_revision(word), revision)
+            known = self.lexicon().user
+            user = {**known, word: tuple(dict.fromkeys((phones, *known.get(word, ()))))}
             rows = [f"{each} {' '.join(variant)}\n" for each, variants in sorted(user.items()) for variant in variants]
             with whole_file(self.path / LEXICON) as temporary:
                 temporary.write_text("".join(rows), encoding="utf-8")
@@ -475,10 +491,29 @@ def _key(name: str) -> str:
     return unicodedata.normalize("NFD", name).casefold()
 
 
-def _copy_file(source: Path, target: Path) -> None:
+def copy_file(source: Path, target: Path) -> None:
     """Copy a file, whole or not at all. Raises ExportError: it cannot be written."""
     with whole_file(target) as temporary:
         shutil.copyfile(source, temporary)
+
+
+def write_twice(path: Path, copy: Path, write: Callable[[Path], object]) -> None:
+    """Write a file and its copy. Raises ExportError: one of them cannot be written.
+
+    What fails between the two leaves what was acknowledged, and never a copy alone: that would be a damage.
+    """
+    first, second = (copy, path) if path.exists() else (path, copy)
+    write(first)
+    copy_file(first, second)
+
+
+def restore(path: Path, copy: Path) -> None:
+    """Put a copy in the place of a damaged file, which stays beside it under another name. Raises ExportError."""
+    with whole_file(path) as temporary:
+        shutil.copyfile(copy, temporary)
+        if path.exists():
+            path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))
+    LOG.warning("%s: was damaged, and is restored from %s", path, copy)
 
 
 def plain_name(given: str, usual: str = "line") -> str:

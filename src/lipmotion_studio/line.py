@@ -33,7 +33,7 @@ from lipmotion_faces.outputs.scenes import delivered_scene
 from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_faces.video.mp4 import write_mp4
-from lipmotion_studio.folder import ProjectFolder, RevisionError, revision_of, summary_of
+from lipmotion_studio.folder import ProjectFolder, check_revision, revision_of, summary_of
 from lipmotion_studio.meshes import with_turn
 from lipmotion_studio.project import digest_of
 
@@ -182,8 +182,7 @@ class OpenLine:
         return revision_of(self.folder.line(self.number), self.summary)
 
     def _check(self, revision: int) -> None:
-        if revision != self.revision:
-            raise RevisionError("the line has been changed elsewhere: in another window, or by a request before")
+        check_revision("the line", self.revision, revision)
 
     def _changed(self, file: EditFile, revision: int, *, keeps: bool = False) -> dict[str, Any]:
         """Go over to other edits: compute, then write, then keep them; nothing, where somebody else was first.

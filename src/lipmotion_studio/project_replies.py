@@ -111,17 +111,19 @@ class ProjectReplies:
         """A pronunciation that the project keeps."""
         content = await content_of(request)
         word, phones = _word(text(content, "word", longest=LONGEST_WORD)), texts(content, "phones", most=MOST_PHONES)
+        revision = whole(content, "revision")
         unknown = [phone for phone in phones if phone not in PHONES]
         if unknown or not phones:
             raise InputError(f"the phones of a word are some of: {' '.join(PHONES)}")
-        await self._desk.beside(lambda: self._studio.folder.add_pronunciation(word, phones))
+        await self._desk.beside(lambda: self._studio.folder.add_pronunciation(word, phones, revision))
         return self._pronounced(word)
 
     def _pronounced(self, word: str) -> Response:
-        lexicon = self._studio.folder.lexicon()
+        with self._studio.folder.lock:
+            lexicon, revision = self._studio.folder.lexicon(), self._studio.folder.word_revision(word)
         known = {"word": word, "known": lexicon.known(word), "own": word in lexicon.user}
         found = [list(phones) for phones in lexicon.pronunciations(word)]
-        return JSONResponse(known | {"pronunciations": found}, headers=FRESH)
+        return JSONResponse(known | {"pronunciations": found, "revision": revision}, headers=FRESH)
 
     def _number(self, request: Request) -> int:
         return self._studio.number(str(request.path_params["number"]))

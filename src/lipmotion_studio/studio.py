@@ -31,7 +31,7 @@ from lipmotion.units import PHONES, Pronunciation, is_silent, words_of
 from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion_studio.desk import FAILED, READY, WAITING, WORKING, Desk, NotReadyError, Work
-from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, revision_of
+from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, revision_of
 from lipmotion_studio.known_model import KnownModel, known_model
 from lipmotion_studio.line import LONGEST_VIDEO_S, OpenLine
 from lipmotion_studio.meshes import Faces
@@ -176,14 +176,16 @@ class Studio:
         file = Path(os.path.normpath(self.folder.path / known[name])) if known[name] else None
         return known[name], known_model(file)
 
-    def use_voice(self, path: str, voice: KnownModel) -> None:
+    def use_voice(self, path: str, voice: KnownModel, revision: int) -> None:
         """Let another model move the lines of the project, from now on; their phones and edits stay.
 
-        path : from the folder of the project; empty: the one that ships
-        Raises ExportError: the project cannot be written.
+        path     : from the folder of the project; empty: the one that ships
+        revision : of the voice, as it was seen
+        Raises RevisionError: another one is used since. ExportError: the project cannot be written.
         """
 
         def with_model(project: Project) -> Project:
+            check_revision("the voice", self.folder.voice_revision, revision)
             given = project.model if self.is_given(project.model) else project.given_model
             return replace(project, model=path, given_model=given)
 

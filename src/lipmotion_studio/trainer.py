@@ -21,12 +21,12 @@ from lipmotion.storage.files import UNFINISHED, make_folder, read_text_file, rem
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, tupled, value_of, whole
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
-from lipmotion_studio.folder import ProjectFolder, plain_name
+from lipmotion_studio.folder import ProjectFolder, copy_file, plain_name, restore, write_twice
 from lipmotion_studio.project import ProjectLine
 from lipmotion_studio.training import FACE, KINDS, VOICE, LearnedLine, TrainingOrder, VoiceOptions, carry_out
 
 LOG = logging.getLogger("lipmotion")
-TRAINING, STATE = "training", "state.json"
+TRAINING, STATE, STATE_COPY = "training", "state.json", "state.copy.json"
 VOICES, FACES = "voices", "faces"
 PLACES = {VOICE: (VOICES, ".lipmotion"), FACE: (FACES, FACE_SUFFIX)}
 """Folder and suffix of what is made, by its kind."""
@@ -77,16 +77,19 @@ class Trainer:
     the last face that were made. All is kept in the folder of the project, so that one that a killed studio was making
     is told as interrupted, and can be made again.
 
-    clock : returns seconds, and only grows
+    clock  : returns seconds, and only grows
+    damage : why the file that keeps it cannot be read, and how it is restored; until then nothing is made. Empty: it
+             can be read
     """
 
     def __init__(self, folder: ProjectFolder, clock: Callable[[], float] = time.monotonic) -> None:
         self._folder, self._lock, self._clock = folder, threading.RLock(), clock
-        self._file = folder.path / TRAINING / STATE
+        self._file, self._copy = folder.path / TRAINING / STATE, folder.path / TRAINING / STATE_COPY
         self._wanted: Wanted | None = None
         self._told: dict[str, Any] = {}
         self._made: dict[str, TrainingJob] = {}
-        self._read()
+        self.damage = ""
+        self._open()
         self._process: BaseProcess | None = None
         self._thread: threading.Thread | None = None
         self._begun_s = 0.0
@@ -104,9 +107,13 @@ class Trainer:
             return None if self._wanted is None else {**_wanted_document(self._wanted), **self.short_document()}
 
     def short_document(self) -> dict[str, Any]:
-        """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s`` and what was told."""
+        """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s`` and what was told.
+
+        ``left_s`` is by the last estimate; 0: it takes longer than that; None: not known yet
+        """
         with self._lock:
-            return dict(self._told) | ({"left_s": self._left_s()} if self.is_working else {})
+            left_s = None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
+            return dict(self._told) | ({"left_s": left_s} if self.is_working else {})
 
     def earlier(self) -> list[dict[str, Any]]:
         """Return the last voice and the last face that were made, as ``document``, where that is another one."""
@@ -123,7 +130,8 @@ class Trainer:
     def made(self, kind: str) -> dict[str, Path]:
         """Return the files of the voices or the faces of the project by their names."""
         folder, suffix = PLACES[kind]
-        return {path.stem: path for path in sorted((self._folder.path / folder).glob(f"*{suffix}")) if _is_whole(path)}
+        found = sorted((self._folder.path / folder).glob(f"*{suffix}"))
+        return {path.stem: path for path in found if path.is_file() and not path.name.startswith(".")}
 
     def begin(self, kind: str, name: str, lines: Sequence[int], options: VoiceOptions) -> None:
         """Begin to make a voice or a face.
@@ -147,8 +155,8 @@ class Trainer:
 
     def again(self) -> None:
         """Begin again what was stopped, interrupted or has failed, where it was. Raises as ``begin``."""
-        if self._wanted is None or self._told["state"] == DONE:
-            raise InputError("nothing was stopped; begin with a voice or a face")
+        if self.damage or self._wanted is None or self._told["state"] == DONE:
+            raise InputError(self.damage or "nothing was stopped; begin with a voice or a face")
         self._begin(self._wanted)
 
     def stop(self) -> None:
@@ -171,6 +179,8 @@ class Trainer:
 
     def _begin(self, wanted: Wanted) -> None:
         with self._lock:
+            if self.damage:
+                raise InputError(self.damage)
             if self.is_working or self._thread is not None:
                 raise InputError("a voice or a face is being made; wait for it, or stop it")
             order = self._order(wanted)
@@ -245,7 +255,8 @@ class Trainer:
             if "stage" in told:
                 self._go_on(told["stage"], min(told["share"], MOST_UNFINISHED))
             elif "report" in told:
-                self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": self._made_file()}}
+                file = self._wanted.file if self._wanted else ""
+                self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": file}}
                 if self._wanted:
                     self._made[self._wanted.kind] = TrainingJob(self._wanted, self._told)
             elif "error" in told and self.is_working:
@@ -257,9 +268,6 @@ class Trainer:
             elif "noted" in told:
                 _append(self._told["warnings"], f"{told['noted']}: {told['reason']}")
 
-    def _made_file(self) -> str:
-        return self._wanted.file if self._wanted else ""
-
     def _go_on(self, stage: str, share: float) -> None:
         """Tell how far it is; where it has gone on, estimate anew when it will be done, if it goes on as until now."""
         now_s = self._clock()
@@ -269,34 +277,71 @@ class Trainer:
             self._ends_s = now_s + (now_s - self._begun_s) * (1 - share) / (share - self._first_share)
         self._told |= {"stage": stage, "share": max(share, self._told["share"])}
 
-    def _left_s(self) -> int | None:
-        """Return how many seconds are left, by the last estimate; 0: it takes longer than that; None: not known yet."""
-        return None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
-
     def _write(self) -> None:
         make_folder(self._file.parent)
         wanted = {} if self._wanted is None else asdict(self._wanted)
         made = [asdict(job) for job in self._made.values()]
         document = {"format": FORMAT, "version": VERSION, "wanted": wanted, "told": self._told, "made": made}
-        with whole_file(self._file) as temporary:
-            temporary.write_text(as_json(document, indent=1, ensure_ascii=False), encoding="utf-8")
+        text = as_json(document, indent=1, ensure_ascii=False)
 
-    def _read(self) -> None:
-        """Read what was made last; nothing, where the file says nothing that can be understood."""
+        def write(path: Path) -> None:
+            with whole_file(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+
+        write_twice(self._file, self._copy, write)
+
+    def _open(self) -> None:
+        """Read what was made last, where there is a file of it; what is wrong with one is told."""
+        self.damage = ""
+        if not self._file.exists() and not self._copy.exists():
+            return
         try:
-            found = from_json(read_text_file(self._file, "training"))
-            if found["format"] != FORMAT or found["version"] != VERSION:
-                return
-            last, made = _job(found), [_job(each) for each in found.get("made", ())]
-        except (InputError, KeyError, TypeError, ValueError, AttributeError):
+            last, made = _read(self._file)
+        except InputError as error:
+            told = f"there is no good copy; remove the folder {self._file.parent}: voices and faces stay"
+            if self.is_restorable:
+                told = f"restore the last good copy on the page, or put it in its place: {self._copy}"
+            self.damage = f"what is known of the training is damaged, and is left as it is: {error}; {told}"
+            LOG.warning("%s", self.damage)
             return
         self._wanted, self._told = last.wanted, last.told
         self._made = {job.wanted.kind: job for job in (*made, last) if job.told["state"] == DONE}
+        if not self._copy.exists():
+            with suppress(ExportError):
+                copy_file(self._file, self._copy)
+
+    @property
+    def is_restorable(self) -> bool:
+        """Whether there is a good copy of the file that keeps what was made."""
+        try:
+            return bool(_read(self._copy))
+        except InputError:
+            return False
+
+    def restore(self) -> None:
+        """Put the last good copy in the place of a damaged file, which stays beside it under another name.
+
+        Raises InputError: it is not damaged, or there is no good copy. ExportError: it cannot be written.
+        """
+        with self._lock:
+            if not self.damage or not self.is_restorable:
+                raise InputError(self.damage or "what is known of the training is not damaged; nothing is restored")
+            restore(self._file, self._copy)
+            self._open()
 
 
-def _job(found: Mapping[str, Any]) -> TrainingJob:
-    """Return what a file says of something that was made. Raises InputError and others: it cannot be understood."""
-    job = _JOB(found)
+def _read(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
+    """Return what was made last, and before. Raises InputError: the file cannot be read, or is of a later version."""
+    text = read_text_file(file, "training")
+    try:
+        found = _STATE(from_json(text))
+        return _job(found), [_job(each) for each in found.get("made", ())]
+    except ValueError as error:  # InputError is one
+        raise InputError(f"{file}: {error}") from error
+
+
+def _job(job: Mapping[str, Any]) -> TrainingJob:
+    """Return what a file says of something that was made. Raises InputError: options that there are not."""
     wanted, told = replace(job["wanted"], name=plain_name(job["wanted"].name)), job["told"]
     VoiceOptions.stored(wanted.options)
     state = INTERRUPTED if told["state"] == WORKING else told["state"]
@@ -309,15 +354,15 @@ _TOLD = {
     **{"state": one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)), "stage": _TEXT, "share": number(0, 1)},
     **{"warnings": items(_TEXT), "skipped": items(_ANY), "error": _TEXT, "report": optional(_ANY)},
 }
-_JOB = members({"wanted": value_of(Wanted, _WANTED, _WANTED), "told": members(_TOLD, ["state"])}, ("wanted", "told"))
+_JOB = {"wanted": value_of(Wanted, _WANTED, _WANTED), "told": members(_TOLD, ["state"])}
+_STATE = members(
+    _JOB | {"format": one_of([FORMAT]), "version": one_of([VERSION]), "made": items(members(_JOB, _JOB))},
+    ("format", "version", *_JOB),
+)
 
 
 def _numbered(name: str, number: int) -> str:
     return name if number == 1 else f"{name}-{number}"
-
-
-def _is_whole(path: Path) -> bool:
-    return path.is_file() and not path.name.startswith(".")
 
 
 def _wanted_document(wanted: Wanted) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from dataclasses import fields
 from typing import Any
 
@@ -10,6 +11,7 @@ from starlette.responses import Response
 
 from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items, whole
+from lipmotion_studio import asked
 from lipmotion_studio.asked import content_of, member, text
 from lipmotion_studio.project import MOST_LINES
 from lipmotion_studio.studio import Studio
@@ -37,23 +39,22 @@ class TrainingReplies:
         await self._desk.beside(lambda: self._trainer.begin(kind, name, lines, options))
         return await self._told(201)
 
-    async def stop(self, request: Request) -> Response:
-        """The end of what is being made."""
-        await content_of(request)
-        await self._desk.beside(self._trainer.stop)
-        return await self._told()
+    def after(self, act: Callable[[], None], status: int = 200) -> Callable[[Request], Awaitable[Response]]:
+        """Return what replies once something was done: what is made was stopped, gone on with, or restored."""
 
-    async def again(self, request: Request) -> Response:
-        """What was stopped, gone on with."""
-        await content_of(request)
-        await self._desk.beside(self._trainer.again)
-        return await self._told(201)
+        async def replied(request: Request) -> Response:
+            await content_of(request)
+            await self._desk.beside(act)
+            return await self._told(status)
+
+        return replied
 
     async def voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""
-        name = text(await content_of(request), "voice")
+        content = await content_of(request)
+        name, revision = text(content, "voice"), asked.whole(content, "revision")
         path, voice = await self._desk.beside(lambda: self._studio.voice_model(name))
-        self._studio.use_voice(path, voice)
+        self._studio.use_voice(path, voice, revision)
         return await self._told()
 
     async def _told(self, status: int = 200) -> Response:
@@ -68,8 +69,11 @@ class TrainingReplies:
         voices = [{"name": name, "used": path == used} for name, path in self._studio.voices().items()]
         return {
             "job": trainer.document(),
+            "damage": trainer.damage,
+            "restorable": bool(trainer.damage) and trainer.is_restorable,
             "earlier": trainer.earlier(),
             "voices": voices,
+            "revision": project.voice_revision,
             "faces": [path.relative_to(project.path).as_posix() for path in trainer.made(FACE).values()],
             "videos": listed,
             "count": len(videos),

@@ -11,6 +11,7 @@ from typing import Any
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.types.values import items, members, optional, text, tupled, value_of, whole
 
 DIGEST = re.compile(r"[0-9a-f]{64}|")
 
@@ -88,21 +89,25 @@ def read_votes(path: Path) -> tuple[Vote, ...]:
     """Return the votes in a file; none, where it is not there. Raises InputError: it cannot be read."""
     if not path.exists():
         return ()
+    content = read_text_file(path, "votes")
     try:
-        return tuple(
-            _vote(row) if "edits" not in row else _named_vote(row) for row in from_json(read_text_file(path, "votes"))
-        )
-    except (ValueError, TypeError, KeyError) as error:  # InputError is a ValueError
+        return tuple(_VOTES(from_json(content)))
+    except ValueError as error:  # InputError is one
         raise InputError(f"{path}: {error}; put it right, or take it away") from error
 
 
-def _vote(row: dict[str, Any]) -> Vote:
-    sides = tuple(Side(str(side["name"]), str(side["model"]), str(side["edits"])) for side in row["shown"])
-    return Vote(str(row["line"]), sides, row["better"])
-
-
-def _named_vote(row: dict[str, Any]) -> Vote:
+def _named_vote(row: Any) -> Vote:
     """Return a vote from before digests were kept: of two names, with the digest of the line's edits."""
-    names = list(map(str, row["shown"]))
-    better = names.index(row["better"]) if row["better"] else None
-    return Vote(str(row["line"]), tuple(Side(name, "", str(row["edits"])) for name in names), better)
+    known = _NAMED(row)
+    names, better = known["shown"], known["better"]
+    sides = tuple(Side(name, "", known["edits"]) for name in names)
+    return Vote(known["line"], sides, names.index(better) if better else None)
+
+
+_TEXT = text(4096)
+_NAMES = {"line": _TEXT, "shown": items(_TEXT, 2, 2), "better": optional(_TEXT), "edits": text(64)}
+_NAMED = members(_NAMES, _NAMES)
+_SIDE = {"name": _TEXT, "model": text(64), "edits": text(64)}
+_VOTE = {"line": _TEXT, "shown": tupled(items(value_of(Side, _SIDE, _SIDE), 2, 2)), "better": optional(whole(0, 1))}
+_NEW_VOTE = value_of(Vote, _VOTE, _VOTE)
+_VOTES = items(lambda row: _named_vote(row) if isinstance(row, dict) and "edits" in row else _NEW_VOTE(row))

@@ -68,7 +68,7 @@ def vote(folder: Path) -> None:
 
 def pronounce(folder: Path) -> None:
     with opened_folder(None, folder) as project:
-        project.add_pronunciation("bob", ("b", "aa", "b"))
+        project.add_pronunciation("bob", ("b", "aa", "b"), project.word_revision("bob"))
 
 
 def train_voice(folder: Path) -> None:

@@ -58,6 +58,7 @@ PATHS = (
     "/api/understand",
     "/api/training",
     "/api/training/again",
+    "/api/training/restore",
     "/api/training/../../foreign.txt",
     "/api/voice",
     "/voices/../../foreign.txt",

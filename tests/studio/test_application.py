@@ -265,7 +265,8 @@ def test_a_recording_that_the_disk_cannot_take_is_refused(studio: OpenStudio) ->
 def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
     tear = studio.ask("/api/lexicon?word=Tear").content
     assert ["t", "eh", "r"] in tear["pronunciations"]
-    kept = studio.ask("/api/lexicon", {"word": "zenodo", "phones": ["z", "eh", "n", "ow"]}).content
+    seen = studio.ask("/api/lexicon?word=zenodo").content["revision"]
+    kept = studio.ask("/api/lexicon", {"word": "zenodo", "phones": ["z", "eh", "n", "ow"], "revision": seen}).content
     assert (kept["own"], kept["pronunciations"]) == (True, [["z", "eh", "n", "ow"]])
     assert studio.folder.lexicon().pronunciations("zenodo") == (("z", "eh", "n", "ow"),)
     state = studio.edit("word 1 is zenodo").content
@@ -278,7 +279,7 @@ def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
     at_work = [phone["label"] for phone in said["phones"] if phone["word"] == "zenodo"]
     assert at_work == ["z", "eh", "n", "ow"]
     for wrong in ({"word": "a b", "phones": ["b"]}, {"word": "a", "phones": ["B!"]}, {"word": "a", "phones": []}):
-        assert studio.ask("/api/lexicon", wrong).status == 422
+        assert studio.ask("/api/lexicon", wrong | {"revision": 0}).status == 422
 
 
 def test_lists_and_forms_follow_from_the_registries(studio: OpenStudio) -> None:

@@ -13,7 +13,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.sound import write_sound
 from lipmotion.storage.files import portable_name
 from lipmotion.testing.toy import ToySentence
-from lipmotion_studio.folder import PROJECT, ProjectFolder, folder_for, opened_folder
+from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, folder_for, opened_folder
 from lipmotion_studio.project import ExportRecord, Project, ProjectLine, project_document, project_from
 
 LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}
@@ -38,8 +38,11 @@ def test_a_project_is_there_again(lines: Path) -> None:
         assert folder.line(number).name == "C__over there_.._A"
         assert folder.drop("a.wav", folder.path / "other", "") == number + 1
         folder.change_line(1, lambda line: replace(line, mark="approved", exports=(RECORD,)))
-        folder.add_pronunciation("tear", ("t", "eh", "r"))
-        folder.add_pronunciation("tear", ("t", "ih", "r"))
+        seen = folder.word_revision("tear")
+        folder.add_pronunciation("tear", ("t", "eh", "r"), seen)
+        with pytest.raises(RevisionError):
+            folder.add_pronunciation("tear", ("d", "eh", "r"), seen)
+        folder.add_pronunciation("tear", ("t", "ih", "r"), folder.word_revision("tear"))
         project = folder.project
     assert folder.path == lines.with_name("lines.studio")
     with opened_folder(folder.path) as again:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ import pytest
 
 from children import wait_until
 from lipmotion.corpora.store import Corpus
+from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.testing.toy import ToySentence
 
@@ -80,8 +82,9 @@ def test_a_voice_is_trained_measured_used_and_taken_back(studio: OpenStudio) -> 
     assert [path.name for path in (studio.folder.path / "voices").iterdir()] == ["Me.lipmotion"]
     assert load_model(studio.folder.path / report["file"]).about["utterances"] == SENTENCES - 1
 
-    assert studio.ask("/api/voice", {"voice": "../Me"}).status == 422
-    used = studio.ask("/api/voice", {"voice": "Me"}).content["voices"]
+    revision = studio.ask("/api/training").content["revision"]
+    assert studio.ask("/api/voice", {"voice": "../Me", "revision": revision}).status == 422
+    used = studio.ask("/api/voice", {"voice": "Me", "revision": revision}).content["voices"]
     assert [voice["name"] for voice in used if voice["used"]] == ["Me"]
     after = studio.ready()
     assert (after["steps"], after["phones"][4:]) == (["phone 3 is p"], state["phones"][4:])
@@ -228,9 +231,47 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypa
     ]
 
 
-def test_a_state_that_cannot_be_understood_is_none(tmp_path: Path) -> None:
+DAMAGES = (
+    "",
+    "[]",
+    "{}",
+    '{"format": "lipmotion.training", "version": 2}',
+    '{"format": "lipmotion.training", "version": 1}',
+)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path: Path, damage: str) -> None:
+    file = tmp_path / TRAINING / "state.json"
+    wanted = {"kind": "voice", "name": "me", "lines": [], "options": {}}
+    told = {"state": "failed", "error": "no memory"}
+    good = json.dumps({"format": "lipmotion.training", "version": 1, "wanted": wanted, "told": told})
+    file.parent.mkdir()
+    file.write_text(good, encoding="utf-8")
     folder = ProjectFolder(tmp_path)
+    assert Trainer(folder).damage == ""  # and keeps a copy
+    file.write_text(damage, encoding="utf-8")
+    trainer = Trainer(folder)
+    assert (trainer.document(), str(file) in trainer.damage, trainer.is_restorable) == (None, True, True)
+    for act in (trainer.again, lambda: trainer.begin("voice", "a", [], VoiceOptions())):
+        with pytest.raises(InputError, match="damaged"):
+            act()
+    assert file.read_text(encoding="utf-8") == damage
+    trainer.restore()
+    document = trainer.document()
+    assert document is not None
+    assert (document["name"], document["error"], trainer.damage) == ("me", "no memory", "")
+    assert [each.read_text(encoding="utf-8") for each in file.parent.glob("*.damaged-*")] == [damage]
+    with pytest.raises(InputError, match="not damaged"):
+        trainer.restore()
+
+
+def test_a_damaged_state_without_a_copy_is_an_error(studio: OpenStudio, tmp_path: Path) -> None:
     (tmp_path / TRAINING).mkdir()
-    for text in ("", "[]", "{}", '{"format": "lipmotion.training", "version": 1, "wanted": {"kind": "x"}}'):
-        (tmp_path / TRAINING / "state.json").write_text(text, encoding="utf-8")
-        assert Trainer(folder).document() is None
+    (tmp_path / TRAINING / "state.json").write_text("{", encoding="utf-8")
+    trainer = Trainer(ProjectFolder(tmp_path))
+    assert (trainer.is_restorable, "remove" in trainer.damage) == (False, True)
+    with pytest.raises(InputError, match="damaged"):
+        trainer.restore()
+    assert studio.ask("/api/training").content["damage"] == ""
+    assert studio.ask("/api/training/restore", {}).status == 422

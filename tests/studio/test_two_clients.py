@@ -69,6 +69,21 @@ def test_every_change_names_the_revision_that_it_saw(studio: OpenStudio, change:
     assert (state["steps"], state["mark"], state["versions"]) == (["phone 3 is p"], "none", [])
 
 
+def test_the_voice_and_the_lexicon_name_the_revision_that_they_saw(studio: OpenStudio) -> None:
+    for path, content in (
+        ("/api/voice", {"voice": ""}),
+        ("/api/lexicon", {"word": "tear", "phones": ["t", "eh", "r"]}),
+    ):
+        seen = studio.ask("/api/training" if path == "/api/voice" else f"{path}?word=tear").content["revision"]
+        assert studio.ask(path, content).status == 422
+        late = studio.ask(path, content | {"revision": seen + 1})
+        assert (late.status, "window" in late.content["error"]) == (409, True)
+        assert studio.ask(path, content | {"revision": seen}).status == 200
+    assert studio.folder.lexicon().user == {"tear": (("t", "eh", "r"),)}
+    late = studio.ask("/api/lexicon", {"word": "tear", "phones": ["t", "ih", "r"], "revision": seen})
+    assert (late.status, len(studio.folder.lexicon().user["tear"])) == (409, 1)
+
+
 def test_two_windows_lose_nothing_of_what_was_acknowledged(studio: OpenStudio) -> None:
     """Six changes at once, all of the line as it was: one is made, and is there."""
     seen = studio.ready()["revision"]

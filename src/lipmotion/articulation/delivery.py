@@ -17,7 +17,6 @@ from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.types import EYE_DISTANCE, WEIGHT, CurveEdit, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
 from lipmotion.types.delivery import Delivery as Delivery  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.generation import ReducedVariance
 from lipmotion.units import is_silent
 
 
@@ -97,10 +96,9 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
     position: Curve = np.arange(int(np.floor(duration_s * rate_hz + 1e-6)) + 1.0) - by_s * rate_hz
     nearest = np.clip(np.rint(position), 0, len(motion.values) - 1).astype(int)
     if abs(by_s * rate_hz - round(by_s * rate_hz)) < 1e-6:
-        values, spread = motion.values[nearest], _rows_of(generation, nearest)
+        values = motion.values[nearest]
     else:
         values = motion.at(position / rate_hz)
-        spread = _rows_of(generation, nearest)
         for frame, *_ in closures(motion, generation.units):
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
@@ -108,7 +106,7 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
     return replace(
         generation,
         motion=Motion(values, rate_hz, motion.channels),
-        spread=spread,
+        spread=generation.changed_spread(lambda rows: rows[nearest]),
         units=moved_units(
             generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
         ),
@@ -169,7 +167,8 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
             larger[:, column] = values[:, column]
         if channel.name in GROWING:
             larger[:, column] = 1 - np.clip(1 - values[:, column], 0, 1) ** np.sqrt(intensity)
-    return replace(generation, motion=replace(motion, values=larger), spread=_scaled(generation.spread, factor**2))
+    spread = generation.changed_spread(lambda rows: rows * factor[:, None] ** 2)
+    return replace(generation, motion=replace(motion, values=larger), spread=spread)
 
 
 ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", *GROWING)
@@ -199,7 +198,7 @@ def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) ->
     return replace(
         generation,
         motion=replace(motion, values=np.repeat(values, lengths, axis=0)),
-        spread=_rows_of(generation, middle),
+        spread=generation.changed_spread(lambda rows: rows[middle]),
         trace=StateTrace(generation.trace.states, generation.trace.frames[middle]),
     )
 
@@ -248,20 +247,6 @@ def _deciding(motion: Motion) -> Curve:
     for kind in set(kinds.tolist()):
         rows[:, kinds == kind] /= max(float(rows[:, kinds == kind].std(axis=0).max()), 1e-12)
     return rows
-
-
-def _rows_of(generation: Generation, frames: NDArray[np.intp]) -> NDArray[np.floating] | ReducedVariance:
-    """Return the variances of some frames."""
-    spread = generation.spread
-    if isinstance(spread, ReducedVariance):
-        return replace(spread, reduced=spread.reduced[frames])
-    return spread[frames]
-
-
-def _scaled(spread: NDArray[np.floating] | ReducedVariance, factor: Curve) -> NDArray[np.floating] | ReducedVariance:
-    if isinstance(spread, ReducedVariance):
-        return replace(spread, reduced=spread.reduced * factor[:, None])
-    return spread * factor[:, None]
 
 
 def sound_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:

@@ -40,7 +40,7 @@ BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
 """Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are
 seconds away do not change the result, and the memory does not grow with the recording."""
 DOUBLE_FRAMES = 60_000
-"""The motion of recordings beyond ten minutes is kept in single precision, its variance in the model's space."""
+"""The motion of recordings beyond ten minutes is kept in single precision."""
 
 Pins = dict[tuple[int, int], float]
 """Pinned values by frame and dimension of the motion space."""
@@ -91,8 +91,8 @@ class LearnedMotion:
         closing_units: Container[str] = (),
         reliability: NDArray[np.float64] | float = 1.0,
         voice: float = 1.0,
-    ) -> tuple[Motion, NDArray[np.floating[Any]] | ReducedVariance]:
-        """Return the motion of all channels at 100 Hz, and its variance [shape=(T, P)], by parameter generation.
+    ) -> tuple[Motion, ReducedVariance]:
+        """Return the motion of all channels at 100 Hz, and its variance, by parameter generation.
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
@@ -131,16 +131,15 @@ class LearnedMotion:
         ranges: Sequence[slice],
         pins: Pins,
         scaling: VarianceScaling | None,
-    ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | ReducedVariance]:
-        """Return values and variance of all channels [each shape=(T, P)], block by block.
+    ) -> tuple[NDArray[np.floating[Any]], ReducedVariance]:
+        """Return values of all channels [shape=(T, P)] and their variance, block by block.
 
         ranges : the frames of each p, b and m, of which one must be closed
         """
         space = self.space
-        is_long = frames > DOUBLE_FRAMES
-        precise = np.float32 if is_long else np.float64
+        precise = np.float32 if frames > DOUBLE_FRAMES else np.float64
         motion = np.empty((frames, len(space.channels)), precise)
-        spread = np.empty((frames, space.dimensions if is_long else len(space.channels)), precise)
+        spread = np.empty((frames, space.dimensions), precise)
         for inner, outer in generation_blocks(frames):
             block_pins = {
                 (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
@@ -157,11 +156,11 @@ class LearnedMotion:
             self.limits.check(result[0], self.closure, block_pins)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             values, variance = (rows[kept] for rows in result)
-            motion[inner], restored = space.restore(values, variance)
-            spread[inner] = variance if is_long else restored
+            motion[inner], _ = space.restore(values, variance)
+            spread[inner] = variance
         weights = [channel.unit == WEIGHT for channel in space.channels]
         motion[:, weights] = np.maximum(motion[:, weights], 0)
-        return motion, ReducedVariance(spread, space.mixing.astype(precise)) if is_long else spread
+        return motion, ReducedVariance(spread, space.mixing.astype(precise))
 
 
 def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:

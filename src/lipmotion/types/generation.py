@@ -297,7 +297,7 @@ class StateTrace:
 
 @dataclass(frozen=True, eq=False)
 class ReducedVariance:
-    """Variances of P channels, stored as those of Q dimensions to save memory in long recordings.
+    """Variances of P channels, stored as those of Q dimensions to save memory: recordings last for hours.
 
     reduced : float array [shape=(T, Q)], variances of the dimensions
     mixing  : float array [shape=(Q, P)]; ``reduced @ mixing`` are the variances of the channels
@@ -401,7 +401,7 @@ class Generation:
 
     @property
     def variance(self) -> NDArray[np.floating[Any]]:
-        """Variance of every channel in every frame [shape=(T, P)]; in long recordings, computed at every access."""
+        """Variance of every channel in every frame [shape=(T, P)], computed at every access where it is reduced."""
         return self.variance_of(slice(None))
 
     @property
@@ -435,8 +435,10 @@ class Generation:
     def with_motion(self, motion: Motion) -> Generation:
         """Return the generation with other motion; channels after its own have the variance 0."""
         added = len(motion.channels) - len(self.motion.channels)
-        spread = np.pad(self.variance, ((0, 0), (0, added))) if added else self.spread
-        return replace(self, motion=motion, spread=spread)
+        if isinstance(self.spread, ReducedVariance):
+            mixing = np.pad(self.spread.mixing, ((0, 0), (0, added)))
+            return replace(self, motion=motion, spread=replace(self.spread, mixing=mixing))
+        return replace(self, motion=motion, spread=np.pad(self.spread, ((0, 0), (0, added))))
 
     def resampled(self, rate_hz: float) -> Generation:
         """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
@@ -444,17 +446,19 @@ class Generation:
         Raises InputError: the rate is not more than 0.
         """
         motion = self.motion.resampled(rate_hz)
-        spread = self._spread_at(motion.time_s)
+        spread = self.changed_spread(lambda rows: between_frames(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
         return replace(
             self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])
         )
 
-    def _spread_at(self, time_s: NDArray[np.float64]) -> NDArray[np.floating[Any]] | ReducedVariance:
+    def changed_spread(
+        self, change: Callable[[NDArray[np.floating[Any]]], NDArray[np.floating[Any]]]
+    ) -> NDArray[np.floating[Any]] | ReducedVariance:
+        """Return the variances with other rows, which a function makes of those of all frames."""
         if isinstance(self.spread, ReducedVariance):
-            reduced = between_frames(self.spread.reduced, self.motion.rate_hz, time_s)
-            return replace(self.spread, reduced=reduced)
-        return between_frames(self.spread, self.motion.rate_hz, time_s)
+            return replace(self.spread, reduced=change(self.spread.reduced))
+        return change(self.spread)
 
 
 class SpokenText(NamedTuple):

@@ -2,7 +2,7 @@
 
 import { choice, labelled, made, replaced, textButton } from "./dom.js";
 import { dialog } from "./dialogs.js";
-import { OWN, filled } from "./strings.js";
+import { OWN, TEXT, filled } from "./strings.js";
 
 const FOLDER = "folder", LINES = "lines", MINUTE_S = 60;
 const percent = (share) => `${Math.round(100 * share)} %`;
@@ -69,7 +69,8 @@ class Own {
     } catch (error) {
       this.status.textContent = error.message;
       this.status.className = "bad";
-      return;
+      if (error.status !== 409) return;
+      this.told = await this.studio.server.read("training"); // another window was first
     }
     this.state = this.told.job?.state ?? "";
     this.studio.wake();
@@ -81,7 +82,11 @@ class Own {
   send(path, content = {}) { return this.ask(() => this.studio.server.told(path, content)); }
 
   showJob() {
-    const { job } = this.told;
+    const { job, damage, restorable } = this.told;
+    if (damage) {
+      return replaced(this.job, paragraph(damage, { className: "warning" }),
+        restorable ? textButton(TEXT.restore, () => this.send("training/restore"), { id: "own-restore" }) : null);
+    }
     if (!job) return replaced(this.job);
     const title = made("h3", { textContent: filled(OWN.states[job.state], { what: OWN.kinds[job.kind], name: job.name }) });
     if (job.state === "working") {
@@ -146,7 +151,7 @@ class Own {
   }
 
   async use(voice) {
-    await this.send("voice", { voice });
+    await this.send("voice", { voice, revision: this.told.revision });
     const { lineId } = this.studio.store;
     await this.studio.listed();
     if (lineId) await this.studio.open(lineId, true);

@@ -506,9 +506,9 @@ export class Studio {
     });
   }
 
-  async keepPronunciation(word, phones) {
+  async keepPronunciation(word, phones, { revision }) {
     try {
-      await this.server.told("lexicon", { word, phones });
+      await this.server.told("lexicon", { word, phones, revision });
       this.say(filled(TEXT.kept, { word, phones: phones.join(" ") }));
     } catch (error) {
       this.refuse(error);

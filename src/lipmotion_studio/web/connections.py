@@ -10,7 +10,9 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 MOST_CONNECTIONS, MOST_OF_ONE = 800, 256
 """Connections at the same time, of all clients and of one: beyond these, those without a request are closed."""
 HEADERS_S, IDLE_S, STALLED_S = 5.0, 20, 30.0
-"""How long the headers of a request may take; a connection is kept after a reply; and a reply is not taken."""
+"""How long the headers of a request may take; a connection is kept after a reply; and a reply may wait for its client,
+before that is asked to have taken ``LEAST_BYTES_S`` meanwhile."""
+LEAST_BYTES_S = 4096.0
 FIRST_READ_S = 0.1
 """After which the request of a new connection has been read, where it came with it."""
 
@@ -21,6 +23,8 @@ class PunctualConnection(H11Protocol):
     _due: asyncio.TimerHandle | None = None
     _stalled: asyncio.TimerHandle | None = None
     idle_since_s, was_read = 0.0, False
+    _waited_s, _taken = 0.0, 0
+    _paused = (0.0, 0)
 
     @property
     def is_busy(self) -> bool:
@@ -54,13 +58,15 @@ class PunctualConnection(H11Protocol):
         self.transport.abort()  # what is left of a reply is not waited for
 
     def pause_writing(self) -> None:
-        """Wait for a client that does not take its reply."""
+        """Wait for a client that does not take its reply as fast as it is made."""
         super().pause_writing()
-        self._stalled = self.loop.call_later(STALLED_S, self.transport.abort)
+        self._paused = self.loop.time(), self.transport.get_write_buffer_size()
+        self._stalled = self.loop.call_later(STALLED_S - self._waited_s, self._end_if_slow)
 
     def resume_writing(self) -> None:
         """Go on with a reply that is taken."""
         super().resume_writing()
+        self._count_taken()
         if self._stalled is not None:
             self._stalled.cancel()
 
@@ -75,6 +81,21 @@ class PunctualConnection(H11Protocol):
         if self._due is not None:
             self._due.cancel()
         self._due = None
+
+    def _count_taken(self) -> None:
+        """Count what the client has taken while its reply waited, and how long that was."""
+        since_s, before = self._paused
+        self._paused = self.loop.time(), self.transport.get_write_buffer_size()
+        self._waited_s += self._paused[0] - since_s
+        self._taken += before - self._paused[1]
+
+    def _end_if_slow(self) -> None:
+        self._count_taken()
+        if self._taken < LEAST_BYTES_S * self._waited_s:
+            self.transport.abort()
+            return
+        self._waited_s, self._taken = 0.0, 0
+        self._stalled = self.loop.call_later(STALLED_S, self._end_if_slow)
 
     def _end_if_idle(self) -> None:
         if not self.is_busy:

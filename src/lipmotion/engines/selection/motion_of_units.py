@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +43,7 @@ def motion_of_units(
     constraints: Constraints | None = None,
     *,
     close: bool = False,
-) -> tuple[Motion, NDArray[np.floating[Any]] | ReducedVariance]:
+) -> tuple[Motion, ReducedVariance]:
     """Return the motion of chosen units and its variance, as of ``LearnedMotion.generate``.
 
     close : make the lips meet in every p, b and m

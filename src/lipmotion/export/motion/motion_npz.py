@@ -6,7 +6,6 @@ import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,19 +27,24 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
     ``confidence`` [shape=(T,)] is ``Generation.confidence``, where that is known.
     """
     document = as_json({**header(generation), **units_and_origin(generation, source, model)}, ensure_ascii=False)
-    with path.open("wb") as file:  # given a path, NumPy would add a suffix of its own
-        deviations = np.empty(generation.motion.values.shape, np.float32)
-        for start in range(0, len(deviations), FRAMES_AT_ONCE):
-            frames = slice(start, start + FRAMES_AT_ONCE)
-            deviations[frames] = np.sqrt(np.maximum(generation.variance_of(frames), 0))
-        arrays: dict[str, Any] = {
-            "values": generation.motion.values,
-            "standard_deviations": deviations,
-            "document": np.array(document),
-        }
+    values = generation.motion.values
+    rows = {
+        "values": lambda frames: values[frames],
+        "standard_deviations": lambda frames: np.sqrt(np.maximum(generation.variance_of(frames), 0)).astype(np.float32),
+    }
+    with zipfile.ZipFile(path, "w") as file:  # as ``np.savez``, which would want all deviations at once
+        for name, some in rows.items():
+            with file.open(f"{name}.npy", "w", force_zip64=True) as member:
+                head = {"descr": some(slice(0, 1)).dtype.str, "fortran_order": False, "shape": values.shape}
+                np.lib.format.write_array_header_1_0(member, head)
+                for start in range(0, len(values), FRAMES_AT_ONCE):
+                    member.write(np.ascontiguousarray(some(slice(start, start + FRAMES_AT_ONCE))).data)
+        arrays = {"document": np.array(document)}
         if (confidence := generation.confidence) is not None:
             arrays["confidence"] = confidence.astype(np.float32)
-        np.savez(file, **arrays)
+        for name, array in arrays.items():
+            with file.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

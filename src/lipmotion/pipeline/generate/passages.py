@@ -67,10 +67,10 @@ def generate_passages(
     held = [(pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
     bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest
     clip_at_zero(motion)
-    if held and not isinstance(spread, ReducedVariance):
-        spread = np.require(spread, None, "W")
+    if held and isinstance(spread, ReducedVariance):
+        spread = replace(spread, reduced=np.require(spread.reduced, None, "W"))
         for frame, column, _ in held:
-            spread[frame, column] = 0
+            spread.reduced[frame, spread.mixing[:, column] > 0] = 0
     units, trace = _join_units(speech, parts, made, rest.units[0].label), _join_traces(parts, made, rest, frames)
     return replace(rest, motion=motion, spread=spread, units=units, trace=trace)
 

@@ -183,10 +183,7 @@ def with_curves(
     kept = [name for name in generation.motion.names if name not in added.names]
     if len(kept) < len(generation.motion.names):
         generation = generation.selected(kept)
-    motion = generation.motion
-    both = beside(motion, added)
-    variance = np.pad(generation.variance, ((0, 0), (0, len(added.channels))))
-    return replace(generation, motion=both, spread=variance), added.names
+    return generation.with_motion(beside(generation.motion, added)), added.names
 
 
 def described(character: DrivenCharacter) -> Iterator[str]:

@@ -43,6 +43,7 @@ LOCAL_FRAMES, LOCAL_DROP, SOFTEST_DROP = 301, 30 * DECIBEL, 42 * DECIBEL
 STEADY, STEADY_FRAMES = 10 * DECIBEL, 201
 """The level of a voice falls by more than the first from the loudest of so many frames around."""
 TONE_FRAMES, TONE_RANGE, TONE_SHARE, TONE_DROP = 15, 0.2, 0.985, 20 * DECIBEL
+TONE_BLOCK = 6000
 """A tone has a log energy within the second for so many frames, this share of its power at one frequency, and is no
 softer than the last beneath the loudest frame. No voice in 13 minutes of speech, or of a synthesiser, is a tone."""
 GATED_DROP, FILLED_DROP = 70 * DECIBEL, 33 * DECIBEL
@@ -126,14 +127,16 @@ def find_tones(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) ->
 
     ranges = maximum_filter1d(log_energy, TONE_FRAMES) - minimum_filter1d(log_energy, TONE_FRAMES)
     steady = (ranges < TONE_RANGE) & (log_energy > log_energy.max() - TONE_DROP)
-    padded, window = np.pad(samples, WINDOW // 2), np.hanning(WINDOW)
-    tones = []
+    window, tones = np.hanning(WINDOW), []
     for first, end in sound_runs(maximum_filter1d(steady, TONE_FRAMES), 1):
-        frames = sliding_window_view(padded[first * HOP : (end - 1) * HOP + WINDOW], WINDOW)[::HOP]
-        power = np.square(np.abs(np.fft.rfft(frames * window)))
-        peaks = power.argmax(axis=1)
-        near = np.abs(np.arange(power.shape[1]) - np.median(peaks)) <= 3
-        pure = power[:, near].sum(axis=1) > TONE_SHARE * power.sum(axis=1)
+        pure = np.zeros(end - first, bool)
+        for start in range(first, end, TONE_BLOCK):  # hours may be steady
+            stop = min(start + TONE_BLOCK, end)
+            begin, over = start * HOP - WINDOW // 2, (stop - 1) * HOP + WINDOW - WINDOW // 2
+            block = np.pad(samples[max(begin, 0) : over], (max(-begin, 0), max(over - len(samples), 0)))
+            power = np.square(np.abs(np.fft.rfft(sliding_window_view(block, WINDOW)[::HOP] * window)))
+            near = np.abs(np.arange(power.shape[1]) - np.median(power.argmax(axis=1))) <= 3
+            pure[start - first : stop - first] = power[:, near].sum(axis=1) > TONE_SHARE * power.sum(axis=1)
         runs = sound_runs(pure, 1)
         tones += [Stretch(first + start, first + stop) for start, stop in runs if stop - start >= TONE_FRAMES]
     return tones

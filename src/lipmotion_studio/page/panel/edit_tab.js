@@ -53,8 +53,8 @@ function wordPart(studio, index) {
   const phones = made("input", { id: "word-phones", spellcheck: false, autocapitalize: "none" });
   const spoken = spokenAs(line, index).join(" ");
   phones.value = spoken;
-  const offer = () => offerPronunciations(studio, field.value.trim().toLowerCase(), offers, phones);
-  let waiting = 0;
+  let waiting = 0, seen = {};
+  const offer = async () => { seen = await offerPronunciations(studio, field.value.trim().toLowerCase(), offers, phones); };
   field.addEventListener("input", () => {
     clearTimeout(waiting);
     waiting = setTimeout(offer, 200);
@@ -69,22 +69,26 @@ function wordPart(studio, index) {
   return section(`${TEXT.word} ${index + 1}`,
     row(field, textButton(TEXT.change, apply, { id: "word-change" })), offers,
     row(labelled(TEXT.said, phones), textButton(TEXT.keep, async () => {
-      await studio.keepPronunciation(field.value.trim().toLowerCase(), phones.value.trim().split(/\s+/));
+      const kept = field.value.trim().toLowerCase();
+      if (seen.asked !== kept) await offer();
+      await studio.keepPronunciation(kept, phones.value.trim().split(/\s+/), seen);
       offer();
     }, { id: "word-keep" })));
 }
 
+/** Offer the pronunciations of a word that are known; return the word, and what the server said of it. */
 async function offerPronunciations(studio, word, place, phones) {
-  if (!word) return place.replaceChildren();
-  let found;
+  let found = {};
   try {
-    found = await studio.server.read(`lexicon?word=${encodeURIComponent(word)}`);
+    if (word) found = await studio.server.read(`lexicon?word=${encodeURIComponent(word)}`);
   } catch (error) {
-    return place.replaceChildren(made("p", { className: "hint", textContent: error.message }));
+    place.replaceChildren(made("p", { className: "hint", textContent: error.message }));
+    return {};
   }
-  return place.replaceChildren(
+  place.replaceChildren(
     found.known === false ? made("p", { className: "hint", textContent: TEXT.noPronunciation }) : "",
     ...(found.pronunciations ?? []).map((said) => textButton(said.join(" "), () => { phones.value = said.join(" "); }, { className: "offer" })));
+  return { ...found, asked: word };
 }
 
 /** Return the phones of a word: those that the server counts to it. */
