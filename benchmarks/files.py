@@ -22,11 +22,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
-from lipmotion.export.addon import write_addon
 from lipmotion.faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.shape_fit import mouth_weights
 from lipmotion.faces.head.stage import figure, head_mesh
+from lipmotion.formats.blender import write_addon
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves

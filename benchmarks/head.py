@@ -31,12 +31,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.export.sound import write_sound
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.stage import Stage, camera_for
+from lipmotion.formats.sound import write_sound
 from lipmotion.meshes.rendering.rasteriser import Camera
 from lipmotion.types import Audio, Channel, Motion, Span, SpokenText, Timeline, Unit
 from lipmotion.units import LIP_CLOSING

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from lipmotion.appearance.lower_face import FaceShape, best_scale, region_map, replaced_part
 from lipmotion.appearance.placing import cut, feather, place
 from lipmotion.appearance.poisson import CloningSystem, cloning_system
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.vision.footage import footage_frames, track_footage

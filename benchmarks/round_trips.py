@@ -15,7 +15,7 @@ import numpy as np
 
 import lipmotion
 from lipmotion.corpora.labels import read_labels, read_phones
-from lipmotion.export import read_motion, write_motion
+from lipmotion.formats import read_motion, write_motion
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.motion_files import in_format
 from lipmotion.pipeline.outputs.motion_input import read_generation

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # as in typing, whose import would delay the answer to Ctrl-C
 if TYPE_CHECKING:
+    from lipmotion.articulation.cue_sheets import CueSheet
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
-    from lipmotion.export.base import read_motion
-    from lipmotion.export.cues.sheet import CueSheet
     from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
+    from lipmotion.formats.base import read_motion
     from lipmotion.pipeline.corpus.prepare import prepare
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.evaluation.compare import compare
@@ -116,7 +116,7 @@ _HOMES = {
     "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
-    "CueSheet": "lipmotion.export.cues.sheet",
+    "CueSheet": "lipmotion.articulation.cue_sheets",
     "Job": "lipmotion.pipeline.job",
     "Outputs": "lipmotion.pipeline.job",
     "Request": "lipmotion.pipeline.job",
@@ -137,7 +137,7 @@ _HOMES = {
     "load_model": "lipmotion.pipeline.model",
     "map_onto": "lipmotion.pipeline.generate.transfer",
     "prepare": "lipmotion.pipeline.corpus.prepare",
-    "read_motion": "lipmotion.export.base",
+    "read_motion": "lipmotion.formats.base",
     "save_face": "lipmotion.faces.filmed.face",
     "save_model": "lipmotion.pipeline.model",
     "SpokenText": "lipmotion.types",

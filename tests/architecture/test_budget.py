@@ -49,6 +49,7 @@ def test_what_animate_loads() -> None:
         "experiments",
         "export",
         "faces",
+        "formats",
         "meshes",
         "studio",
         "study",

@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[2]
 DOWN = "Imports only go down"
 ENGINES = "Engines never import one another; only the registry knows them"
 FACES = "Faces never import one another; only the registry knows them"
+FORMATS = "Formats never import one another; only the registry of cues knows its own"
 VISION = "Only corpora and vision may import OpenCV and MediaPipe"
 NUMBA = "Only kernels may import numba"
 FORBIDDEN = [
@@ -29,17 +30,9 @@ FORBIDDEN = [
     (ENGINES, "engines/trajectory/model.py", "from lipmotion.engines.joint import engine"),
     (ENGINES, "engines/base.py", "from lipmotion.engines import registry"),
     (FACES, "faces/portrait/mouth_painting.py", "from lipmotion.faces import registry"),
-    ("Exporters never import one another", "export/cues/sheet.py", "from lipmotion.export.motion import keys"),
-    (
-        "Formats of motion never import one another",
-        "export/motion/motion_csv.py",
-        "import lipmotion.export.motion.motion_npz",
-    ),
-    (
-        "Formats of cues never import one another",
-        "export/cues/moho_dat.py",
-        "import lipmotion.export.cues.rhubarb_tsv",
-    ),
+    (FORMATS, "formats/tables.py", "from lipmotion.formats import motion_document"),
+    (FORMATS, "formats/rhubarb.py", "from lipmotion.formats import papagayo"),
+    (FORMATS, "formats/base.py", "import lipmotion.formats.c3d"),
     (
         "Engines know predictors by their interface alone",
         "engines/selection/engine.py",

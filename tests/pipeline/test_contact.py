@@ -15,12 +15,12 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
-from lipmotion.export.base import read_motion, write_motion
 from lipmotion.faces.base import Staging
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.shape_fit import lip_gap
 from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.faces.portrait.drawn_frames import face_poses
+from lipmotion.formats.base import read_motion, write_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.facial_animation import FAP

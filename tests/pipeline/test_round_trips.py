@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.speak import speak
 from lipmotion.pipeline.model import Model

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.export.base import MOTION_FORMATS, MotionFormat
 from lipmotion.faces import Face, face_named
+from lipmotion.formats.base import MOTION_FORMATS, MotionFormat
 from lipmotion.testing import ContractError, check_exporter, check_face
 
 

@@ -19,7 +19,7 @@ from lipmotion.corpora.source_recordings import (
 )
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.curve_table import is_live_link_file
+from lipmotion.formats.tables import is_live_link_file
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
 VIDEO_KINDS = (VIDEOS, BOTH)

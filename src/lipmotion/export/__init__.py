@@ -1,21 +1,5 @@
-"""Motion, cues and pictures to files that other programs open: one module per format."""
+"""Videos, pages and marks of synthetic pictures."""
 
-from lipmotion.export.base import (
-    MotionFormat,
-    motion_suffix,
-    motion_suffixes,
-    read_motion,
-    readable_suffixes,
-    write_motion,
-)
 from lipmotion.export.video import write_mp4
 
-__all__ = [
-    "MotionFormat",
-    "motion_suffix",
-    "motion_suffixes",
-    "read_motion",
-    "readable_suffixes",
-    "write_motion",
-    "write_mp4",
-]
+__all__ = ["write_mp4"]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, LipMotionError
-from lipmotion.export.base import MotionFormat
 from lipmotion.faces.base import TRANSPARENT, Face, Stageable, Staging
+from lipmotion.formats.base import MotionFormat
 from lipmotion.meshes.fitting.facial_animation import FAP
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS
@@ -74,7 +74,7 @@ def check_exporter(exporter: MotionFormat) -> None:
     order, and beside others; eyes, brows, head and pressed lips may be left out.
     Raises ContractError: what was found.
 
-    >>> from lipmotion.export.base import MOTION_FORMATS
+    >>> from lipmotion.formats.base import MOTION_FORMATS
     >>> check_exporter(MOTION_FORMATS.load("csv"))
     """
     one = example(("m", "aa"))

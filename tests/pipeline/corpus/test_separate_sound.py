@@ -11,8 +11,8 @@ import pytest
 from lipmotion.corpora.source_recordings import SourceRecording
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.export.base import write_motion
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.base import write_motion
+from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.corpus import long_videos as module
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.separate_sound import SeparateSound, in_step, on_own_time

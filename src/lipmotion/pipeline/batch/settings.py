@@ -11,12 +11,12 @@ from typing import Any
 
 from lipmotion.corpora.labels import label_files_beside
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import motion_suffixes
-from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
 from lipmotion.faces.cut_out import picture_files
 from lipmotion.faces.registry import is_drawings
+from lipmotion.formats.base import motion_suffixes
+from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job

@@ -50,7 +50,7 @@ def write_posteriors(path: Path, generation: Generation, posteriors: tuple[Chain
 
     Raises ExportError: another suffix, or the file cannot be written.
     """
-    from lipmotion.export.posterior_plot import draw_posteriors
+    from lipmotion.pipeline.generate.posterior_plot import draw_posteriors
 
     check_picture(path)
     with whole_file(path) as unfinished:

@@ -7,9 +7,8 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lipmotion.articulation.cue_sheets import shown_shapes
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.cues import OPTIONAL
-from lipmotion.export.cues.sheet import shown_shapes
 from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.cut_out import CutOut, read_cut_out
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
@@ -46,6 +45,7 @@ from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
 from lipmotion.types.moods import MOODS
 from lipmotion.types.progress import with_reports
+from lipmotion.units.mouth_chart import OPTIONAL
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model

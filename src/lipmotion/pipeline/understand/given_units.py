@@ -6,8 +6,8 @@ from pathlib import Path
 
 from lipmotion.corpora.labels import holds_timings, read_phones
 from lipmotion.errors import InputError
-from lipmotion.export.base import motion_suffix
-from lipmotion.export.base import read_units as read_units_of_motion
+from lipmotion.formats.base import motion_suffix
+from lipmotion.formats.base import read_units as read_units_of_motion
 from lipmotion.storage.sources import check_kind
 from lipmotion.types import Timeline, Unit
 
