@@ -18,12 +18,12 @@ import numpy as np
 
 from lipmotion.articulation.cue_sheets import CueSheet
 from lipmotion.citations import model_citations
-from lipmotion.corpora.labels.textgrid import parse_interval_tiers
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.synthetic_mark import mark_metadata
-from lipmotion.export.timed_labels import write_labels
 from lipmotion.formats.base import read_motion, write_motion
 from lipmotion.formats.cues import write_cue_file
+from lipmotion.formats.label_files import write_labels
+from lipmotion.formats.textgrid import parse_interval_tiers
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.files.usd_writer import write_usda

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lipmotion.corpora.labels import read_labels
-from lipmotion.export.timed_labels import write_labels
+from lipmotion.formats.label_files import read_labels, write_labels
 from lipmotion.types import Span, Timeline, Unit
 
 ROWS = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 3599.9996, "dh", "there")]

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.labels import read_labels, read_phones
-from lipmotion.export.timed_labels import write_textgrid
+from lipmotion.formats.label_files import read_labels, read_phones
+from lipmotion.formats.textgrid import write_textgrid
 from lipmotion.types import Span, Timeline, Unit
 
 WORDS = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 0.7, "dh", 'a "the"')]

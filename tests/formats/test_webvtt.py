@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.labels import read_labels
-from lipmotion.export.timed_labels import write_labels, write_textgrid, write_webvtt
+from lipmotion.formats.label_files import read_labels, write_labels
+from lipmotion.formats.subtitles import write_webvtt
+from lipmotion.formats.textgrid import write_textgrid
 from lipmotion.types import Span, Timeline, Unit
 
 ROWS = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 3599.9996, "dh", "r&d <the>")]

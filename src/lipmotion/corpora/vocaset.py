@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import gathered
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import MotionFile, RecordingFolder, SourceRecording
 from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_files import labels_beside
 from lipmotion.formats.markers import in_head_frame, motion_of_markers
 from lipmotion.types import Motion
 

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import VIDEO_KINDS
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.layouts import LRS
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import labels_beside
 from lipmotion.pipeline.corpus.separate_sound import on_own_time, separate_sound
 from lipmotion.pipeline.corpus.utterance_spans import SpokenPart, utterance_spans
 from lipmotion.speech.sound.audio_files import read_audio

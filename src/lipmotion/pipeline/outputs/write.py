@@ -8,8 +8,8 @@ from pathlib import Path
 
 from lipmotion.articulation.delivery import Delivery, sound_units
 from lipmotion.errors import ExportError
-from lipmotion.export.timed_labels import LABEL_SUFFIXES, write_labels
 from lipmotion.faces.base import Staging
+from lipmotion.formats.label_files import LABEL_SUFFIXES, write_labels
 from lipmotion.formats.sound import SOUND_CODECS, write_sound
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions

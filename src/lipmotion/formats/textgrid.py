@@ -1,12 +1,19 @@
-"""Praat TextGrids, in long and short text form."""
+"""``.TextGrid``: labels of Praat in time, written in long text form, read in long and short form.
+
+Written are the tiers ``phones`` and ``words``. Source: Praat manual, "TextGrid file formats".
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
-from lipmotion.corpora.labels.tier import LabelTier, TimedLabel, check_count, named_tier, required_time
 from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, named_tier, required_time
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Timeline, Unit
+from lipmotion.units import RECOGNISED, recognised_phones, words_in_time
 
 TOKEN = re.compile(
     r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
@@ -15,6 +22,8 @@ TOKEN = re.compile(
 MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
 LONGEST_COUNT = 18
 """Most digits of a count."""
+Interval = tuple[float, float, str]
+"""Start and end in seconds, and the text."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
@@ -111,3 +120,48 @@ def _take(tokens: Iterator[tuple[str, str]], wanted: str) -> str:
     if kind != wanted:
         raise _DamagedError(f"there stands {kind} {' '.join(value[:40].split())}".rstrip() + f", required a {wanted}")
     return value
+
+
+def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
+    """Write phones in time to a TextGrid in long text form, with the tiers ``phones`` and ``words``.
+
+    units : the phones; where a label has no phone, the name of its unit is written
+    Words are those of ``units.words_in_time``. If phones were recognised, a third tier, ``recognised``, holds these
+    with their confidence (``p 0.37``), so that a reader can tell them from corrected ones (``units.recognised``).
+    Times are as exact as floats are. After a failure there is no partial file.
+    Raises ExportError: the file cannot be written.
+    Source: Praat manual, "TextGrid file formats".
+    """
+    phones = [(float(span.start_s), float(span.end_s), span.label.phone or span.label.unit) for span in units]
+    words = [(float(span.start_s), float(span.end_s), span.label) for span in words_in_time(units)]
+    tiers = [("phones", phones), ("words", words)]
+    recognised = [
+        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in recognised_phones(units)
+    ]
+    if recognised:
+        tiers.append((RECOGNISED, recognised))
+    end_s = max((float(span.end_s) for span in units), default=0.0)
+    lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
+    lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
+    for number, (name, intervals) in enumerate(tiers, 1):
+        whole = _filled(intervals, end_s)
+        lines += [f"    item [{number}]:", '        class = "IntervalTier"', f'        name = "{name}"']
+        lines += ["        xmin = 0", f"        xmax = {end_s}", f"        intervals: size = {len(whole)}"]
+        for place, (start_s, stop_s, text) in enumerate(whole, 1):
+            quoted = text.replace('"', '""')
+            lines += [f"        intervals [{place}]:", f"            xmin = {start_s}", f"            xmax = {stop_s}"]
+            lines.append(f'            text = "{quoted}"')
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _filled(intervals: list[Interval], duration_s: float) -> list[Interval]:
+    """Return intervals from 0 s to the end that follow each other; what was a gap has no text. Praat requires that."""
+    whole: list[Interval] = []
+    end_s = 0.0
+    for start_s, stop_s, text in intervals:
+        if start_s > end_s:
+            whole.append((end_s, start_s, ""))
+        whole.append((end_s if start_s < end_s else start_s, stop_s, text))
+        end_s = stop_s
+    return [*whole, (end_s, duration_s, "")] if end_s < duration_s else whole

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from corpora.labels.timing_samples import (
+from formats.timing_samples import (
     AZURE_VISEMES,
     AZURE_WORDS,
     CARTESIA,
@@ -23,9 +23,15 @@ from corpora.labels.timing_samples import (
     SERVERS,
     lines,
 )
-from lipmotion.corpora.labels import holds_timings, labels_beside, read_labels, read_phones, read_transcript
 from lipmotion.errors import InputError
-from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.formats.label_files import (
+    holds_timings,
+    labels_beside,
+    read_labels,
+    read_phones,
+    read_transcript,
+    read_units,
+)
 from lipmotion.types import TimedTranscript
 
 

@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
-from lipmotion.corpora.labels import read_labels, read_phones, read_transcript, speakers_in
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import read_labels, read_phones, read_transcript, speakers_in
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.types import TimedTranscript
 from lipmotion.units import UNKNOWN_PHONES
 
-CASES = Path(__file__).parents[2] / "data" / "cases" / "labels"
+CASES = Path(__file__).parents[1] / "data" / "cases" / "labels"
 MOTHER = "my mother moved the baby boat"
 W = [("hello", 0.4, 0.8), ("big", 0.85, 1.1), ("moon", 1.2, 1.6)]
 

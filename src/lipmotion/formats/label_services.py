@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Any, NamedTuple
 
-from lipmotion.corpora.labels.phone_symbols import ipa_labels, with_pauses
-from lipmotion.corpora.labels.tier import (
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import (
     EARLIEST_S,
     LINES,
     PHONE_LABELS,
@@ -34,7 +34,7 @@ from lipmotion.corpora.labels.tier import (
     named_tier,
     unit_of_times,
 )
-from lipmotion.errors import InputError, shortened
+from lipmotion.formats.phone_symbols import ipa_labels, with_pauses
 from lipmotion.types import values
 from lipmotion.types.values import number_of, require
 from lipmotion.units import SILENCE

@@ -8,8 +8,8 @@ from collections import defaultdict
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from lipmotion.corpora.labels.tier import LINES, OTHER, LabelTier, TimedLabel, check_count, clock_seconds, named_tier
 from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, clock_seconds, named_tier
 
 ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
 READ_ROOTS = ("ANNOTATION_DOCUMENT", "tt", "transcript", "timedtext")

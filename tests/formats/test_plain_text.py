@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.labels import check_plain_text, read_labels
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import check_plain_text, read_labels
 
 OTHER = {
     "master labels": ('#!MLF!#\n"*/a.lab"\n0 1000000 sil\n.\n', "is a master label file"),

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.corpora.labels import labels_beside, read_transcript
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import labels_beside, read_transcript
 from lipmotion.types import TimedTranscript
 
 Lines = list[tuple[float | None, float | None, str]]

@@ -9,9 +9,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from io import StringIO
+from pathlib import Path
 
-from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count, clock_seconds
 from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import LINES, LabelTier, TimedLabel, check_count, clock_seconds
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Timeline, Unit
+from lipmotion.units import is_silent, words_in_time
 from lipmotion.units.spoken_text import speaker_names, spoken_text
 
 TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
@@ -55,6 +59,9 @@ LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
 LYRICS = re.compile(rf"(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]")
 """The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``."""
 LYRICS_LINE = re.compile(rf"((?:\[{TIME}\]\s{{0,4}}){{1,100}}).*")
+PHONES = ".phones"
+"""A file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words."""
+_ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 
 
 def is_subtitles(text: str) -> bool:
@@ -244,3 +251,46 @@ def _without_drawings(text: str) -> str:
         elif not drawing:
             shown.append(part)
     return "".join(shown)
+
+
+def shown_labels(path: Path, units: Timeline[Unit]) -> list[tuple[float, float, str]]:
+    """Return start, end and text of each word, or of each phone where the name of the file asks for them; no silence.
+
+    Words are those of ``units.words_in_time``.
+    """
+    if path.stem.lower().endswith(PHONES):
+        spoken = [span for span in units if not is_silent(span.label.phone)]
+        return [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
+    return [(span.start_s, span.end_s, span.label) for span in words_in_time(units) if span.label]
+
+
+def clock(seconds: float, mark: str) -> str:
+    """Return a time as ``HH:MM:SS.mmm``; ``mark``: what stands before the thousandths."""
+    thousandths = round(seconds * 1000)
+    minutes, rest = divmod(thousandths, 60_000)
+    return f"{minutes // 60:02d}:{minutes % 60:02d}:{rest // 1000:02d}{mark}{rest % 1000:03d}"
+
+
+def write_subrip(path: Path, units: Timeline[Unit]) -> None:
+    """Write the words in time, or the phones where the name ends with ``.phones.srt``, one a cue; silence has none.
+
+    After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    """
+    lines: list[str] = []
+    for number, (start_s, end_s, text) in enumerate(shown_labels(path, units), 1):
+        lines += [f"{number}", f"{clock(start_s, ',')} --> {clock(end_s, ',')}", text, ""]
+    with whole_file(path) as temporary:
+        temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
+
+
+def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
+    """Write the words in time, or the phones where the name ends with ``.phones.vtt``, one a cue; silence has none.
+
+    After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    """
+    lines = ["WEBVTT", ""]
+    for start_s, end_s, text in shown_labels(path, units):
+        shown = "".join(_ESCAPES.get(letter, letter) for letter in text)
+        lines += [f"{clock(start_s, '.')} --> {clock(end_s, '.')}", shown, ""]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines), encoding="utf-8", newline="\n")

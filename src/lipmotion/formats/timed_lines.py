@@ -13,7 +13,8 @@ from itertools import islice
 from pathlib import Path
 from statistics import median
 
-from lipmotion.corpora.labels.tier import (
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import (
     LINES,
     MOST_LABELS,
     PHONE_LABELS,
@@ -28,7 +29,6 @@ from lipmotion.corpora.labels.tier import (
     required_time,
     scaled_tier,
 )
-from lipmotion.errors import InputError, shortened
 
 SHORTEST_TICKS = 10_000
 """Whole numbers below a millisecond are not taken as ticks at sight: "20 30 people" is a sentence."""

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.corpora.labels import labels_beside, read_labels
-from lipmotion.corpora.labels.label_files import LARGEST_LABELS
-from lipmotion.corpora.labels.tier import MOST_LABELS
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import LARGEST_LABELS, labels_beside, read_labels
+from lipmotion.formats.label_tiers import MOST_LABELS
 from lipmotion.units import PHONES, phone_named
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 

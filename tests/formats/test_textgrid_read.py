@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.labels import read_labels, read_phones
-from lipmotion.corpora.labels.textgrid import parse_interval_tiers
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import read_labels, read_phones
+from lipmotion.formats.textgrid import parse_interval_tiers
 from lipmotion.units import words_in_time
 
 Interval = tuple[float, float, str]

@@ -6,7 +6,8 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
-from lipmotion.corpora.labels.tier import (
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import (
     PHONE_LABELS,
     PHONES_SHARE,
     ROUNDING_S,
@@ -14,7 +15,6 @@ from lipmotion.corpora.labels.tier import (
     TimedLabel,
     phone_of,
 )
-from lipmotion.errors import InputError, shortened
 from lipmotion.units import PAUSE, PHONES, SILENCE, UNKNOWN_PHONES
 from lipmotion.units.ipa_phones import ipa_phones, token_phones, xsampa_as_ipa
 from lipmotion.units.phones import SHORT_PAUSE_S

@@ -1,4 +1,4 @@
-"""The label files of one recording; the kind of each is recognised by its content."""
+"""Files of labels in time, by the suffix or by their content, and those of one recording, which lie beside it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from io import StringIO
 from itertools import islice
 from pathlib import Path
 
-from lipmotion.corpora.labels.phone_symbols import in_inventory
-from lipmotion.corpora.labels.services import DamagedJsonError, described, is_json, service_tiers
-from lipmotion.corpora.labels.subtitles import NO_ARROW, is_subtitles, subtitle_tier
-from lipmotion.corpora.labels.textgrid import is_textgrid, parse_interval_tiers
-from lipmotion.corpora.labels.tier import (
+from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.formats.base import motion_suffix
+from lipmotion.formats.base import read_units as read_units_of_motion
+from lipmotion.formats.label_services import DamagedJsonError, described, is_json, service_tiers
+from lipmotion.formats.label_tiers import (
     LINES,
     OTHER,
     PHONE_LABELS,
@@ -31,10 +31,14 @@ from lipmotion.corpora.labels.tier import (
     with_recognised,
     with_words,
 )
-from lipmotion.corpora.labels.timed_lines import line_tiers
-from lipmotion.corpora.labels.xml_labels import is_timed_xml, xml_tiers
-from lipmotion.errors import InputError, shortened
+from lipmotion.formats.phone_symbols import in_inventory
+from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, subtitle_tier, write_subrip, write_webvtt
+from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
+from lipmotion.formats.timed_lines import line_tiers
+from lipmotion.formats.xml_labels import is_timed_xml, xml_tiers
+from lipmotion.printable import is_line
 from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import check_kind
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, phone_named
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
@@ -65,6 +69,12 @@ TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
 NAMED_TIERS = 12
 """Most names in a message."""
+READABLE = (".textgrid", ".eaf", ".lab", ".phn", ".txt", ".json", ".jsonl", ".marks", ".csv", ".tsv")
+"""Suffixes of files of phones in time, in lower case; their content decides which form they have. ``.json`` and
+``.csv`` may also be motion."""
+_WRITERS = {".TextGrid": write_textgrid, ".vtt": write_webvtt, ".srt": write_subrip}
+LABEL_SUFFIXES = tuple(_WRITERS)
+"""Suffixes of label files that are written, as programs write them; capitals do not matter."""
 
 
 @dataclass(frozen=True)
@@ -419,3 +429,37 @@ def _check_plain(text: str, path: Path) -> None:
 
 def _text(path: Path, kind: str = "label") -> str:
     return read_text_file(path, kind, LARGEST_LABELS, western=True)
+
+
+def read_units(path: str | Path, tier: str = "", speaker: str = "") -> Timeline[Unit]:
+    """Return the phones in time of a file.
+
+    path : a motion file (``.json``, ``.npz``); a ``.json`` with the member ``units`` alone; or any file of labels that
+           corpora may have (``READABLE``): a TextGrid with a tier of phones, Audacity's or HTK's labels, the
+           timings of a voice or an aligner
+    tier, speaker : of labels, which tier and whose phones (``read_phones``)
+    Raises InputError: no such file, not one of these, or without phones.
+    """
+    path = Path(path)
+    check_kind(path, "motion file", "units file")
+    is_label = path.suffix.lower() in READABLE
+    if motion_suffix(path) and not (is_label and holds_timings(path)):
+        return read_units_of_motion(path)
+    if is_label:
+        return read_phones(path, tier, speaker)
+    required = "use one of .json, .npz, .TextGrid, .eaf, .lab, .txt, .jsonl, .marks"
+    raise InputError(f"{path}: cannot read phones from {path.suffix!r}; {required}")
+
+
+def write_labels(path: Path, units: Timeline[Unit]) -> None:
+    """Write phones and words in time in the format of the suffix.
+
+    Raises ExportError: a label that is no line of text, or the file cannot be written.
+    """
+    for label in [span.label for span in units]:
+        if not is_line(label.phone + label.unit + label.word):
+            raise ExportError(
+                f"{path}: {shortened(repr(label))} has a line end, a control character or half a character"
+            )
+    write = next(write for suffix, write in _WRITERS.items() if suffix.lower() == path.suffix.lower())
+    write(path, units)
