@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
-from lipmotion.pipeline.generate.posterior_plot import (
+from lipmotion.pipeline.generate.posteriors import (
     COLOURS,
     LEAST_COLUMNS,
     LEFT_PX,

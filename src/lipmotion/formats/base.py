@@ -10,6 +10,7 @@ import logging
 import re
 from array import array
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -205,29 +206,41 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
             f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(readable_suffixes())}"
         )
     check_regular(path, "motion file")
-    try:
+    with _errors_name(path):
         size = path.stat().st_size
         if size > LARGEST_MOTION_BYTES:
             raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
         motion, units = read(path)
-        if not (finite := np.isfinite(motion.values)).all():
-            frame, column = np.argwhere(~finite)[0].tolist()
-            first = f"the first is {motion.names[column]!r} in frame {frame}"
-            raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
-        beyond = []
-        for channel, curve in zip(motion.channels, motion.values.T, strict=True):
-            if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
-                low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
-                if high > LARGEST_WEIGHT:
-                    raise InputError(
-                        f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
-                    )
-                if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
-                    beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
-        if beyond:
-            what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
-            LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
-        return motion, units
+        _check_values(path, motion)
+    return motion, units
+
+
+def _check_values(path: Path, motion: Motion) -> None:
+    """Raise InputError for values that are not finite, or weights in percent; warn of weights beyond 0 to 1."""
+    if not (finite := np.isfinite(motion.values)).all():
+        frame, column = np.argwhere(~finite)[0].tolist()
+        first = f"the first is {motion.names[column]!r} in frame {frame}"
+        raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
+    beyond = []
+    for channel, curve in zip(motion.channels, motion.values.T, strict=True):
+        if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
+            low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
+            if high > LARGEST_WEIGHT:
+                raise InputError(
+                    f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
+                )
+            if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
+                beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
+    if beyond:
+        what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
+        LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
+
+
+@contextmanager
+def _errors_name(path: Path) -> Iterator[None]:
+    """Put a file's name before the message of an error of reading it, once."""
+    try:
+        yield
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
@@ -242,12 +255,8 @@ def read_units(path: Path) -> Timeline[Unit]:
     """
     read = _format_of(path).units if motion_suffix(path) else None
     if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS_BYTES:
-        try:
+        with _errors_name(path):
             units = read(path)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
         if units is not None:
             return units
     return read_motion(path)[1]
@@ -364,50 +373,45 @@ MOST_ITEMS = 1 << 20
 """Most items of a list that has not one item a frame."""
 MOST_ROWS = 1 << 22
 """Most rows of numbers: eleven hours of frames of 10 ms."""
-_BLANK = re.compile(r"[ \t\n\r]*")
+_BLANK = re.compile(r"\s*")
 _DECODER = json.JSONDecoder()
 
 
 def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any]:
     """Return the members of a JSON object; the list called ``rows_of`` becomes an array of numbers [shape=(T, P)].
 
+    It is read item by item: rows of numbers need no more memory than an array.
     numbers_of : name of a list that may have an item for every row
-
     Raises json.JSONDecodeError, RecursionError: not one object.
     Raises ValueError, TypeError, OverflowError: a list that is too long, or rows that are uneven or no numbers.
     """
-    members_by_name: dict[str, Any] = {}
+    members: dict[str, Any] = {}
 
-    def member(at: int) -> int:
-        key, at = _DECODER.raw_decode(text, at)
-        at = _next(text, _passed(text, _next(text, at), ":"))
-        is_list = text[at : at + 1] == "["
-        if is_list and key == rows_of:
-            members_by_name[key], at = _rows(text, at)
-        elif is_list:
-            members_by_name[key], at = _items(text, at, MOST_ROWS if key == numbers_of else MOST_ITEMS)
+    def take_member(at: int) -> int:
+        name, at = _DECODER.raw_decode(text, at)
+        at = next_at(text, _passed(text, next_at(text, at), ":"))
+        if text[at : at + 1] != "[":
+            members[name], at = _DECODER.raw_decode(text, at)
+        elif name == rows_of:
+            members[name], at = _rows(text, at)
         else:
-            members_by_name[key], at = _DECODER.raw_decode(text, at)
+            members[name] = []
+            most = MOST_ROWS if name == numbers_of else MOST_ITEMS
+            at = _each(text, at, "[]", lambda place: _take_item(text, place, members[name], most))
         return at
 
-    end = _next(text, _each(text, _next(text, 0), "{}", member))
+    end = next_at(text, _each(text, next_at(text, 0), "{}", take_member))
     if end < len(text):
         raise json.JSONDecodeError("Extra data", text, end)
-    return members_by_name
+    return members
 
 
-def _items(text: str, at: int, most: int) -> tuple[list[Any], int]:
-    """Return the items of a list, and the position of its end."""
-    items: list[Any] = []
-
-    def item(at: int) -> int:
-        value, at = _DECODER.raw_decode(text, at)
-        items.append(value)
-        if len(items) > most:
-            raise ValueError(f"a list of more than {most} items")
-        return at
-
-    return items, _each(text, at, "[]", item)
+def _take_item(text: str, at: int, items: list[Any], most: int) -> int:
+    value, at = _DECODER.raw_decode(text, at)
+    items.append(value)
+    if len(items) > most:
+        raise ValueError(f"a list of more than {most} items")
+    return at
 
 
 def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
@@ -434,17 +438,17 @@ def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
 
 def _each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
     """Let ``take`` read each item between brackets; return the position after the closing bracket."""
-    at = _next(text, _passed(text, at, brackets[0]))
+    at = next_at(text, _passed(text, at, brackets[0]))
     if text[at : at + 1] == brackets[1]:
         return at + 1
     while True:
-        at = _next(text, take(at))
+        at = next_at(text, take(at))
         if text[at : at + 1] == brackets[1]:
             return at + 1
-        at = _next(text, _passed(text, at, ","))
+        at = next_at(text, _passed(text, at, ","))
 
 
-def _next(text: str, at: int) -> int:
+def next_at(text: str, at: int) -> int:
     """Return the position of the next character that is not blank."""
     match = _BLANK.match(text, at)
     return match.end() if match else at

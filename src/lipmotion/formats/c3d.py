@@ -52,20 +52,14 @@ _POINT = re.compile(r"[xyz]_(\d{1,3})$")
 _UNLABELLED = re.compile(r"\*|[uc]_?\d+$|unlabel|point\d+$", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class _Numbers:
-    """Reads numbers of a processor: ``kind`` is that of NumPy, without the order of bytes."""
-
-    processor: int
-
-    def read(self, content: bytes, kind: str, count: int, at: int = 0) -> Array:
-        """Return numbers as doubles. Raises ValueError: there are not so many."""
-        order = ">" if self.processor == MIPS_PROCESSOR else "<"
-        if kind == "f4" and self.processor == DEC_PROCESSOR:  # words the other way round, exponents larger by 2
-            words = np.frombuffer(content, "<u2", 2 * count, at).reshape(-1, 2)[:, ::-1]
-            return np.ascontiguousarray(words).view("<f4")[:, 0].astype(np.float64) / 4
-        with np.errstate(invalid="ignore"):  # damaged numbers become NaN, as of markers that were not seen
-            return np.frombuffer(content, order + kind, count, at).astype(np.float64)
+def _numbers(content: bytes, kind: str, count: int, at: int, processor: int) -> Array:
+    """Return numbers of a processor as doubles; ``kind``: that of NumPy. Raises ValueError: there are not so many."""
+    order = ">" if processor == MIPS_PROCESSOR else "<"
+    if kind == "f4" and processor == DEC_PROCESSOR:  # words the other way round, exponents larger by 2
+        words = np.frombuffer(content, "<u2", 2 * count, at).reshape(-1, 2)[:, ::-1]
+        return np.ascontiguousarray(words).view("<f4")[:, 0].astype(np.float64) / 4
+    with np.errstate(invalid="ignore"):  # damaged numbers become NaN, as of markers that were not seen
+        return np.frombuffer(content, order + kind, count, at).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +108,11 @@ def _parsed(content: bytes) -> C3dFile:
     processor = content[start + 3]
     if processor not in {INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR}:
         raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
-    numbers = _Numbers(processor)
-    found = _parameters(content, start + 4, numbers)
-    words: list[int] = numbers.read(content, "u2", 10).astype(int).tolist()
+    found = _parameters(content, start + 4, processor)
+    words: list[int] = _numbers(content, "u2", 10, 0, processor).astype(int).tolist()
     _, points, analog, first, last, _, _, _, block, samples = words
-    rate_hz = _number(found, "POINT.RATE", numbers.read(content, "f4", 1, 20)[0])
-    scale = _number(found, "POINT.SCALE", numbers.read(content, "f4", 1, 12)[0])
+    rate_hz = _number(found, "POINT.RATE", _numbers(content, "f4", 1, 20, processor)[0])
+    scale = _number(found, "POINT.SCALE", _numbers(content, "f4", 1, 12, processor)[0])
     if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0):
         raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
     if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
@@ -128,9 +121,8 @@ def _parsed(content: bytes) -> C3dFile:
     data = content[(block - 1) * BLOCK :] if block > 1 else b""
     held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
     frames = _frames(found, last - first + 1, held, spare)
-    return _content(
-        found, numbers.read(data, kind, frames * width).reshape(frames, width), points, scale, rate_hz, samples
-    )
+    rows = _numbers(data, kind, frames * width, 0, processor).reshape(frames, width)
+    return _content(found, rows, points, scale, rate_hz, samples)
 
 
 def _frames(found: dict[str, Values], numbered: int, held: int, spare: int) -> int:
@@ -169,16 +161,8 @@ def _content(found: dict[str, Values], rows: Array, points: int, scale: float, r
     names = [*_texts(found, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][: curves.shape[1]]
     units = [*_texts(found, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
     unit, software = (next(iter(_texts(found, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
-    return C3dFile(
-        tuple(labels),
-        places,
-        exact_rate(float(f"{rate_hz:.7g}"), 5e-6),
-        unit or "mm",
-        software,
-        curves,
-        tuple(names),
-        tuple(units),
-    )
+    exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
+    return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
 
 
 def _texts(found: dict[str, Values], name: str) -> list[str]:
@@ -194,18 +178,18 @@ def _number(found: dict[str, Values], name: str, otherwise: float) -> float:
     return float(values[0] + (1 << 16) * values[1] if len(values) == 2 else values[0])
 
 
-def _parameters(content: bytes, at: int, numbers: _Numbers) -> dict[str, Values]:
+def _parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
     groups: dict[int, str] = {}
     found: list[tuple[int, str, Values]] = []
     while at + 2 <= len(content) and content[at]:
         length, group = abs(struct.unpack_from("b", content, at)[0]), struct.unpack_from("b", content, at + 1)[0]
         name = content[at + 2 : at + 2 + length].decode("ascii").strip().upper()
         body = at + 2 + length
-        step = int(numbers.read(content, "i2", 1, body)[0])
+        step = int(_numbers(content, "i2", 1, body, processor)[0])
         if group < 0:
             groups[-group] = name
         else:
-            found.append((group, name, _values(content, body + 2, numbers)))
+            found.append((group, name, _values(content, body + 2, processor)))
         if step == 0:
             break
         if step < 0:
@@ -214,7 +198,7 @@ def _parameters(content: bytes, at: int, numbers: _Numbers) -> dict[str, Values]
     return {f"{groups.get(group, '')}.{name}": values for group, name, values in found}
 
 
-def _values(content: bytes, at: int, numbers: _Numbers) -> Values:
+def _values(content: bytes, at: int, processor: int) -> Values:
     """Return the values of a parameter whose type stands at a place."""
     kind, dimensions = struct.unpack_from("bB", content, at)
     sizes = list(content[at + 2 : at + 2 + dimensions])
@@ -226,7 +210,7 @@ def _values(content: bytes, at: int, numbers: _Numbers) -> Values:
         return [text.decode("latin-1").rstrip("\0 ")[:LONGEST_LABEL_CHARACTERS] for text in texts]
     if kind not in {1, 2, 4} or len(data) < count * kind:
         raise InputError(f"a parameter of type {kind} and sizes {sizes} does not fit; export the capture again")
-    return numbers.read(data, {1: "u1", 2: "u2", 4: "f4"}[kind], count)
+    return _numbers(data, {1: "u1", 2: "u2", 4: "f4"}[kind], count, 0, processor)
 
 
 def write_c3d(path: Path, content: C3dFile) -> None:
@@ -239,24 +223,13 @@ def write_c3d(path: Path, content: C3dFile) -> None:
     curves = len(content.analog_labels)
     groups: dict[str, dict[str, int | float | Values]] = {
         "POINT": {
-            "USED": points,
-            "SCALE": -1.0,
-            "RATE": content.rate_hz,
-            "DATA_START": 0,
-            "FRAMES": numbered,
-            "LABELS": list(content.labels),
-            "DESCRIPTIONS": ["" for _ in content.labels],
-            "UNITS": [content.unit],
+            **{"USED": points, "SCALE": -1.0, "RATE": content.rate_hz, "DATA_START": 0, "FRAMES": numbered},
+            **{"LABELS": list(content.labels), "DESCRIPTIONS": [""] * points, "UNITS": [content.unit]},
         },
         "ANALOG": {
-            "USED": curves,
-            "LABELS": list(content.analog_labels),
-            "DESCRIPTIONS": ["" for _ in content.analog_labels],
-            "GEN_SCALE": 1.0,
-            "OFFSET": np.zeros(curves, np.int16),
-            "SCALE": np.ones(curves, np.float32),
-            "UNITS": list(content.analog_units),
-            "RATE": content.rate_hz,
+            **{"USED": curves, "LABELS": list(content.analog_labels), "DESCRIPTIONS": [""] * curves},
+            **{"GEN_SCALE": 1.0, "OFFSET": np.zeros(curves, np.int16), "SCALE": np.ones(curves, np.float32)},
+            **{"UNITS": list(content.analog_units), "RATE": content.rate_hz},
         },
         "MANUFACTURER": {"SOFTWARE": [content.software]},
     }

@@ -23,6 +23,7 @@ from lipmotion.formats.label_tiers import (
     LabelTier,
     TimedLabel,
     holds_phones,
+    in_inventory,
     in_seconds,
     merged_timelines,
     phone_timeline,
@@ -31,7 +32,6 @@ from lipmotion.formats.label_tiers import (
     with_recognised,
     with_words,
 )
-from lipmotion.formats.phone_symbols import in_inventory
 from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, subtitle_tier, write_subrip, write_webvtt
 from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import line_tiers

@@ -20,6 +20,7 @@ from itertools import accumulate
 from typing import Any, NamedTuple
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.formats.base import next_at
 from lipmotion.formats.label_tiers import (
     EARLIEST_S,
     LINES,
@@ -31,10 +32,11 @@ from lipmotion.formats.label_tiers import (
     check_count,
     clock_seconds,
     in_seconds,
+    ipa_labels,
     named_tier,
     unit_of_times,
+    with_pauses,
 )
-from lipmotion.formats.phone_symbols import ipa_labels, with_pauses
 from lipmotion.types import values
 from lipmotion.types.values import number_of, require
 from lipmotion.units import SILENCE
@@ -141,7 +143,6 @@ SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
 """Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
-BLANK = re.compile(r"\s*")
 DIGITS = re.compile(r"(?:PT)?([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
 
 
@@ -226,7 +227,7 @@ def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         object_pairs_hook=lambda pairs: {_plain_name(name): value for name, value in pairs},
         parse_constant=lambda _: None,  # NaN: missing
     )
-    at, line, counted = _next(text, 0), 1, 0
+    at, line, counted = next_at(text, 0), 1, 0
     while at < len(text):
         line, counted = line + text.count("\n", counted, at), at
         try:
@@ -238,17 +239,11 @@ def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         except (ValueError, RecursionError) as error:
             raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
         yield line, value
-        at = _next(text, at)
+        at = next_at(text, at)
 
 
 def _plain_name(name: str) -> str:
     return name if " " in name else name.replace("_", "").lower().removeprefix("priv")
-
-
-def _next(text: str, at: int) -> int:
-    """Return the position of the next character that is not blank."""
-    found = BLANK.match(text, at)
-    return found.end() if found else at
 
 
 def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:

@@ -48,7 +48,7 @@ def check(motion: Motion) -> None:
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write two curves, and how many keys they have."""
     motion = generation.motion
-    curves, steps = [], bool(SHOWING & set(generation.stepped))
+    curves, points, steps = [], 0, bool(SHOWING & set(generation.stepped))
     for name, values in ((OPEN, mouth_open(generation)), (FORM, mouth_form(generation))):
         rounded = np.round(values, DECIMALS) + 0.0
         kept = key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
@@ -56,18 +56,12 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         segments: list[float] = [*keys[0]]
         for time_s, value in keys[1:]:
             segments += [STEPPED_SEGMENT if steps else LINEAR_SEGMENT, time_s, value]
-        curves.append({"Target": "Parameter", "Id": name, "Segments": segments, "Points": len(keys)})
-    points = [int(curve.pop("Points")) for curve in curves]  # type: ignore[call-overload]
+        curves.append({"Target": "Parameter", "Id": name, "Segments": segments})
+        points += len(keys)
     meta = {
-        "Duration": round(float(motion.time_s[-1]), 6),
-        "Fps": FPS,
-        "Loop": False,
-        "AreBeziersRestricted": True,
-        "CurveCount": len(curves),
-        "TotalSegmentCount": sum(points) - len(points),
-        "TotalPointCount": sum(points),
-        "UserDataCount": 0,
-        "TotalUserDataSize": 0,
+        **{"Duration": round(float(motion.time_s[-1]), 6), "Fps": FPS, "Loop": False, "AreBeziersRestricted": True},
+        **{"CurveCount": len(curves), "TotalSegmentCount": points - len(curves), "TotalPointCount": points},
+        **{"UserDataCount": 0, "TotalUserDataSize": 0},
     }
     path.write_text(as_json({"Version": 3, "Meta": meta, "Curves": curves}) + "\n", encoding="utf-8")
 

@@ -34,33 +34,30 @@ FRAMES_AT_ONCE = 4096
 """Frames whose variance is computed at once."""
 
 
-def header(generation: Generation) -> dict[str, Any]:
-    """Return the members ``format``, ``version``, ``rate_hz`` and ``channels``.
+def _document(
+    generation: Generation, source: Mapping[str, str], model: Mapping[str, str]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the members that are before the values, and those after them.
 
     Raises InputError: a channel has a name that would not be read.
     """
     motion = generation.motion
     channels = [{"name": channel.name, "unit": channel.unit} for channel in motion.channels]
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "rate_hz": float(motion.rate_hz),
-        "channels": require(items(members(_CHANNEL)), channels, "channels"),
-    }
-
-
-def units_and_origin(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
-    """Return the members ``units``, ``recognised`` (if phones were), ``outlook`` (if known), ``source``, ``model``."""
+    checked = require(items(members(_CHANNEL)), channels, "channels")
     outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
-    return {**unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
+    after = {**unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
+    return {"format": FORMAT, "version": VERSION, "rate_hz": float(motion.rate_hz), "channels": checked}, after
 
 
 def unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
     """Return the members ``units`` and ``recognised`` (if phones were), for ``parse_units``."""
-    rows: dict[str, Any] = {"units": [_row(span) for span in units]}
-    if recognised := recognised_phones(units):
-        rows[RECOGNISED] = recognised
-    return rows
+    rows = []
+    for span in units:
+        label = span.label
+        row = {"start_s": span.start_s, "end_s": span.end_s, "phone": label.phone, "unit": label.unit}
+        rows.append(row | ({"word": label.word} if label.word else {}) | ({"again": True} if label.again else {}))
+    recognised = recognised_phones(units)
+    return {"units": rows} | ({RECOGNISED: recognised} if recognised else {})
 
 
 def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
@@ -94,14 +91,11 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
     Raises InputError: rows of another kind, without a time or a name, or with times that no recording has.
     """
     with json_errors("the motion document"):
-        confidences = [_recognised(*row) for row in _ROWS(recognised or [])]
+        confidences = [
+            RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
+            for start_s, end_s, name, confidence in _ROWS(recognised or [])
+        ]
         return with_confidences(Timeline(tuple(map(_span, _UNITS(rows)))), confidences)
-
-
-def _row(span: Span[Unit]) -> dict[str, Any]:
-    """Return the member of ``units`` for a phone, with its word if that is known."""
-    row = {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}
-    return row | ({"word": span.label.word} if span.label.word else {}) | ({"again": True} if span.label.again else {})
 
 
 def _span(row: Any) -> Span[Unit]:
@@ -115,11 +109,6 @@ def _span(row: Any) -> Span[Unit]:
             f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"
         )
     return span
-
-
-def _recognised(start_s: Any, end_s: Any, name: Any, confidence: Any) -> RecognisedPhone:
-    """Return a row of the member ``recognised``. Raises SchemaError: it is none."""
-    return RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
 
 
 _TEXT, _TIME = text(10_000), number()
@@ -141,8 +130,8 @@ _DOCUMENT = members(
 def write_json_file(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
     """Write one JSON object: format, version, rate_hz, channels, values, confidence, units, source, model."""
     certain = {} if (confidence := generation.confidence) is None else {"confidence": confidence.round(2).tolist()}
-    after = certain | units_and_origin(generation, source, model)
-    write_json(path, header(generation), "values", generation.motion.values, after)
+    before, after = _document(generation, source, model)
+    write_json(path, before, "values", generation.motion.values, certain | after)
 
 
 def read_json(path: Path) -> tuple[Motion, Timeline[Unit]]:
@@ -176,7 +165,8 @@ def write_npz(path: Path, generation: Generation, source: Mapping[str, str], mod
     A standard deviation is the model's, in the unit of its channel: the square root of ``Generation.variance``.
     ``confidence`` [shape=(T,)] is ``Generation.confidence``, where that is known.
     """
-    document = as_json({**header(generation), **units_and_origin(generation, source, model)}, ensure_ascii=False)
+    before, after = _document(generation, source, model)
+    document = as_json(before | after, ensure_ascii=False)
     with path.open("wb") as file:  # given a path, NumPy would add a suffix of its own
         deviations = np.empty(generation.motion.values.shape, np.float32)
         for start in range(0, len(deviations), FRAMES_AT_ONCE):

@@ -73,7 +73,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     motion = generation.motion
     time_s = motion.time_s
     frames = np.rint(time_s * RATE_HZ).astype(int).tolist()
-    morphs = {}
+    morphs: list[tuple[int, str, float]] = []
     for morph, sources in MORPHS.items():
         if all(name in motion.names for name in sources):
             values = np.mean([motion[name] for name in sources], axis=0)
@@ -81,20 +81,28 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
             kept = key_frames(time_s, values, TOLERANCE, stepped=stepped)
             if stepped:  # between keys everything is linear
                 kept = sorted({*kept, *(frame - 1 for frame in kept if frame)})
-            morphs[morph] = [(frames[frame], float(values[frame])) for frame in kept]
-    bones = {}
+            morphs += [(frames[frame], morph, float(values[frame])) for frame in kept]
     curves = {name: motion[name].astype(np.float64) for name in (*ANGLES, *MOVED_BY["gaze"]) if name in motion.names}
-    found = {}
+    angles = {}
     if {*ANGLES} <= {*curves}:
-        found[HEAD] = np.stack([curves[name] for name in ANGLES], axis=1)
+        angles[HEAD] = np.stack([curves[name] for name in ANGLES], axis=1)
     if {*MOVED_BY["gaze"]} & {*curves}:
         still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
-        found[EYES] = np.pad(given_gaze(still | curves), ((0, 0), (0, 1)))
-    for bone, angles in found.items():
-        turned = head_quaternions(angles) * MIRRORED
-        turns: Turns = [(frame, (x, y, z, w)) for frame, (x, y, z, w) in zip(frames, turned.tolist(), strict=True)]
-        bones[bone] = turns
-    _write_keys(path, morphs, bones)
+        angles[EYES] = np.pad(given_gaze(still | curves), ((0, 0), (0, 1)))
+    turns = {bone: (head_quaternions(turned) * MIRRORED).tolist() for bone, turned in angles.items()}
+    bones = [
+        (frame, bone, turn)
+        for frame, *each in zip(frames, *turns.values(), strict=True)
+        for bone, turn in zip(turns, each, strict=True)
+    ]
+    with path.open("wb") as file:
+        file.write(MARK.ljust(MARK_BYTES, b"\0") + _named("lipmotion", MODEL_BYTES) + COUNT.pack(len(bones)))
+        for frame, bone, turn in bones:
+            file.write(BONE_KEY.pack(_named(bone, 15), frame, 0, 0, 0, *turn, bytes(LINEAR)))
+        file.write(COUNT.pack(len(morphs)))
+        for frame, morph, value in sorted(morphs, key=lambda key: key[0]):
+            file.write(MORPH_KEY.pack(_named(morph, 15), frame, value))
+        file.write(4 * COUNT.pack(0))  # camera, lights, shadows, and what newer versions hold of inverse kinematics
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
@@ -142,19 +150,6 @@ def _turned(bone: str, keys: Turns, frames: np.ndarray) -> np.ndarray:
         raise InputError(f"a rotation of the bone {bone} is none (0 0 0 0); save the motion again in MikuMikuDance")
     angles = np.unwrap(head_angles(np.array(turns) * MIRRORED), axis=0)
     return np.stack([np.interp(frames, at, column) for column in angles.T], axis=1)
-
-
-def _write_keys(path: Path, morph_keys: Mapping[str, Keys], bone_keys: Mapping[str, Turns]) -> None:
-    bones = [(frame, name, turn) for name, keys in bone_keys.items() for frame, turn in keys]
-    morphs = [(frame, name, value) for name, keys in morph_keys.items() for frame, value in keys]
-    with path.open("wb") as written:
-        written.write(MARK.ljust(MARK_BYTES, b"\0") + _named("lipmotion", MODEL_BYTES) + COUNT.pack(len(bones)))
-        for frame, name, turn in sorted(bones, key=lambda key: key[0]):
-            written.write(BONE_KEY.pack(_named(name, 15), frame, 0, 0, 0, *turn, bytes(LINEAR)))
-        written.write(COUNT.pack(len(morphs)))
-        for frame, name, value in sorted(morphs, key=lambda key: key[0]):
-            written.write(MORPH_KEY.pack(_named(name, 15), frame, value))
-        written.write(4 * COUNT.pack(0))  # camera, lights, shadows, and what newer versions hold of inverse kinematics
 
 
 def _named(name: str, size: int) -> bytes:
