@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from lipmotion.corpora.facegood import read_bare_motion, read_channels
 from lipmotion.corpora.source_recordings import MotionFile
-from lipmotion.export import read_motion
+from lipmotion.formats import read_motion
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes.live_link_app import write_take
 

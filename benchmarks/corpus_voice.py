@@ -33,9 +33,9 @@ from pocketsphinx import Decoder, get_model_path
 from scipy.ndimage import maximum_filter1d
 
 from lipmotion import Corpus, Model, load_model
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.engines.base import SelectsRecordings
+from lipmotion.formats.label_files import labels_beside
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.speech.features.analysed_audio import analysed

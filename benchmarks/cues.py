@@ -16,8 +16,14 @@ from itertools import pairwise
 import numpy as np
 
 import lipmotion
-from lipmotion.export.cues.choose import choose_cues, default_hold_frames, frame_costs
-from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet
+from lipmotion.articulation.cue_sheets import (
+    CueSheet,
+    choose_cues,
+    cue_frame_count,
+    cue_sheet,
+    default_hold_frames,
+    frame_costs,
+)
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Generation, Motion, Speech, StateTrace, Timeline

@@ -20,9 +20,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
-from lipmotion.export.addon import write_addon
+from lipmotion.formats.blender import write_addon
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio, Channel, Motion, Span, SpokenText, Timeline, Unit
 from lipmotion.units import LIP_CLOSING
 from lipmotion_faces import face_named

@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 
 import lipmotion
-from lipmotion.corpora.labels import read_labels, read_phones
-from lipmotion.export import read_motion, write_motion
+from lipmotion.formats import read_motion, write_motion
+from lipmotion.formats.label_files import read_labels, read_phones, read_units
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.motion_files import in_format
 from lipmotion.pipeline.outputs.motion_input import read_generation
-from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio, Generation, Motion, Timeline

@@ -38,7 +38,8 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 
-from lipmotion.export.sound import write_sound  # noqa: E402
+
+from lipmotion.formats.sound import write_sound  # noqa: E402
 from lipmotion.kernels.choice import expect_more  # noqa: E402
 from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402

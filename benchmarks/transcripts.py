@@ -41,9 +41,9 @@ from numpy.typing import NDArray
 from robust import SPOKEN
 
 import lipmotion
-from lipmotion.corpora.labels import read_transcript
 from lipmotion.corpora.layouts import words_of_name
 from lipmotion.errors import AlignmentError
+from lipmotion.formats.label_files import read_transcript
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import transcribe

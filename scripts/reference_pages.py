@@ -116,28 +116,29 @@ def exit_codes() -> str:
     return re.sub(r"\s+", " ", whole_parser().epilog or "").capitalize() + "."
 
 
-def first_sentence(module: str) -> str:
-    """Return what the first line of a module's docstring says after the name of its format."""
-    return (import_module(module).__doc__ or "").splitlines()[0].partition(": ")[2].rstrip(".")
+def line_on(name: str, module: str) -> str:
+    """Return what a module's docstring says of a format, in the line that begins with its name."""
+    found = re.search(rf"^``\.?{re.escape(name)}``: (.*)$", import_module(module).__doc__ or "", re.MULTILINE)
+    return found[1].rstrip(".") if found else ""
 
 
 def motion_formats() -> str:
     """Return the table of motion files that are built in."""
-    from lipmotion.export.base import MOTION_FORMATS
+    from lipmotion.formats.base import MOTION_FORMATS
 
     rows = []
     for name in MOTION_FORMATS.built_in:
         chosen = MOTION_FORMATS.load(name)
         rate = f"{chosen.rate_hz:g}" if chosen.rate_hz else "the motion's"
-        rows.append([f"`.{name}`", first_sentence(chosen.write.__module__), "yes" if chosen.read else "no", rate])
+        rows.append([f"`.{name}`", line_on(name, chosen.write.__module__), "yes" if chosen.read else "no", rate])
     return table(["file", "what it holds", "read back", "frames a second"], iter(rows))
 
 
 def cue_formats() -> str:
     """Return the table of cue files."""
-    from lipmotion.export.cues.base import CUE_FORMATS
+    from lipmotion.formats.cues import CUE_FORMATS
 
-    rows = ([f"`.{name}`", first_sentence(text.__module__)] for name, text in CUE_FORMATS.items())
+    rows = ([f"`.{name}`", line_on(name, form.text.__module__)] for name, form in CUE_FORMATS.items())
     return table(["file", "what it holds"], rows)
 
 

@@ -14,10 +14,10 @@ TYPE_CHECKING = False  # as in typing, whose import would delay the answer to Ct
 if TYPE_CHECKING:
     from typing import Any
 
+    from lipmotion.articulation.cue_sheets import CueSheet
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
-    from lipmotion.export.base import read_motion
-    from lipmotion.export.cues.sheet import CueSheet
+    from lipmotion.formats.base import read_motion
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain
@@ -99,7 +99,7 @@ _HOMES = {
     "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
-    "CueSheet": "lipmotion.export.cues.sheet",
+    "CueSheet": "lipmotion.articulation.cue_sheets",
     "Job": "lipmotion.pipeline.job",
     "Outputs": "lipmotion.pipeline.job",
     "Request": "lipmotion.pipeline.job",
@@ -112,7 +112,7 @@ _HOMES = {
     "engine_named": "lipmotion.engines",
     "explain": "lipmotion.pipeline.generate.explain",
     "load_model": "lipmotion.pipeline.model",
-    "read_motion": "lipmotion.export.base",
+    "read_motion": "lipmotion.formats.base",
     "save_model": "lipmotion.pipeline.model",
     "SpokenText": "lipmotion.types",
     "speak": "lipmotion.pipeline.generate.speak",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
-from lipmotion.export.motion.marker_frame import MILLIMETRES
+from lipmotion.formats.markers import MILLIMETRES
 from lipmotion.measures import curves, vertices
 from lipmotion.measures.closures import closed_threshold, closure_figures
 from lipmotion.measures.curves import modulation_distance_db

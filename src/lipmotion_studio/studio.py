@@ -15,8 +15,8 @@ from uuid import uuid4
 from starlette.exceptions import HTTPException
 
 from lipmotion.errors import InputError, LipMotionError, shortened
-from lipmotion.export.sound import write_sound
 from lipmotion.extensions import installed_version
+from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
 from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
 from lipmotion.pipeline.job import Job, Outputs

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lipmotion.addons.blender.curves import at_frames
-from lipmotion.export.addon import write_addon
+from lipmotion.formats.blender import write_addon
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation, StateTrace

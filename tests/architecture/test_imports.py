@@ -16,6 +16,7 @@ DOWN = "Imports only go down"
 ENGINES = "Engines never import one another; only the registry knows them"
 FACES = "Faces never import one another; only the registry knows them"
 CORE = "The core names no other package; studio and lab stand on faces"
+FORMATS = "Formats never import one another; only the registries know them"
 TRACKING = "Only tracking may import OpenCV and MediaPipe"
 NUMBA = "Only kernels may import numba"
 FORBIDDEN = [
@@ -32,21 +33,9 @@ FORBIDDEN = [
     (ENGINES, "lipmotion/engines/trajectory/model.py", "from lipmotion.engines.joint import engine"),
     (ENGINES, "lipmotion/engines/base.py", "from lipmotion.engines import registry"),
     (FACES, "lipmotion_faces/portrait/mouth_painting.py", "from lipmotion_faces import registry"),
-    (
-        "Exporters never import one another",
-        "lipmotion/export/cues/sheet.py",
-        "from lipmotion.export.motion import keys",
-    ),
-    (
-        "Formats of motion never import one another",
-        "lipmotion/export/motion/motion_csv.py",
-        "import lipmotion.export.motion.motion_npz",
-    ),
-    (
-        "Formats of cues never import one another",
-        "lipmotion/export/cues/moho_dat.py",
-        "import lipmotion.export.cues.rhubarb_tsv",
-    ),
+    (FORMATS, "lipmotion/formats/tables.py", "from lipmotion.formats import motion_document"),
+    (FORMATS, "lipmotion/formats/rhubarb.py", "from lipmotion.formats import papagayo"),
+    (FORMATS, "lipmotion/formats/base.py", "import lipmotion.formats.c3d"),
     (
         "Engines know predictors by their interface alone",
         "lipmotion/engines/selection/engine.py",

@@ -9,7 +9,7 @@ from PIL import Image
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.outputs.write import write

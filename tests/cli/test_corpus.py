@@ -10,7 +10,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import MissingDependencyError
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio, Item, Progress
 from lipmotion_faces.corpus import prepare
 from lipmotion_faces.corpus import sync as offset

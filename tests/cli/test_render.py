@@ -12,7 +12,7 @@ import pytest
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.errors import InputError
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import WEIGHT, Channel, Motion

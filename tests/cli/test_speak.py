@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.export.base import read_motion
 from lipmotion.extensions import install_command
+from lipmotion.formats.base import read_motion
 from lipmotion.pipeline.generate.speak import speak
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.outputs.write import write

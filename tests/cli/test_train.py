@@ -9,7 +9,7 @@ import pytest
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.train import TrainReport

@@ -12,7 +12,7 @@ import pytest
 
 from docs.site_pages import blocks
 from lipmotion.cli.main import main
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.testing.toy import CAMERA_HZ, toy_motion, toy_sentences
 from lipmotion.types import Audio, Timeline
 from lipmotion_faces import Staging, staged_face

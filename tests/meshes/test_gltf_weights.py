@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.export.base import read_motion, readable_suffixes
+from lipmotion.formats.base import read_motion, readable_suffixes
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes import gltf
 from meshes.heads import head, write_glb

@@ -15,7 +15,7 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
-from lipmotion.export.base import read_motion, write_motion
+from lipmotion.formats.base import read_motion, write_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.facial_animation import FAP

@@ -8,7 +8,7 @@ import pytest
 
 import lipmotion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.cues import CUE_FORMATS
+from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.types import Generation, Timeline

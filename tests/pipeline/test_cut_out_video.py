@@ -11,8 +11,8 @@ from PIL import Image
 
 import lipmotion
 from faces.test_cut_out import draw
+from lipmotion.articulation.cue_sheets import shown_shapes
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.cues.sheet import shown_shapes
 from lipmotion.types import Audio, Generation, StateTrace, Timeline
 from lipmotion_faces import Staging
 from meshes.speech import motion, units

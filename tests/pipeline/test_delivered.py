@@ -12,7 +12,7 @@ import pytest
 from lipmotion.articulation.contact import closures
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.pipeline.generate import speak as module
 from lipmotion.pipeline.generate.speak import REST_S, speak
 from lipmotion.pipeline.model import Model, load_model

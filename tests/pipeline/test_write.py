@@ -15,7 +15,7 @@ import pytest
 from lipmotion.articulation.delivery import closed_on_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.motion_files import with_articulation

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.storage.files import portable_name
 from lipmotion.testing.toy import ToySentence
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, folder_for, opened_folder

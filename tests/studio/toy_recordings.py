@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.testing.toy import toy_motion, toy_sentences
 
 SENTENCES = 4

@@ -24,7 +24,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.model import Model
 from lipmotion.storage.files import sha256_of

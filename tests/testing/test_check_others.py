@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.export.base import MOTION_FORMATS, MotionFormat
+from lipmotion.formats.base import MOTION_FORMATS, MotionFormat
 from lipmotion.testing import ContractError, check_exporter
 from lipmotion_faces import Face, face_named
 from lipmotion_faces.testing import check_face

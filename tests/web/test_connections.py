@@ -140,7 +140,8 @@ class Clock:
     """A loop whose time the test moves on."""
 
     def __init__(self) -> None:
-        self.now_s, self.timers = 0.0, []
+        self.now_s = 0.0
+        self.timers: list[SimpleNamespace] = []
 
     def time(self) -> float:
         return self.now_s
@@ -169,7 +170,7 @@ def test_who_takes_a_reply_drop_by_drop_is_closed(
     transport.get_write_buffer_size = lambda: transport.left
     config = uvicorn.Config(lambda *_: None, log_level="error")
     config.load()
-    client = connections.PunctualConnection(config, uvicorn.server.ServerState(), {}, clock)
+    client = connections.PunctualConnection(config, uvicorn.server.ServerState(), {}, clock)  # type: ignore[arg-type]
     client.connection_made(transport)
     client.data_received(b"G")  # nothing is asked yet: the time of headers is another limit
     client._stop_waiting()

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, MotionFile, RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import labels_beside
 from lipmotion.storage.archive import array_in
 from lipmotion.storage.files import check_regular
 from lipmotion.types import WEIGHT, Channel, Motion

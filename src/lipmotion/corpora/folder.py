@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from lipmotion.corpora.labels import RecordingLabels, labels_beside
 from lipmotion.corpora.separate_sounds import is_of_recorder
 from lipmotion.corpora.source_recordings import (
     AUDIO_SUFFIXES,
@@ -19,7 +18,8 @@ from lipmotion.corpora.source_recordings import (
 )
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.curve_table import is_live_link_file
+from lipmotion.formats.label_files import RecordingLabels, labels_beside
+from lipmotion.formats.tables import is_live_link_file
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
 VIDEO_KINDS = (VIDEOS, BOTH)

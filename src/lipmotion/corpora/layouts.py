@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lipmotion.corpora.folder import files_in, gathered
-from lipmotion.corpora.labels import labels_beside, read_labels
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, video_files
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_files import labels_beside, read_labels
 from lipmotion.storage.files import read_text_file
 from lipmotion.units import words_of
 

@@ -1,13 +1,20 @@
-"""Reader of VOCASET: sounds in one folder, and in another a mesh for each sixtieth of a second."""
+"""Reader of VOCASET: sounds in one folder, and in another a mesh of FLAME (``.ply``) for each sixtieth of a second."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lipmotion.corpora.folder import gathered
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import MotionFile, RecordingFolder, SourceRecording
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_files import labels_beside
+from lipmotion.formats.markers import in_head_frame, motion_of_markers
+from lipmotion.types import Motion
 
 KIND = "VOCASET meshes"
 MESHES, SOUNDS = "unposedcleaneddata", "audio"
@@ -16,6 +23,26 @@ RIGHTS = {
     "licence": "research, as agreed with its owners",
     "attribution": "VOCASET (Cudeiro, Bolkart, Laidlaw, Ranjan, Black 2019)",
 }
+MESH = ".ply"
+FLAME_VERTICES = 5023
+FLAME_MARKERS = {
+    **{"EYE_L": 1162, "EYE_R": 2431, "NASION": 3553},
+    **{"LIP_0": 3541, "LIP_13": 3533, "LIP_14": 3504, "LIP_17": 3511, "LIP_61": 2845, "LIP_291": 1730, "JAW_152": 3414},
+}
+"""The vertices at the outer eye corners, at the root of the nose, and at points of the face mesh.
+Found by looking at a mesh of a face at rest: where the lips meet, the edges of their red, their corners, the chin."""
+METRES = "m"
+LARGEST_HEADER_BYTES = 1 << 14
+LARGEST_MESH_BYTES = 1 << 26
+MOST_MESHES = 1 << 20
+"""Meshes of four hours."""
+NUMBER = re.compile(r"(\d+)$")
+TYPES = {
+    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
+    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
+    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
+}
+ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 
 
 def read_vocaset(directory: Path) -> RecordingFolder | None:
@@ -30,7 +57,7 @@ def read_vocaset(directory: Path) -> RecordingFolder | None:
 
     def recording_of(name: str, sound: Path) -> SourceRecording:
         speaker, sentence = sound.parent.name, meshes / sound.parent.name / sound.stem
-        first = min(sentence.glob("*.ply"), default=None)
+        first = min(sentence.glob(f"*{MESH}"), default=None)
         if first is None:
             raise InputError(f"{sentence}: no meshes (.ply) of {sound}; unpack them, or remove the sound")
         labels = labels_beside(sound)
@@ -46,3 +73,81 @@ def read_vocaset(directory: Path) -> RecordingFolder | None:
 
     by_name = {f"{sound.parent.name}-{sound.stem}": [sound] for sound in sorted(sounds.glob("*/*.wav"))}
     return gathered(KIND, by_name, recording_of, directory)
+
+
+def mesh_files(first: Path) -> list[Path]:
+    """Return the files of the sequence that a mesh is of: all beside it whose names differ in their last number."""
+    start = NUMBER.sub("", first.stem)
+    return sorted(path for path in first.parent.glob(f"*{MESH}") if NUMBER.sub("", path.stem) == start)
+
+
+def read_mesh_motion(first: Path, rate_hz: float) -> Motion:
+    """Return lip distances and lip points of a sequence of meshes, in the head's frame, in eye distances.
+
+    first   : one of its meshes; where numbers are missing, the motion is interpolated
+    rate_hz : meshes a second
+    Raises InputError: a file that is no mesh with the vertices of FLAME, in metres.
+    """
+    files = mesh_files(first)
+    numbers = [int(found[1]) if (found := NUMBER.search(path.stem)) else 1 for path in files]
+    if not files or max(numbers) > MOST_MESHES:
+        raise InputError(
+            f"{first}: {len(files)} meshes up to number {max(numbers, default=0)}, required 1 to {MOST_MESHES}"
+        )
+    vertices = list(FLAME_MARKERS.values())
+    places = np.stack([read_vertices(path, vertices) for path in files])
+    frames = np.arange(1, max(numbers) + 1)
+    markers = {
+        name: np.stack([np.interp(frames, numbers, axis) for axis in places[:, column].T], axis=1)
+        for column, name in enumerate(FLAME_MARKERS)
+    }
+    try:
+        return motion_of_markers(in_head_frame(markers, METRES), rate_hz)
+    except InputError as error:
+        raise InputError(f"{first}: {error}") from error
+
+
+def read_vertices(path: Path, chosen: Sequence[int]) -> NDArray[np.float64]:
+    """Return the places of some vertices of a ``.ply`` [shape=(N, 3)].
+
+    Raises InputError: damaged, without ``x``, ``y``, ``z``, not finite, or not ``FLAME_VERTICES`` vertices.
+    """
+    size = path.stat().st_size
+    if size > LARGEST_MESH_BYTES:
+        raise InputError(f"{path}: {size} bytes, required at most {LARGEST_MESH_BYTES}: is it the mesh of a head?")
+    head, mark, body = path.read_bytes().partition(b"end_header")
+    lines = [line.split() for line in head[:LARGEST_HEADER_BYTES].decode("ascii", "replace").splitlines()]
+    try:
+        order, columns = _vertex_columns(lines)
+        if not mark:
+            raise ValueError("its header has no end")
+        body = body[body.index(b"\n") + 1 :]
+        if order:
+            rows = np.frombuffer(body, np.dtype([(name, order + kind) for name, kind in columns]), FLAME_VERTICES)
+            found = np.stack([rows[axis][list(chosen)] for axis in "xyz"], axis=1).astype(np.float64)
+        else:
+            lines_of_text, names = body.split(b"\n", FLAME_VERTICES), [name for name, _ in columns]
+            texts = [lines_of_text[vertex].split() for vertex in chosen]
+            found = np.array([[float(row[names.index(axis)]) for axis in "xyz"] for row in texts])
+    except (ValueError, KeyError, IndexError, TypeError) as error:
+        raise InputError(f"{path}: not a mesh of FLAME in .ply ({shortened(str(error))}); export it again") from error
+    if not np.isfinite(found).all():
+        raise InputError(f"{path}: has vertices that are not finite; export it again")
+    return found
+
+
+def _vertex_columns(lines: Sequence[Sequence[str]]) -> tuple[str, list[tuple[str, str]]]:
+    """Return the order of bytes (empty: as text), and name and type of each number of a vertex, from a header.
+
+    Raises ValueError, KeyError, IndexError: not such a header.
+    """
+    if not lines or list(lines[0]) != ["ply"]:
+        raise ValueError("its first line is not 'ply'")
+    (order,) = (ORDERS[words[1]] for words in lines if words[:1] == ["format"])
+    first, *others = [number for number, words in enumerate(lines) if words[:1] == ["element"]]
+    _, element, count = lines[first]
+    if element != "vertex" or int(count) != FLAME_VERTICES:
+        wanted = f"{FLAME_VERTICES} vertices: of others, no lip points are known"
+        raise ValueError(f"it begins with {count} of {element!r}, required {wanted}")
+    properties = [words for words in lines[first + 1 : others[0] if others else None] if words[:1] == ["property"]]
+    return order, [(name, TYPES[kind]) for _, kind, name in properties]

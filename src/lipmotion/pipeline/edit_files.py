@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError
-from lipmotion.export.motion.document import parse_units, unit_rows
+from lipmotion.formats.motion_document import parse_units, unit_rows
 from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model

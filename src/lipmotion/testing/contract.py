@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from lipmotion.errors import LipMotionError
-from lipmotion.export.base import MotionFormat
+from lipmotion.formats.base import MotionFormat
 from lipmotion.meshes.fitting.facial_animation import FAP
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS
@@ -27,7 +27,7 @@ def check_exporter(exporter: MotionFormat) -> None:
     order, and beside others; eyes, brows, head and pressed lips may be left out.
     Raises ContractError: what was found.
 
-    >>> from lipmotion.export.base import MOTION_FORMATS
+    >>> from lipmotion.formats.base import MOTION_FORMATS
     >>> check_exporter(MOTION_FORMATS.load("csv"))
     """
     one = example(("m", "aa"))

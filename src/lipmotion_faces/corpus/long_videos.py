@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import VIDEO_KINDS
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.layouts import LRS
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import labels_beside
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams

@@ -6,9 +6,8 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lipmotion.articulation.cue_sheets import shown_shapes
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.cues import OPTIONAL
-from lipmotion.export.cues.sheet import shown_shapes
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
@@ -19,6 +18,7 @@ from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
 from lipmotion.types.moods import MOODS
 from lipmotion.types.progress import with_reports
+from lipmotion.units.mouth_chart import OPTIONAL
 from lipmotion_faces.base import Face, Staging
 from lipmotion_faces.cut_out import CutOut, read_cut_out
 from lipmotion_faces.film.filmed_video import (

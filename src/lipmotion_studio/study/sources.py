@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
-from lipmotion.export.base import readable_suffixes
+from lipmotion.formats.base import readable_suffixes
 from lipmotion.pipeline.job import Job, Outputs, Request
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.opened_job import opened

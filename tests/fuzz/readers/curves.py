@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require, short_speech
+from lipmotion.articulation.cue_sheets import CueSheet
 from lipmotion.corpora.facegood import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.corpora.store import Corpus
-from lipmotion.export.base import write_motion
-from lipmotion.export.cues.base import CUE_FORMATS
-from lipmotion.export.cues.cue_motion import PARSERS
-from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
+from lipmotion.formats.base import write_motion
+from lipmotion.formats.c3d import C3dFile, write_c3d
+from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
 from lipmotion.units.mouth_chart import SHAPES
 from lipmotion_faces.corpus.supplied_motion import supplied_track
@@ -73,10 +72,10 @@ def _captures() -> list[Files]:
     frames_s = [n / RATE_HZ for n in range(FRAMES)]
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
-        for form, text in CUE_FORMATS.items():
+        for name, form in CUE_FORMATS.items():
             sheet = CueSheet(cues, 24.0, "".join(SHAPES), Timeline((Span(0.3, 0.7, "moth"),)))
-            if f".{form}" in PARSERS:
-                (folder / f"c.{form}").write_text(text(sheet, "c.wav"), encoding="utf-8")
+            if form.parse:
+                (folder / f"c.{name}").write_text(form.text(sheet, "c.wav"), encoding="utf-8")
         (folder / "a.glb").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values[:, :2])))
         expression = {"node": 1, "path": "translation"}
         (folder / "a.vrma").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values, target=expression)))

@@ -6,13 +6,13 @@ import json
 import math
 from pathlib import Path
 
-from corpora.labels.timing_samples import SAMPLES
+from formats.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
-from lipmotion.corpora.labels import read_labels
 from lipmotion.corpora.layouts import read_aligned_words
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
+from lipmotion.formats.label_files import read_labels
 from lipmotion.types import TimedWord, TranscriptLine
 from lipmotion_faces.corpus.supplied_motion import supplied_phones
 

@@ -20,7 +20,7 @@ import lipmotion
 from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.export.base import motion_suffixes
+from lipmotion.formats.base import motion_suffixes
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place

@@ -11,8 +11,8 @@ import pytest
 from lipmotion.corpora.source_recordings import SourceRecording
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.export.base import write_motion
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.base import write_motion
+from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
 from lipmotion_faces.corpus import long_videos as module

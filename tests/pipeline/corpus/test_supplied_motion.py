@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.export.base import write_motion
-from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
-from lipmotion.meshes.files.curve_table import SPEECH_CURVES
+from lipmotion.formats.base import write_motion
+from lipmotion.formats.c3d import C3dFile, write_c3d
+from lipmotion.formats.tables import SPEECH_CURVES
 from lipmotion.motion import acoustic_network, posterior_network
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent

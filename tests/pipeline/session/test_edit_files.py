@@ -11,7 +11,7 @@ import pytest
 
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
-from lipmotion.export.sound import write_sound
+from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, Edits, MoodStep, step_of
 from lipmotion.pipeline.generate.animate import animate

@@ -12,7 +12,7 @@ import pytest
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
-from lipmotion.export.base import read_motion
+from lipmotion.formats.base import read_motion
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network

@@ -266,7 +266,7 @@ def _current_folder() -> str:
 
 def _main_path() -> str:
     """Animate the made-up speech, and write motion, cues and video; return what came out."""
-    from lipmotion.export.sound import write_sound
+    from lipmotion.formats.sound import write_sound
     from lipmotion.pipeline.job import Job, Outputs, Request
     from lipmotion.storage.files import temporary_folder
     from lipmotion.testing.formant_synthesiser import synthesise

@@ -19,7 +19,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the add-on; print its path."""
-    from lipmotion.export.addon import write_addon
+    from lipmotion.formats.blender import write_addon
 
     write_addon(options.program, options.output)
     print_line(options.output)

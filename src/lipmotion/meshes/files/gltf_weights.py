@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.curve_table import strongest_columns
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
 from lipmotion.meshes.files.gltf_nodes import placed_nodes
 from lipmotion.meshes.files.gltf_scene import mesh_target_names
-from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.meshes.files.steady_rate import exact_rate, strongest_columns
 from lipmotion.meshes.model.bones import HEAD, NECK, bone_kind
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name

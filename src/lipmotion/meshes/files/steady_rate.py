@@ -1,13 +1,22 @@
-"""Rows that come at uneven times, as rows at a steady rate."""
+"""Rows of curves that come at uneven times, as motion at a steady rate."""
 
 from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
+from lipmotion.meshes.model.shape_names import arkit_name, is_known
+from lipmotion.motion.rest import runs
+from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion.types.motion import RADIAN
 
 Array = NDArray[np.float64]
+LOG = logging.getLogger("lipmotion")
 
 USUAL_RATES_HZ = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)
 """Frame rates of cameras and of motion capture."""
@@ -27,6 +36,19 @@ LONGEST_GAP = 3
 """Most frames of the steady rate for each row: a table whose time is mostly gaps is refused."""
 SPARE_FRAMES = 600
 """Frames of gaps that are allowed besides, so that a short take may have a long gap."""
+ANGLES = ("Yaw", "Pitch", "Roll")
+"""Endings of the curves that are angles of the head and of the eyes."""
+PER_SECOND = {"ms": 1e3, "msec": 1e3, "milliseconds": 1e3, "us": 1e6, "microseconds": 1e6, "ns": 1e9}
+TIME_COLUMN = re.compile(
+    rf"(?:(?:time(?:stamp|code)?|t)(?:s|secs?|seconds?|{'|'.join(PER_SECOND)})?|seconds?|milliseconds)"
+)
+"""Names of columns of times, without blanks, brackets and underscores."""
+BACKWARDS_S = 0.5
+"""A row whose time is earlier than that of the row before by less than this is left out; more is an error."""
+LEFT_OUT_SHARE, LEFT_OUT = 0.1, 3
+"""So many rows may be left out: a share of all, or a few."""
+LONGEST_STEP_S = 2.0
+"""Rows that are further apart are not seconds apart: the column of times has another unit."""
 
 
 def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
@@ -90,3 +112,117 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
 def _unevenness(passed_s: Array, hertz: float) -> float:
     """Return how far times are from an even grid at most, as a share of a step."""
     return float(np.abs(passed_s * hertz - np.arange(len(passed_s))).max())
+
+
+def column_key(name: str) -> str:
+    """Return the name of a column as it is compared: ``Time (ms)`` is ``timems``."""
+    return re.sub(r"[\s_()\[\].-]+", "", name).lower()
+
+
+def tabulated(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], Array]:
+    """Return the names of all curves of some frames, and their values [shape=(N, P)]; NaN where a frame has none."""
+    names = [name for name in dict.fromkeys(name for frame in frames for name in frame) if name != "_neutral"]
+    return names, np.array([[frame.get(name, np.nan) for name in names] for frame in frames], float)
+
+
+def in_seconds(times: Array, key: str) -> Array:
+    """Return times in seconds; their size shows the unit where the name of their column (``column_key``) does not.
+
+    Raises InputError: one is no number.
+    """
+    if not np.isfinite(times).all():
+        raise InputError(f"the time of row {int(np.argmin(np.isfinite(times))) + 1} is no number, required one in each")
+    per_second = next((scale for unit, scale in PER_SECOND.items() if key.endswith(unit)), 1.0)
+    step = float(np.median(np.diff(times))) / per_second if len(times) > 1 else 0.0
+    if per_second == 1 and step > LONGEST_STEP_S:
+        per_second = next(scale for scale in (1e3, 1e6, 1e9) if step / scale <= LONGEST_STEP_S or scale == 1e9)
+        LOG.warning("the times rise by %g a row: read as parts of a second, %g of them", step, per_second)
+    return np.asarray(times / per_second)
+
+
+def motion_at_times(
+    names: Sequence[str], time_s: Array, values: Array, unit: str = WEIGHT
+) -> tuple[Motion, NDArray[np.bool_]]:
+    """Return curves at a steady rate from the first time on, and in which frames they were measured.
+
+    time_s : of the rows, in seconds [shape=(N,)];  values : NaN where there is no face [shape=(N, P)]
+    unit   : of curves that are neither blendshapes nor angles
+    Before the first face and after the last one weights are 0 and other curves still; between faces is a straight line.
+    Rows that are not later than all before are left out, frames that were lost and uneven times evened out
+    (``steady_rows``). A warning says how many rows each of this was.
+    Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
+    """
+    ordered = _in_order(time_s)
+    time_s, values = time_s[ordered], values[ordered]
+    measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
+    if not measured.any():
+        raise InputError("0 rows with values, required two or more")
+    if not measured.all():
+        empty = ", ".join(name for name, there in zip(names, measured, strict=True) if not there)
+        LOG.warning("columns without any number are left out: %s", shortened(empty))
+    names = [name for name, there in zip(names, measured, strict=True) if there]
+    values = values[:, measured]
+    channels = [_channel(name, unit) for name in names]
+    kept = strongest_columns([channel.name for channel in channels], values)
+    values, channels = values[:, kept], [channels[column] for column in kept]
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
+    if not seen.all():
+        if not seen.any():
+            raise InputError("0 rows with values of all curves, required two or more")
+        _bridge(time_s, values, seen, np.array([channel.unit == WEIGHT for channel in channels]))
+    rows, rate_hz = steady_rows(time_s, np.concatenate([values, seen[:, None]], axis=1))
+    return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
+
+
+def _channel(name: str, unit: str) -> Channel:
+    if name.endswith(ANGLES):
+        return Channel(name[:1].lower() + name[1:], RADIAN)
+    return Channel(arkit_name(name) or name, WEIGHT if is_known(name) else unit)
+
+
+def strongest_columns(names: Sequence[str], values: Array) -> list[int]:
+    """Return one column of each name, in order: where several have it, the one that moves most, with a warning."""
+    if len(set(names)) == len(names):
+        return list(range(len(names)))
+    with np.errstate(invalid="ignore"):
+        moved = np.nanmax(values, axis=0, initial=-np.inf) - np.nanmin(values, axis=0, initial=np.inf)
+    best: dict[str, int] = {}
+    for column, name in enumerate(names):
+        if name not in best or moved[column] > moved[best[name]]:
+            best[name] = column
+    twice = [name for name in best if sum(moved[c] > 0 for c, other in enumerate(names) if other == name) > 1]
+    if twice:
+        LOG.warning("%d curves are there more than once: the one that moves most counts: %s", len(twice), twice[:8])
+    return sorted(best.values())
+
+
+def _bridge(time_s: Array, values: Array, seen: NDArray[np.bool_], weights: NDArray[np.bool_]) -> None:
+    """Fill rows without a face: straight lines between faces, rest before the first and after the last one."""
+    spans = [f"{time_s[first] - time_s[0]:.2f}–{time_s[last - 1] - time_s[0]:.2f} s" for first, last in runs(~seen)]
+    more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
+    LOG.warning(
+        "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",
+        *(int((~seen).sum()), len(seen), ", ".join(spans[:4]), more),
+    )
+    for column in range(values.shape[1]):
+        values[:, column] = np.interp(time_s, time_s[seen], values[seen, column])
+    first, last = np.flatnonzero(seen)[[0, -1]]
+    values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
+
+
+def _in_order(time_s: Array) -> NDArray[np.bool_]:
+    """Return which rows are later than all before them. Raises InputError: a row goes far back, or too many do."""
+    latest = np.maximum.accumulate(time_s)
+    back = latest - time_s
+    if back.max() > BACKWARDS_S:
+        row = int(np.argmax(back > BACKWARDS_S))
+        raise InputError(f"the time of row {row + 1} goes back by {back[row]:.2f} s, required: one take in order")
+    ordered = np.concatenate([[True], time_s[1:] > latest[:-1]])
+    left_out = int((~ordered).sum())
+    if left_out:
+        row = int(np.argmin(ordered)) + 1
+        what = f"{left_out} of {len(time_s)} rows are not later than those before, as row {row}"
+        if left_out > max(LEFT_OUT, LEFT_OUT_SHARE * len(time_s)):
+            raise InputError(f"{what}; required: times that increase")
+        LOG.warning("%s: they are left out", what)
+    return np.asarray(ordered)

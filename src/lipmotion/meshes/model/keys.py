@@ -60,8 +60,7 @@ EVERY_KEY = Thinning()
 def _distances(time_s: Array, rows: Array) -> Array:
     """Return the largest distance of any curve from the line between the ends, at every key [shape=(K,)]."""
     share = (time_s - time_s[0]) / (time_s[-1] - time_s[0])
-    line = rows[0] + share[:, None] * (rows[-1] - rows[0])
-    distances: Array = np.abs(rows - line).max(axis=1, initial=0.0)
+    distances: Array = np.abs(rows - rows[0] - share[:, None] * (rows[-1] - rows[0])).max(axis=1, initial=0.0)
     distances[[0, -1]] = 0.0
     return distances
 

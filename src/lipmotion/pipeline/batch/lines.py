@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shortened
-from lipmotion.export.base import motion_suffixes
+from lipmotion.formats.base import motion_suffixes
 from lipmotion.storage.files import check_listable, portable_name, read_text_file
 from lipmotion.storage.text_table import read_table
 

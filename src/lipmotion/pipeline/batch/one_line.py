@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from lipmotion.errors import ExportError, LipMotionError
-from lipmotion.export.base import motion_suffix
 from lipmotion.extensions import failed_extension, provided
+from lipmotion.formats.base import motion_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.motion.closure import OPENING, closable_ranges

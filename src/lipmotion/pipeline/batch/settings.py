@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.labels import label_files_beside
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import motion_suffixes
-from lipmotion.export.cues import CUE_FORMATS
-from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version, provided
+from lipmotion.formats.base import motion_suffixes
+from lipmotion.formats.cues import CUE_FORMATS
+from lipmotion.formats.label_files import LABEL_SUFFIXES, label_files_beside
 from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job

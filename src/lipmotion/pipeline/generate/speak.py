@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.entry import quantise
-from lipmotion.corpora.labels import is_subtitles, subtitle_words
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
+from lipmotion.formats.subtitles import is_subtitles, subtitle_words
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus

@@ -9,14 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.cue_sheets import CUES_FPS, CueSheet, choose_cues
 from lipmotion.articulation.delivery import Delivery, moved_in_time
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, SHAPES, CueSheet, choose_cues, format_of, write_cue_file
-from lipmotion.export.cues.sheet import CUES_FPS
+from lipmotion.formats.cues import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
+from lipmotion.units.mouth_chart import OPTIONAL, SHAPES
 
 SHEET = ".cues."
 """What the name of a cue sheet among other outputs has before its format."""
@@ -93,7 +94,7 @@ def cue_text(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> 
 
     speech : the recording that was animated;  form : as of ``write_cues``
     """
-    return CUE_FORMATS[form](sheet, as_text(speech))
+    return CUE_FORMATS[form].text(sheet, as_text(speech))
 
 
 def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:

@@ -17,7 +17,7 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError
-from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
+from lipmotion.formats.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter

@@ -10,11 +10,11 @@ import numpy as np
 
 from lipmotion.articulation.expression import is_mood
 from lipmotion.errors import InputError
-from lipmotion.export.base import read_motion
-from lipmotion.export.cues.cue_motion import read_cue_motion
+from lipmotion.formats.base import read_motion
+from lipmotion.formats.cues import read_cue_motion
+from lipmotion.formats.label_files import read_units
 from lipmotion.meshes.files.steady_rate import rate_in_step
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace
 
 LOG = logging.getLogger("lipmotion")

@@ -9,9 +9,9 @@ from typing import Any
 
 from lipmotion.articulation.delivery import Delivery, sound_units
 from lipmotion.errors import ExportError
-from lipmotion.export.sound import SOUND_CODECS, write_sound
-from lipmotion.export.timed_labels import LABEL_SUFFIXES, write_labels
 from lipmotion.extensions import provided
+from lipmotion.formats.label_files import LABEL_SUFFIXES, write_labels
+from lipmotion.formats.sound import SOUND_CODECS, write_sound
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import (

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shortened
+from lipmotion.formats.label_files import labels_beside
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.understand.transcribe import phones_in_time

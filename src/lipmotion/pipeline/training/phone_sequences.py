@@ -8,9 +8,9 @@ from itertools import groupby
 from pathlib import Path
 
 from lipmotion.corpora.entry import read_entry
-from lipmotion.corpora.labels import read_plain_text
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import read_plain_text
 from lipmotion.units import Lexicon, is_silent, words_of
 
 SHIPPED = "english.txt"

@@ -31,7 +31,7 @@ def in_language(request: SpeechRequest) -> SpeechRequest:
         return request
     given = request.transcript
     if isinstance(given, Path) or (isinstance(given, str) and ":" in given):
-        from lipmotion.corpora.labels import read_transcript  # forty formats
+        from lipmotion.formats.label_files import read_transcript  # forty formats
 
         given = read_transcript(given)
     transcript = _plain_transcript(given) if isinstance(given, str) else given

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from lipmotion.corpora.labels import labels_beside, read_transcript, speakers_in
 from lipmotion.errors import InputError
+from lipmotion.formats.label_files import labels_beside, read_transcript, read_units, speakers_in
 from lipmotion.pipeline.job import Request
-from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.storage.sources import check_kind
 from lipmotion.types import TimedTranscript

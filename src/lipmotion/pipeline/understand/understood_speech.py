@@ -454,7 +454,7 @@ def _words(
     """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
     text = transcript
     if isinstance(text, Path) or (isinstance(text, str) and ":" in text):  # a file, or perhaps subtitles
-        from lipmotion.corpora.labels import read_transcript  # forty formats
+        from lipmotion.formats.label_files import read_transcript  # forty formats
 
         text = read_transcript(text)
     if text is None or isinstance(text, TimedTranscript):

@@ -1,0 +1,417 @@
+"""Cue sheets for 2D animation: the mouth shape of every span of time (``units.mouth_chart``), chosen from motion.
+
+Of all sequences of held shapes the one with the least total cost is chosen. Which shapes suit a phone says a table of
+our own; cue files of other programs name shapes by one of four charts.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.kernels.sequences.segments import best_segments
+from lipmotion.types import Generation, Motion, Span, Timeline, Unit
+from lipmotion.types.values import clock_seconds, number_of
+from lipmotion.units import SILENCE, VISEMES, closing_phones, is_silent, words_in_time
+from lipmotion.units.mouth_chart import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, drawn_shape
+
+Array = NDArray[np.float64]
+LOG = logging.getLogger("lipmotion")
+
+CUES_FPS = 24.0
+"""Frame rate of cues where none is given."""
+
+
+@dataclass(frozen=True)
+class CueSheet:
+    """The cues of one recording.
+
+    cues  : shapes without gaps from 0 to the end, at least one; times are whole hundredths of a second
+    fps   : the frame rate that they were chosen for; ``int(fps * start_s)`` is a cue's first frame, the first is 0
+    drawn : the shapes that the character has
+    words : the words in time, where they are known
+    blair : whether shapes have Preston Blair's names where a format has no letters of its own, ``.dat``
+
+    >>> sheet = CueSheet(Timeline((Span(0.0, 0.5, "X"), Span(0.5, 0.62, "A"))), fps=24.0, drawn="ABCDEFX")
+    >>> sheet.duration_s, sheet.rest
+    (0.62, 'X')
+    """
+
+    cues: Timeline[str]
+    fps: float
+    drawn: str
+    words: Timeline[str] = field(default_factory=lambda: Timeline(()))
+    blair: bool = True
+
+    @property
+    def rest(self) -> str:
+        """The shape before and after speech."""
+        return drawn_shape(REST, self.drawn)
+
+    @property
+    def rows(self) -> list[tuple[float, str]]:
+        """Start and shape of every cue, then the end, at which the mouth is at rest."""
+        return [*((cue.start_s, cue.label) for cue in self.cues), (self.duration_s, self.rest)]
+
+    @property
+    def duration_s(self) -> float:
+        """Length in seconds."""
+        return self.cues.spans[-1].end_s
+
+
+def drawn_shapes(optional: str) -> str:
+    """Return the basic shapes and the given optional ones."""
+    return "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
+
+
+def start_s(frame: int, fps: float) -> float:
+    """Return the first hundredth of a second in which a frame is shown.
+
+    Rounded up, so that ``int(fps * start)``, which readers of Rhubarb's and Moho's files compute, is the frame again.
+    Frame 1 at 24 fps, 0.0417 s, becomes 0.05 s; rounded to 0.04 s it would be in frame 0. At 100 fps a frame is a
+    hundredth, and none is left to round to.
+    """
+    hundredths = int(np.ceil(frame / fps * 100 - 1e-6))
+    return (hundredths + (fps < 100 and int(fps * (hundredths / 100)) < frame)) / 100
+
+
+def cue_frame_count(duration_s: float, fps: float) -> int:
+    """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
+    end_s = whole_hundredths(duration_s)
+    frames = int(np.ceil(end_s * fps))
+    while frames and start_s(frames - 1, fps) >= end_s:
+        frames -= 1
+    return frames
+
+
+def whole_hundredths(duration_s: float) -> float:
+    """Return a duration cut to hundredths of a second."""
+    return int(duration_s * 100 + 1e-6) / 100
+
+
+def cue_sheet(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
+    """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
+    starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
+    shapes = [shape for _, shape in segments] or [drawn_shape(REST, drawn)]
+    ends = [*starts[1:], whole_hundredths(duration_s)]
+    return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
+
+
+def shown_shapes(sheet: CueSheet) -> list[str]:
+    """Return the shape of every frame of the animation, to the end of the sheet."""
+    frames = max(1, int(sheet.fps * sheet.duration_s + 1 - 1e-9))
+    starts = [min(int(sheet.fps * cue.start_s), frames) for cue in sheet.cues] + [frames]
+    shown: list[str] = []
+    for cue, end in zip(sheet.cues, starts[1:], strict=True):
+        shown += [cue.label] * (end - len(shown))
+    return shown
+
+
+@dataclass(frozen=True)
+class PhoneShapes:
+    """The shapes that suit one part of a phone.
+
+    share   : of the phone's duration
+    best    : shapes that suit it best
+    allowed : shapes that are acceptable
+    """
+
+    share: float
+    best: str
+    allowed: str = ""
+
+
+_PHONE_SHAPES: tuple[tuple[str, tuple[PhoneShapes, ...]], ...] = (
+    ("sil sp", (PhoneShapes(1, "X", "A"),)),
+    ("p b m", (PhoneShapes(1, "A"),)),
+    ("em", (PhoneShapes(0.4, "BC", "E"), PhoneShapes(0.6, "A"))),
+    ("f v", (PhoneShapes(1, "G"),)),
+    ("l el", (PhoneShapes(1, "H", "BCE"),)),
+    ("w", (PhoneShapes(1, "F", "E"),)),
+    ("uw uh", (PhoneShapes(1, "F", "E"),)),
+    ("ow", (PhoneShapes(0.6, "E", "CF"), PhoneShapes(0.4, "F", "E"))),
+    ("ao", (PhoneShapes(1, "E", "CD"),)),
+    ("oy", (PhoneShapes(0.6, "E", "C"), PhoneShapes(0.4, "B", "C"))),
+    ("er axr", (PhoneShapes(1, "E", "BC"),)),
+    ("aa", (PhoneShapes(1, "D"),)),
+    ("ay", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "B", "C"))),
+    ("aw", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "E", "F"))),
+    ("ae eh ah", (PhoneShapes(1, "C", "D"),)),
+    ("ey", (PhoneShapes(0.6, "C", "BD"), PhoneShapes(0.4, "B", "C"))),
+    ("iy ih ix ax y", (PhoneShapes(1, "B", "C"),)),
+    ("r", (PhoneShapes(1, "BE", "F"),)),
+    ("sh zh ch jh", (PhoneShapes(1, "BF", "E"),)),
+    ("s z t d th dh", (PhoneShapes(1, "B", "CEF"),)),
+    ("n en k g ng", (PhoneShapes(1, "B", "CEF"),)),
+)
+PHONE_SHAPES: dict[str, tuple[PhoneShapes, ...]] = {
+    phone: looks for phones, looks in _PHONE_SHAPES for phone in phones.split()
+}
+ANY_OPEN: tuple[PhoneShapes, ...] = (PhoneShapes(1, "BCDEF"),)
+"""For hh and phones of another inventory: the motion alone decides, the lips stay open."""
+ANY_SHAPE: tuple[PhoneShapes, ...] = (PhoneShapes(1, "ABCDEF"),)
+"""For speech without known phones: the motion alone decides, also whether the lips are open."""
+
+
+def shapes_of_phone(phone: str) -> tuple[PhoneShapes, ...]:
+    """Return the shapes that suit each part of a phone; an empty text stands for an unknown phone."""
+    return PHONE_SHAPES.get(phone, ANY_OPEN) if phone else ANY_SHAPE
+
+
+COST_RATE_HZ = 24.0
+"""Costs are for a frame at this rate and scaled at others, so that the choice does not depend on the rate."""
+ALLOWED_COST, OTHER_COST, MISPLACED_COST = 0.5, 1.5, 3.0
+"""Cost of a shape that is acceptable for the phone; of one that is not; of one of ``SPECIAL`` for another phone."""
+SPECIAL = "AGHX"
+OPENING_WEIGHT, SPREAD_WEIGHT = 6.0, 0.5
+UNCLOSED_COST, UNBITTEN_COST = 10_000.0, 100.0
+"""Cost where the one frame of a p b m, or f v, does not show its shape: where only one fits, p b m win."""
+LARGEST_OPENING = 1.2
+"""Largest relative opening that is distinguished."""
+LEAST_OPENING = 1e-4
+"""Least mean opening, in the unit of the motion, that scales: a mouth that stays closed is not amplified."""
+LIP_BITING = VISEMES["ld"]
+LEAD_S = 0.02
+"""The shape of a phone begins this long before its sound."""
+
+_NAMES = "".join(SHAPES)
+_POSES = np.array([(shape.opening, shape.spread) for shape in SHAPES.values()])
+
+
+def frame_costs(generation: Generation, frames: int, fps: float, intensity: float = 1.0) -> Array:
+    """Return the cost of every one of ``SHAPES`` in every frame [shape=(frames, 9)].
+
+    Frame k is shown from ``k / fps`` to ``(k + 1) / fps``; phones and motion count by their share of that time.
+    Where the motion has no channel ``opening`` or ``width``, the phones alone decide.
+    """
+    edges_s = np.arange(frames + 1) / fps
+    silence = _phone_values(shapes_of_phone(SILENCE)[0], silent=True)
+    bounds_s, sums = [-LEAD_S], [np.zeros_like(silence)]
+    for span in generation.units:
+        start_s = span.start_s - LEAD_S
+        for part in shapes_of_phone(span.label.phone):
+            duration_s = part.share * span.duration_s
+            bounds_s += [start_s, start_s + duration_s]
+            sums += [sums[-1], sums[-1] + duration_s * (_phone_values(part, is_silent(span.label.phone)) - silence)]
+            start_s += duration_s
+    phone_values = silence + _integrals(np.array(bounds_s), np.array(sums), edges_s)
+    cost, voiced, nominal = phone_values[:, : len(_NAMES)].copy(), phone_values[:, -3], phone_values[:, -2:]
+    if "opening" in generation.motion.names:
+        opening = _relative_opening(_means(generation.motion, "opening", edges_s), nominal[:, 0], voiced)
+        opening = np.minimum(intensity * opening, LARGEST_OPENING)
+        cost += OPENING_WEIGHT * voiced[:, None] * (opening[:, None] - _POSES[:, 0]) ** 2
+    if "width" in generation.motion.names:
+        spread = _relative_spread(_means(generation.motion, "width", edges_s), nominal[:, 1], voiced)
+        spread = np.clip(intensity * spread, _POSES[:, 1].min(), _POSES[:, 1].max())
+        cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
+    cost *= COST_RATE_HZ / fps
+    for frame, shape, penalty in _required_shapes(generation, frames, fps):
+        cost[frame] += penalty
+        cost[frame, _NAMES.index(shape)] -= penalty
+    return cost
+
+
+def _phone_values(part: PhoneShapes, silent: bool) -> Array:
+    """Return, for a part of a phone, the costs of all shapes, whether it is speech, nominal opening and spread.
+
+    Result [shape=(12,)]; opening and spread are the means over the best shapes.
+    """
+    cost = [
+        0.0
+        if name in part.best
+        else ALLOWED_COST
+        if name in part.allowed
+        else MISPLACED_COST
+        if name in SPECIAL
+        else OTHER_COST
+        for name in _NAMES
+    ]
+    pose = _POSES[[_NAMES.index(name) for name in part.best]].mean(axis=0)
+    return np.array([*cost, float(not silent), *pose])
+
+
+def _means(motion: Motion, channel: str, edges_s: Array) -> Array:
+    """Return the mean of a channel over each frame [shape=(frames,)]; beyond its ends it is constant."""
+    grid_s = np.concatenate([motion.time_s, edges_s])
+    grid_s.sort()
+    values = np.interp(grid_s, motion.time_s, motion[channel])
+    sums = np.concatenate([[0.0], np.cumsum(np.diff(grid_s) * (values[1:] + values[:-1]) / 2)])
+    return _integrals(grid_s, sums[:, None], edges_s)[:, 0]
+
+
+def _integrals(time_s: Array, sums: Array, edges_s: Array) -> Array:
+    """Return means between edges [shape=(len(edges_s) − 1, columns)] from integrals up to the times ``time_s``."""
+    at_edges = np.stack([np.interp(edges_s, time_s, column) for column in sums.T], axis=1)
+    return np.diff(at_edges, axis=0) / np.diff(edges_s)[:, None]
+
+
+def _relative_opening(opening: Array, nominal: Array, voiced: Array) -> Array:
+    """Return the opening scaled to the nominal openings of the phones by least squares [shape=(frames,)].
+
+    There is no offset, because closed lips have opening 0; so "boo" alone does not count as a mouth wide open.
+    """
+    wanted = voiced * nominal
+    least = LEAST_OPENING * max(float(wanted.sum()), 1.0)
+    return np.clip(opening * (wanted @ wanted) / max(float(wanted @ opening), least), 0.0, LARGEST_OPENING)
+
+
+def _relative_spread(width: Array, nominal: Array, voiced: Array) -> Array:
+    """Return the spread predicted from the width [shape=(frames,)]: linear regression on the nominal spreads."""
+    total = max(float(voiced.sum()), 1e-9)
+    mean = float(voiced @ nominal) / total
+    centred = width - float(voiced @ width) / total
+    weighted = voiced * centred
+    slope = float(weighted @ (nominal - mean)) / max(float(weighted @ centred), 1e-9)
+    return np.asarray(np.clip(mean + max(slope, 0.0) * centred, _POSES[:, 1].min(), _POSES[:, 1].max()))
+
+
+def _required_shapes(generation: Generation, frames: int, fps: float) -> Iterator[tuple[int, str, float]]:
+    """Yield the frame in which each p b m and f v must be shown, its shape, and the cost of other shapes."""
+    units = generation.units
+    for span, closing in zip(units, closing_phones(units), strict=True):
+        if closing:
+            yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "A", UNCLOSED_COST
+        elif span.label.phone in LIP_BITING:
+            yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "G", UNBITTEN_COST
+
+
+def _least_open_s(span: Span[Unit], motion: Motion) -> float:
+    """Return the time in a phone at which the mouth is least open; without an opening, the middle of the phone."""
+    first, last = np.ceil(span.start_s * motion.rate_hz - 1e-6), np.floor(span.end_s * motion.rate_hz + 1e-6)
+    first, stop = int(max(first, 0)), int(min(last + 1, len(motion.values)))
+    if "opening" not in motion.names or first >= stop:
+        return max((span.start_s + span.end_s) / 2, 0.0)
+    return float((first + int(motion["opening"][first:stop].argmin())) / motion.rate_hz + 1e-9)
+
+
+CHANGE_COST = 0.35
+"""Cost of a change of shape, in the unit of ``costs``."""
+HOLD_S = 2 / 24
+
+
+def default_hold_frames(fps: float) -> int:
+    """Return the number of frames nearest to two frames at 24 fps, the shortest hold of a mouth in animation."""
+    return max(1, int(HOLD_S * fps + 0.5))
+
+
+def choose_cues(
+    generation: Generation,
+    fps: float = 24.0,
+    hold_frames: int | None = None,
+    optional: str = OPTIONAL,
+    intensity: float = 1.0,
+) -> CueSheet:
+    """Return the cues of generated motion.
+
+    fps         : frames per second of the animation, 1 to 100
+    hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
+    optional    : which of the shapes G, H and X the character has
+    intensity   : openings and spread so many times as large, before shapes are chosen
+    The result is exact: of all sequences that keep the hold, the one of least cost (``costs``, ``sequences.segments``).
+    Cost: about 10 µs a frame.
+    """
+    motion, drawn = generation.motion, drawn_shapes(optional)
+    duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
+    frames = cue_frame_count(duration_s, fps)
+    cost = np.empty((0, len(drawn)))
+    if frames:
+        cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
+    segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE_COST)
+    sheet = cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
+    return replace(sheet, words=Timeline(tuple(span for span in words_in_time(generation.units) if span.label)))
+
+
+def _costs_of_drawn_shapes(cost: NDArray[np.float64], drawn: str) -> NDArray[np.float64]:
+    """Return the cost of the drawn shapes [shape=(frames, drawn)]: the least cost of those that each one stands for."""
+    names = list(SHAPES)
+    groups = [[column for column, other in enumerate(names) if drawn_shape(other, drawn) == name] for name in drawn]
+    return np.stack([cost[:, group].min(axis=1) for group in groups], axis=1)
+
+
+_OCULUS = "sil:X PP:A FF:G TH:B DD:B kk:B CH:B SS:B nn:B RR:B aa:D E:C ih:B oh:E ou:F I:B O:E U:F"
+_FLEMING_DOBBS = "mbp:A nltdr:B fv:G th:B gk:B sh:F o:E ehsz:C aa:D iy:B rest:X"
+FLEMING_DOBBS = dict(pair.split(":") for pair in _FLEMING_DOBBS.split())
+PHONES = {"rest": REST, "hh": "C"} | {
+    f"{phone}{stress}": parts[0].best[0] for phone, parts in PHONE_SHAPES.items() for stress in ("", 0, 1, 2)
+}
+"""Shapes by the names of other sets, for which Moho and Papagayo have switches."""
+OCULUS = {name.lower(): shape for name, _, shape in (pair.partition(":") for pair in _OCULUS.split())}
+"""Shapes by the names of Meta's 15 visemes (``viseme_PP``), old and new."""
+PREFIX = "viseme_"
+LONGEST_S = 86_400.0
+MOST_CUES = 250_000
+MILLISECONDS = 20.0
+"""Shapes other than rest of which half seem to last so many whole seconds are in milliseconds."""
+
+
+def shape_of(name: str, names: dict[str, str], place: str) -> str:
+    """Return the shape of a name. Raises InputError: it is none, with its place."""
+    found = names.get(name.strip().lower().removeprefix(PREFIX))
+    if found is None:
+        known = " ".join(dict.fromkeys(names))
+        raise InputError(f"{place}: no mouth shape is {shortened(name)!r}; the shapes are: {known}")
+    return found
+
+
+def chart_of(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, str]:
+    """Return the shapes by the names of one set that programs offer: the first that has all of them.
+
+    The usual one, Preston Blair's, Rhubarb's letters, Fleming and Dobbs', Meta's visemes, or the phones of CMU's
+    dictionary, with stress or without.
+    """
+    given = {name.strip().lower().removeprefix(PREFIX) for name in names}
+    return next((chart for chart in (usual, BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES) if given <= {*chart}), usual)
+
+
+def cue_time(text: str, place: str) -> float:
+    """Return a time in seconds, as 1.5, 1,5 or 0:01.5, or a number of frames.
+
+    Raises InputError: it is none, with its place.
+    """
+    value = clock_seconds(text)
+    if math.isnan(value):
+        value = number_of(text.replace(",", "."), f"{place}: the time is", "a number from 0 on")
+    if not 0 <= value <= LONGEST_S * 1000:
+        raise InputError(f"{place}: the time is {value:g}, required a number from 0 to {LONGEST_S * 1000:g}")
+    return value
+
+
+def sheet_of(
+    rows: Sequence[tuple[float, str]], end_s: float, fps: float, words: Timeline[str] | None = None
+) -> CueSheet:
+    """Return a sheet of shapes that each last to the next one, with rest before the first.
+
+    rows  : starts in seconds, in order, and shapes;  end_s : of the last one, if it lasts
+    Times that are milliseconds are read as these, with a warning.
+    Raises InputError: there are none, or too many, or they are not in order.
+    """
+    if not rows:
+        raise InputError("there is no mouth shape in it; export the cues again")
+    end_s = max(end_s, rows[-1][0])
+    lengths = [after[0] - row[0] for row, after in pairwise(rows) if row[1] != REST]
+    if lengths and median(lengths) >= MILLISECONDS and all(float(start_s).is_integer() for start_s, _ in rows):
+        LOG.warning("a mouth shape seems to last %g s: the times are taken for milliseconds", median(lengths))
+        rows, end_s = [(start_s / 1000, shape) for start_s, shape in rows], end_s / 1000
+    if len(rows) > MOST_CUES or end_s > LONGEST_S:
+        raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MOST_CUES} in {LONGEST_S:g} s")
+    late = next((place for place, (row, after) in enumerate(pairwise(rows), 1) if after[0] < row[0]), None)
+    if late is not None:
+        raise InputError(
+            f"mouth shape {late + 1} begins at {rows[late][0]:.6g} s, before the one ahead of it at "
+            f"{rows[late - 1][0]:.6g} s, required in order of time; export the cues again"
+        )
+    whole = [(0.0, REST), *rows] if rows[0][0] > 0 else list(rows)
+    ends = [*(start_s for start_s, _ in whole[1:]), end_s]
+    spans = (Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(whole, ends, strict=True))
+    kept = Timeline(tuple(span for span in spans if span.end_s != span.start_s))
+    if not len(kept):
+        raise InputError("its mouth shapes last no time; export the cues again")
+    return CueSheet(kept, fps, "".join(SHAPES), words or Timeline(()))

@@ -1,1 +1,0 @@
-"""Motion files: one module per format."""

@@ -1,0 +1,469 @@
+"""Motion files: the format is chosen by the suffix, among the built-in ones and those that installed packages add.
+
+Below the registry: what several formats share, rows of numbers as text, keys, and JSON with many rows.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+from array import array
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.extensions import Registry
+from lipmotion.meshes.model.keys import Thinning
+from lipmotion.meshes.model.shape_names import is_known
+from lipmotion.storage.files import check_regular, whole_file
+from lipmotion.storage.json_text import as_json
+from lipmotion.storage.sources import check_kind
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
+
+LOG = logging.getLogger("lipmotion")
+Array = NDArray[np.float64]
+About = Mapping[str, str]
+Json = Mapping[str, Any]
+LARGEST_MOTION_BYTES = 1 << 31
+"""Most bytes of a motion file: four hours of a hundred channels."""
+
+LARGEST_UNITS_BYTES = 1 << 28
+"""Most bytes of a file of units alone: phones of a day."""
+
+
+LARGEST_WEIGHT = 4.0
+"""Largest weight of a blendshape that is read; captures and sculpted faces go a little over 1."""
+TOLERATED_WEIGHT = 0.1
+"""By how much weights may go beyond 0 to 1 without a warning."""
+
+
+@dataclass(frozen=True)
+class MotionFormat:
+    """How one kind of motion file is written and read.
+
+    write   : writes a generation to a path; the mappings describe the origin of its speech and of its model
+    read    : returns motion and units of a file, or raises InputError; None: the format cannot be read
+    check   : raises ExportError for motion that does not fit into such a file
+    units   : returns the units of a file that holds units alone, and None of other files; None: there are no such files
+    curves  : the set of curves that such a file holds, as of ``pipeline.outputs.curve_sets.curves_of`` (``arkit``, for
+              instance): the pipeline computes them from the motion; empty: the channels of the motion
+    rate_hz : frames per second where the user asks for none; None: those of the motion
+    mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
+              whatever channels or curves the user asks for
+    fixed_rate : whether a file can have no other rate than ``rate_hz``
+    other_curves : whether weights and controls that the user asks for take the place of ``curves``
+    keyed   : whether the file holds keys of weights with straight lines between, and needs none where a line goes on
+    names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
+                   the folder of the file
+
+    The description of the speech has ``start_s`` where the sound does not begin with the motion: seconds of the motion
+    at which it begins, as text; negative: before it.
+    """
+
+    write: Callable[[Path, Generation, About, About], None]
+    read: Callable[[Path], tuple[Motion, Timeline[Unit]]] | None = None
+    check: Callable[[Motion], None] = lambda _: None
+    units: Callable[[Path], Timeline[Unit] | None] | None = None
+    curves: str = ""
+    rate_hz: float | None = None
+    fixed_rate: bool = False
+    other_curves: bool = False
+    names_sound: bool = False
+    mouth: bool = False
+    keyed: bool = False
+
+
+MOTION_FORMATS: Registry[MotionFormat] = Registry(
+    "motion format",
+    "lipmotion.exporters",
+    {
+        "json": "lipmotion.formats.motion_document:JSON",
+        "csv": "lipmotion.formats.tables:TABLE",
+        "npz": "lipmotion.formats.motion_document:NPZ",
+        "livelink.csv": "lipmotion.formats.tables:LIVE_LINK",
+        "blender.py": "lipmotion.formats.blender:MOTION_FORMAT",
+        "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
+        "fap": "lipmotion.formats.fap:MOTION_FORMAT",
+        "vrma": "lipmotion.formats.vrm_animation:MOTION_FORMAT",
+        "anim": "lipmotion.formats.game_engines:UNITY",
+        "tres": "lipmotion.formats.game_engines:GODOT",
+        "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
+        "bvh": "lipmotion.formats.bvh:MOTION_FORMAT",
+        "a2f.json": "lipmotion.formats.weights_json:AUDIO2FACE",
+        "motion3.json": "lipmotion.formats.live2d:MOTION_FORMAT",
+    },
+)
+"""Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
+_GLTF = "lipmotion.meshes.files.gltf_weights:read_gltf_motion"
+_CUES = "lipmotion.formats.cues:read_cue_motion"
+_FRAMES = "lipmotion.formats.weights_json:read_frames"
+MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
+    "motion reader",
+    "lipmotion.motion_readers",
+    {"glb": _GLTF, "gltf": _GLTF, **dict.fromkeys(("tsv", "xml", "dat", "pgo"), _CUES), "jsonl": _FRAMES},
+)
+"""Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
+OTHER_JSON = {
+    b'"lipmotion.motion"': ".json",
+    b'"mouthCues"': ".tsv",
+    b'"viseme":': ".tsv",
+    b'"visemes":': ".tsv",
+    b'"facsNames"': ".a2f.json",
+    b'"weightMat"': ".a2f.json",
+    b"lendShapes": ".jsonl",
+    b"lendshape": ".jsonl",
+    b"ategory": ".jsonl",
+    b'awOpen"': ".jsonl",
+}
+"""What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
+JSON_HEAD = 1 << 16
+"""How many bytes of a ``.json`` are searched for them."""
+CUE_LINE = re.compile(
+    rb'^"?[0-9][0-9:.,]{0,20}"?(?:[;,]\s?"?[0-9:.,]{1,20}"?)?[;,]\s?"?(?!nan|inf)[A-Za-z_0-9]{0,9}[A-Za-z]"?\s*$', re.M
+)
+"""A line of a ``.csv`` of cues: one or two times, and the name of a shape."""
+
+
+def motion_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all motion formats, with the dot."""
+    return tuple(f".{name}" for name in MOTION_FORMATS.names)
+
+
+def readable_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all files that ``read_motion`` reads, with the dot."""
+    formats = tuple(suffix for suffix in motion_suffixes() if _can_be_read(suffix))
+    return formats + tuple(f".{name}" for name in MOTION_READERS.names)
+
+
+def motion_suffix(path: Path) -> str:
+    """Return the suffix that chooses the motion format of a file, in lower case, with the dot; empty: there is none.
+
+    The longest known suffix counts: ``take.livelink.csv`` has ``.livelink.csv``, ``take.1.csv`` ``.csv``.
+
+    >>> from pathlib import Path
+    >>> motion_suffix(Path("take.1.CSV")), motion_suffix(Path("take.fbx"))
+    ('.csv', '')
+    """
+    return _longest(path, motion_suffixes())
+
+
+def _longest(path: Path, known: Collection[str]) -> str:
+    """Return the longest ending of a file's name that is known, in lower case, with the dot; empty: there is none."""
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    endings = ("".join(suffixes[first:]) for first in range(len(suffixes)))
+    return next((ending for ending in endings if ending in known), "")
+
+
+def motion_format(path: Path) -> MotionFormat:
+    """Return the motion format that the suffix of a file chooses. Raises ExportError: the suffix is unknown."""
+    try:
+        return _format_of(path)
+    except InputError as error:
+        raise ExportError(
+            f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(motion_suffixes())}"
+        ) from error
+
+
+def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:
+    """Write motion and units to a file in the format of its suffix; after a failure there is no partial file.
+
+    source, model : description of the speech and of the model (``.csv`` stores neither these nor units)
+    Raises ExportError: unknown suffix, values that are not finite, or the file cannot be written.
+    """
+    check_motion(path, generation.motion)
+    with whole_file(path) as temporary:
+        _format_of(path).write(temporary, generation, source, model)
+
+
+def check_motion(path: Path, motion: Motion) -> None:
+    """Raise ExportError if motion cannot be written to a file of that name: unknown suffix, or unsuitable motion."""
+    chosen = motion_format(path)
+    if motion.values.size and not np.isfinite([motion.values.min(), motion.values.max()]).all():  # no mask of an hour
+        raise ExportError(f"{path}: the motion has values that are not finite; interpolate them before writing")
+    chosen.check(motion)
+
+
+def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the motion and the units of a motion file; a ``.csv`` has no units, so its timeline is empty.
+
+    Raises InputError: unknown suffix, no such file, or not a motion file.
+
+    >>> import lipmotion, tempfile
+    >>> from pathlib import Path
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "welcome.npz"
+    ...     lipmotion.write(lipmotion.animate("examples/welcome.flac"), path)
+    ...     motion, units = read_motion(path)
+    >>> motion.rate_hz, units[0].label.phone
+    (100.0, 'sil')
+    """
+    path = Path(path)
+    check_kind(path, "motion file")
+    read = _reader_of(path)
+    if read is None:
+        raise InputError(
+            f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(readable_suffixes())}"
+        )
+    check_regular(path, "motion file")
+    with _errors_name(path):
+        size = path.stat().st_size
+        if size > LARGEST_MOTION_BYTES:
+            raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
+        motion, units = read(path)
+        _check_values(path, motion)
+    return motion, units
+
+
+def _check_values(path: Path, motion: Motion) -> None:
+    """Raise InputError for values that are not finite, or weights in percent; warn of weights beyond 0 to 1."""
+    if not (finite := np.isfinite(motion.values)).all():
+        frame, column = np.argwhere(~finite)[0].tolist()
+        first = f"the first is {motion.names[column]!r} in frame {frame}"
+        raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
+    beyond = []
+    for channel, curve in zip(motion.channels, motion.values.T, strict=True):
+        if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
+            low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
+            if high > LARGEST_WEIGHT:
+                raise InputError(
+                    f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
+                )
+            if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
+                beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
+    if beyond:
+        what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
+        LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
+
+
+@contextmanager
+def _errors_name(path: Path) -> Iterator[None]:
+    """Put a file's name before the message of an error of reading it, once."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
+
+
+def read_units(path: Path) -> Timeline[Unit]:
+    """Return the units of a motion file, or of a ``.json`` that holds the member ``units`` without motion.
+
+    Raises InputError: as ``read_motion``.
+    """
+    read = _format_of(path).units if motion_suffix(path) else None
+    if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS_BYTES:
+        with _errors_name(path):
+            units = read(path)
+        if units is not None:
+            return units
+    return read_motion(path)[1]
+
+
+def _reader_of(path: Path) -> Callable[[Path], tuple[Motion, Timeline[Unit]]] | None:
+    """Return what reads a file, by its name and, of ``.json``, its beginning; None: nothing does."""
+    named = _named_by_content(path)
+    if motion_suffix(named):
+        return _format_of(named).read
+    other = _longest(named, [f".{name}" for name in MOTION_READERS.names])
+    return MOTION_READERS.load(other.removeprefix(".")) if other else None
+
+
+def _named_by_content(path: Path) -> Path:
+    """Return a path, or for ``.json`` of another program, and cues, the name that such a file would have otherwise."""
+    if motion_suffix(path) not in (".json", ".csv") or not path.is_file():
+        return path
+    try:
+        with path.open("rb") as file:
+            head = file.read(JSON_HEAD)
+    except OSError:  # reported when it is read
+        return path
+    if motion_suffix(path) == ".csv":
+        return Path("a.tsv") if CUE_LINE.search(b"\n".join(head.splitlines()[:2])) else path
+    return next((Path(f"a{suffix}") for mark, suffix in OTHER_JSON.items() if mark in head), path)
+
+
+def _format_of(path: Path) -> MotionFormat:
+    """Return the format of a file's suffix. Raises InputError: none, or what a package adds is no format."""
+    chosen = MOTION_FORMATS.load((motion_suffix(path) or path.suffix.lower()).removeprefix("."))
+    if not isinstance(chosen, MotionFormat):
+        raise InputError(f"what an installed package adds as {_suffix(path)} is {chosen!r}, required a MotionFormat")
+    return chosen
+
+
+def _can_be_read(suffix: str) -> bool:
+    try:
+        return _format_of(Path(f"a{suffix}")).read is not None
+    except InputError:
+        return False
+
+
+def _suffix(path: Path) -> str:
+    return repr(motion_suffix(path) or path.suffix) if path.suffix else "a file without a suffix"
+
+
+DECIMALS = 5
+"""A hundred-thousandth of the distance between the eyes is about a micrometre."""
+BLOCK_ROWS = 2000
+"""Rows that are formatted at a time: the text of an hour of all channels would not fit in memory."""
+LARGEST_VALUE = 1e9
+"""Blocks with larger values are formatted number by number: their digits do not fit in 64 bits."""
+
+
+def formatted_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
+    """Yield each row of values [shape=(T, P)] as text: numbers with commas between them, rounded to ``DECIMALS``.
+
+    Raises ExportError: a value is not finite.
+    Cost: a twentieth of a microsecond per number; a fifth of the time of ``json.dumps``.
+    """
+    for start in range(0, len(values), BLOCK_ROWS):
+        with np.errstate(over="ignore"):
+            rounded = np.round(values[start : start + BLOCK_ROWS].astype(float), DECIMALS) + 0.0
+        if not np.isfinite(rounded).all():
+            raise ExportError("the motion has values that are not finite, or too large to be rounded")
+        if rounded.shape[1] and np.abs(rounded).max() < LARGEST_VALUE:
+            yield from _rows_of_digits(np.rint(rounded * 10**DECIMALS).astype(np.int64))
+        else:
+            form = ",".join([f"%.{DECIMALS}f"] * values.shape[1])
+            yield from (form % tuple(row) for row in rounded.tolist())
+
+
+def _rows_of_digits(numbers: NDArray[np.int64]) -> list[str]:
+    """Return each row of numbers as text, with a point before the last ``DECIMALS`` digits."""
+    sizes = np.abs(numbers)
+    digits = max(len(str(sizes.max())), DECIMALS + 1)
+    if digits < 10:
+        sizes = sizes.astype(np.int32)
+    text = np.empty((*numbers.shape, digits + 3), np.uint8)  # sign, digits, point, comma
+    used = np.ones(text.shape, bool)
+    text[..., 0], used[..., 0] = ord("-"), numbers < 0
+    text[..., -2 - DECIMALS], text[..., -1] = ord("."), ord(",")
+    text[:, -1, -1] = ord("\n")
+    for place in range(digits):
+        if place > DECIMALS:
+            used[..., -3 - place] = sizes > 0
+        sizes, digit = np.divmod(sizes, 10)
+        text[..., -(2 if place < DECIMALS else 3) - place] = ord("0") + digit
+    return text[used].tobytes().decode("ascii").splitlines()
+
+
+def write_json(
+    path: Path, before: Mapping[str, Any], rows_of: str, values: NDArray[Any], after: Mapping[str, Any]
+) -> None:
+    """Write one JSON object: members ``before``, one called ``rows_of`` with a row a line, members ``after``."""
+    start, end = as_json(before, ensure_ascii=False)[:-1], as_json(after, ensure_ascii=False)[1:]
+    with path.open("w", encoding="utf-8") as file:
+        file.write(f'{start}, "{rows_of}": [\n')
+        for number, row in enumerate(formatted_rows(values)):
+            file.write(f",\n[{row}]" if number else f"[{row}]")
+        file.write(f"\n]{', ' if after else ''}{end}\n")
+
+
+def key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: bool) -> list[int]:
+    """Return the frames of a curve that are keys in files with straight lines between keys, the first and last of them.
+
+    Held values (``stepped``) have a key where they change; others where a line would be further off than a tolerance.
+    """
+    if stepped:
+        return sorted({0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values) - 1})
+    return Thinning(tolerance).kept(time_s, values[:, None]).tolist()
+
+
+MOST_ITEMS = 1 << 20
+"""Most items of a list that has not one item a frame."""
+MOST_ROWS = 1 << 22
+"""Most rows of numbers: eleven hours of frames of 10 ms."""
+_BLANK = re.compile(r"\s*")
+_DECODER = json.JSONDecoder()
+
+
+def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any]:
+    """Return the members of a JSON object; the list called ``rows_of`` becomes an array of numbers [shape=(T, P)].
+
+    It is read item by item: rows of numbers need no more memory than an array.
+    numbers_of : name of a list that may have an item for every row
+    Raises json.JSONDecodeError, RecursionError: not one object.
+    Raises ValueError, TypeError, OverflowError: a list that is too long, or rows that are uneven or no numbers.
+    """
+    members: dict[str, Any] = {}
+
+    def take_member(at: int) -> int:
+        name, at = _DECODER.raw_decode(text, at)
+        at = next_at(text, _passed(text, next_at(text, at), ":"))
+        if text[at : at + 1] != "[":
+            members[name], at = _DECODER.raw_decode(text, at)
+        elif name == rows_of:
+            members[name], at = _rows(text, at)
+        else:
+            members[name] = []
+            most = MOST_ROWS if name == numbers_of else MOST_ITEMS
+            at = _each(text, at, "[]", lambda place: _take_item(text, place, members[name], most))
+        return at
+
+    end = next_at(text, _each(text, next_at(text, 0), "{}", take_member))
+    if end < len(text):
+        raise json.JSONDecodeError("Extra data", text, end)
+    return members
+
+
+def _take_item(text: str, at: int, items: list[Any], most: int) -> int:
+    value, at = _DECODER.raw_decode(text, at)
+    items.append(value)
+    if len(items) > most:
+        raise ValueError(f"a list of more than {most} items")
+    return at
+
+
+def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
+    """Return the rows of a list of lists of numbers [shape=(T, P)], and the position of its end."""
+    numbers = array("d")
+    widths = array("q")
+
+    def row(at: int) -> int:
+        values, at = _DECODER.raw_decode(text, at)
+        if not values or not isinstance(values, list) or len(values) != (widths[0] if widths else len(values)):
+            raise ValueError(
+                f"row {len(widths) + 1} of the values is not a list of as many numbers as the first: no shape"
+            )
+        numbers.extend(values)
+        widths.append(len(values))
+        if len(widths) > MOST_ROWS:
+            raise ValueError(f"more than {MOST_ROWS} rows of values")
+        return at
+
+    end = _each(text, at, "[]", row)
+    table = np.array(numbers, np.float64)
+    return table.reshape(len(widths), widths[0] if widths else 0), end
+
+
+def _each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
+    """Let ``take`` read each item between brackets; return the position after the closing bracket."""
+    at = next_at(text, _passed(text, at, brackets[0]))
+    if text[at : at + 1] == brackets[1]:
+        return at + 1
+    while True:
+        at = next_at(text, take(at))
+        if text[at : at + 1] == brackets[1]:
+            return at + 1
+        at = next_at(text, _passed(text, at, ","))
+
+
+def next_at(text: str, at: int) -> int:
+    """Return the position of the next character that is not blank."""
+    match = _BLANK.match(text, at)
+    return match.end() if match else at
+
+
+def _passed(text: str, at: int, character: str) -> int:
+    """Return the position after a required character. Raises JSONDecodeError: another character is there."""
+    if text[at : at + 1] != character:
+        raise json.JSONDecodeError(f"Expecting {character!r}", text, at)
+    return at + 1

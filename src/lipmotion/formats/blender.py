@@ -1,0 +1,103 @@
+"""Files for Blender: a script with motion in it, and the add-on that reads motion files.
+
+``.blender.py``: a script that keys shape keys, bones and custom properties when it is run in Blender.
+``.zip``: the add-on (``addons.blender``), as Blender 4.2 and later installs it.
+
+The script is made of the modules of the add-on, one after another, the curves, and a call that keys them.
+"""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+
+from lipmotion.errors import ExportError
+from lipmotion.extensions import installed_version
+from lipmotion.formats.base import MotionFormat
+from lipmotion.storage.files import check_target, whole_file
+from lipmotion.types import Generation
+
+SCRIPT_MODULES = ("takes.py", "curves.py", "keying.py", "script.py")
+"""The modules of the add-on that a script holds, one after another."""
+COPIED = "# -- what follows is copied into scripts\n"
+PROGRAMS = ("blender",)
+FOLDER = "lipmotion_blender"
+MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
+OLDEST = (1980, 1, 1, 0, 0, 0)
+"""The time of every file in an archive: the same version gives the same bytes."""
+NO_VERSION = "0.0.0"
+"""The version where lipmotion is not installed; Blender takes three numbers."""
+MANIFEST = """schema_version = "1.0.0"
+id = "lipmotion"
+version = "{version}"
+name = "lipmotion"
+tagline = "Keys shape keys and bones from files of lip motion"
+maintainer = "lipmotion"
+type = "add-on"
+blender_version_min = "4.2.0"
+license = ["SPDX:MIT"]
+
+[permissions]
+files = "Reads the motion file and the sound that you choose"
+"""
+"""What makes the archive an extension; as an add-on of the older kind, Blender reads ``bl_info``."""
+DECIMALS = 5
+_BEGINNING = re.compile(r'\A""".*?"""\n', re.DOTALL)
+_IMPORT = re.compile(r"^from (\.\w*|__future__) import .*\n", re.MULTILINE)
+
+_HEAD = '''"""Lip motion for Blender, written by lipmotion.
+
+Select the face or the rig and run this script: in the text editor (Alt P), or
+    blender FILE.blend --python THIS_FILE
+It keys shape keys by their names (as ARKit's, in any spelling), bones (Bone.rotation.x, degrees) and custom
+properties (Bone[name]), from the start frame of the scene, and adds the sound to the sequencer.
+"""
+
+from __future__ import annotations
+
+'''
+
+
+def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write the code of the add-on, the curves, and a call that keys them; names are literals of Python in ASCII."""
+    motion = generation.motion
+    folder = resources.files("lipmotion.addons.blender")
+    texts = [folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPT_MODULES]
+    *code, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(_HEAD + "".join(each.strip() + "\n\n\n" for each in code))
+        file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {source.get('path', '')!a}\n")
+        file.write(f"SOUND_S = {float(source.get('start_s', 0.0))!r}\n")
+        stepped = "".join(f"{name!a}, " for name in motion.names if name in generation.stepped)
+        file.write(f"STEPPED = ({stepped})\nMOTION = {{\n")
+        for name in motion.names:
+            values = ", ".join(f"{value + 0.0:.{DECIMALS}g}" for value in motion[name].tolist())
+            file.write(f"    {name!a}: [{values}],\n")
+        file.write("}\n" + main.split(COPIED)[1] + '\n\nif __name__ == "__main__":\n    main()\n')
+
+
+MOTION_FORMAT = MotionFormat(write, curves="face", other_curves=True, names_sound=True)
+
+
+def write_addon(program: str, path: str | Path) -> None:
+    """Write the add-on for a program to a file.
+
+    program : ``blender``: a ``.zip`` that Blender 4.2 and later installs from disk
+    Raises ExportError: no such program, another suffix, or the file cannot be written.
+    """
+    path = Path(path)
+    if program not in PROGRAMS:
+        raise ExportError(f"there is no add-on for {program!r}, required one of {', '.join(PROGRAMS)}")
+    if path.suffix.lower() != ".zip":
+        raise ExportError(f"{path}: unknown format {path.suffix!r}; Blender installs a .zip")
+    check_target(path)
+    source = resources.files("lipmotion.addons.blender")
+    texts = {name: source.joinpath(name).read_text(encoding="utf-8") for name in MODULES}
+    version = re.match(r"\d+\.\d+\.\d+", installed_version())
+    texts["blender_manifest.toml"] = MANIFEST.format(version=version[0] if version else NO_VERSION)
+    with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in texts.items():
+            archive.writestr(zipfile.ZipInfo(f"{FOLDER}/{name}", OLDEST), text.encode(), zipfile.ZIP_DEFLATED)

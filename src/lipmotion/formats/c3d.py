@@ -1,0 +1,373 @@
+"""``.c3d``: lip and jaw points as markers of motion capture, other channels as analog curves; and markers as motion.
+
+A file has labelled points, a place of each in every frame, and analog channels. Written points are in millimetres, with
+two markers more, ``EYE_L`` and ``EYE_R``, at the outer eye corners. Markers of others become channels ``x_NAME``,
+``y_NAME``, ``z_NAME`` in the head's frame (``markers``). Files of Intel's, DEC's and MIPS' processors are read, points
+as fractions or as scaled whole numbers; written are Intel's.
+
+Source: The C3D File Format, A Technical User Guide (Motion Lab Systems); c3d.org, "The C3D frame count".
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.lip_points import CHIN, mouth_template
+from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.formats.base import MotionFormat
+from lipmotion.formats.markers import MARKER, MILLIMETRES, in_head_frame, motion_of_markers
+from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
+
+Array = NDArray[np.float64]
+Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
+"""The values of a parameter: texts, or numbers in the order of the file."""
+
+BLOCK = 512
+MARK = 0x50
+INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
+"""The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
+MOST_FRAMES, OVERFLOW = 65_535, 65_536
+"""Most frames that the header can number, and after how many it may begin at 0 again."""
+LARGEST_FILE_BYTES = 1 << 28
+"""Most bytes of a file that is read."""
+MOST_POINTS, MOST_ANALOG_CHANNELS = 2_000, 5_000
+LONGEST_LABEL_CHARACTERS = 64
+LOG = logging.getLogger("lipmotion")
+SOFTWARE = "lipmotion"
+EYES = (("EYE_L", 0.5), ("EYE_R", -0.5))
+LEAST_SEEN_SHARE = 0.5
+"""Markers that are seen in a smaller share of the frames are left out; shorter gaps are bridged by straight lines."""
+MOST_CURVES = 255
+_POINT = re.compile(r"[xyz]_(\d{1,3})$")
+_UNLABELLED = re.compile(r"\*|[uc]_?\d+$|unlabel|point\d+$", re.IGNORECASE)
+
+
+def _numbers(content: bytes, kind: str, count: int, at: int, processor: int) -> Array:
+    """Return numbers of a processor as doubles; ``kind``: that of NumPy. Raises ValueError: there are not so many."""
+    order = ">" if processor == MIPS_PROCESSOR else "<"
+    if kind == "f4" and processor == DEC_PROCESSOR:  # words the other way round, exponents larger by 2
+        words = np.frombuffer(content, "<u2", 2 * count, at).reshape(-1, 2)[:, ::-1]
+        return np.ascontiguousarray(words).view("<f4")[:, 0].astype(np.float64) / 4
+    with np.errstate(invalid="ignore"):  # damaged numbers become NaN, as of markers that were not seen
+        return np.frombuffer(content, order + kind, count, at).astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class C3dFile:
+    """What a C3D file holds.
+
+    labels        : names of the N points
+    points        : places [shape=(T, N, 3)], in ``unit``; NaN where a marker was not seen
+    rate_hz       : frames per second
+    unit          : of the places: ``mm``, for instance
+    software      : the program that wrote it
+    analog        : curves beside the points, one sample a frame [shape=(T, A)]; none where there are several a frame
+    analog_labels, analog_units : of the A curves
+    """
+
+    labels: tuple[str, ...]
+    points: Array
+    rate_hz: float
+    unit: str = "mm"
+    software: str = ""
+    analog: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    analog_labels: tuple[str, ...] = ()
+    analog_units: tuple[str, ...] = ()
+
+
+def read_c3d(path: Path) -> C3dFile:
+    """Return the points of a file, and its analog channels if they have one sample a frame.
+
+    Raises InputError: not a C3D file, cut short, too large, of a processor that is not known, or sizes that disagree.
+    """
+    size = path.stat().st_size
+    if size > LARGEST_FILE_BYTES:
+        raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the capture into takes")
+    try:
+        return _parsed(path.read_bytes())
+    except InputError:
+        raise
+    except (struct.error, IndexError, ValueError, OverflowError) as error:
+        raise InputError(f"not a C3D file ({error}); export the capture again") from error
+
+
+def _parsed(content: bytes) -> C3dFile:
+    if len(content) < 2 * BLOCK or content[1] != MARK:
+        raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
+    start = (content[0] - 1) * BLOCK
+    processor = content[start + 3]
+    if processor not in {INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR}:
+        raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
+    found = _parameters(content, start + 4, processor)
+    words: list[int] = _numbers(content, "u2", 10, 0, processor).astype(int).tolist()
+    _, points, analog, first, last, _, _, _, block, samples = words
+    rate_hz = _number(found, "POINT.RATE", _numbers(content, "f4", 1, 20, processor)[0])
+    scale = _number(found, "POINT.SCALE", _numbers(content, "f4", 1, 12, processor)[0])
+    if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0):
+        raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
+    if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
+        raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
+    kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
+    data = content[(block - 1) * BLOCK :] if block > 1 else b""
+    held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
+    frames = _frames(found, last - first + 1, held, spare)
+    rows = _numbers(data, kind, frames * width, 0, processor).reshape(frames, width)
+    return _content(found, rows, points, scale, rate_hz, samples)
+
+
+def _frames(found: dict[str, Values], numbered: int, held: int, spare: int) -> int:
+    """Return how many frames there are: the largest number that is stated and held.
+
+    numbered : by the header, which cannot count on from 65,535, as whole parameters cannot
+    held     : as many would fit into the data;  spare : so many of them may be what fills its last block
+    Raises InputError: the data hold less than any number that is stated.
+    """
+    start, end = _number(found, "TRIAL.ACTUAL_START_FIELD", 1), _number(found, "TRIAL.ACTUAL_END_FIELD", 0)
+    counted, long = _number(found, "POINT.FRAMES", 0), _number(found, "POINT.LONG_FRAMES", 0)
+    stated = sorted({int(each) for each in (numbered, counted % (1 << 31), long, end - start + 1) if each >= 1})
+    fitting = [count for count in stated if count <= held]
+    if not fitting:
+        raise InputError(f"cut short: {held} frames of data, required {stated[0] if stated else 1}")
+    frames = fitting[-1]
+    for over in range(frames + OVERFLOW, held + 1, OVERFLOW):
+        if held < over + spare:  # a number that began at 0 again
+            frames = over
+    if frames == MOST_FRAMES and held > frames + spare:  # the end of what can be counted, and nothing beside it
+        frames = held
+    if frames != stated[-1]:
+        LOG.warning("it states %s frames and holds %d: %d are read", " or ".join(map(str, stated)), held, frames)
+    return frames
+
+
+def _content(found: dict[str, Values], rows: Array, points: int, scale: float, rate_hz: float, samples: int) -> C3dFile:
+    """Return the content from rows of numbers, one a frame [shape=(T, 4 · points + analog values)]."""
+    placed = rows[:, : points * 4].reshape(len(rows), points, 4)
+    places = placed[..., :3] * (1.0 if scale < 0 else scale)
+    unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
+    places[unseen] = np.nan
+    labels = [label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(found, name)]
+    labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
+    curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
+    names = [*_texts(found, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][: curves.shape[1]]
+    units = [*_texts(found, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
+    unit, software = (next(iter(_texts(found, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
+    exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
+    return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
+
+
+def _texts(found: dict[str, Values], name: str) -> list[str]:
+    values = found.get(name, [])
+    return values if isinstance(values, list) else []
+
+
+def _number(found: dict[str, Values], name: str, otherwise: float) -> float:
+    """Return a parameter; of two whole numbers the first is the lower half."""
+    values = found.get(name)
+    if not isinstance(values, np.ndarray) or not len(values):
+        return float(otherwise)
+    return float(values[0] + (1 << 16) * values[1] if len(values) == 2 else values[0])
+
+
+def _parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
+    groups: dict[int, str] = {}
+    found: list[tuple[int, str, Values]] = []
+    while at + 2 <= len(content) and content[at]:
+        length, group = abs(struct.unpack_from("b", content, at)[0]), struct.unpack_from("b", content, at + 1)[0]
+        name = content[at + 2 : at + 2 + length].decode("ascii").strip().upper()
+        body = at + 2 + length
+        step = int(_numbers(content, "i2", 1, body, processor)[0])
+        if group < 0:
+            groups[-group] = name
+        else:
+            found.append((group, name, _values(content, body + 2, processor)))
+        if step == 0:
+            break
+        if step < 0:
+            raise InputError(f"the parameter {shortened(name)!r} is before its own place; export the capture again")
+        at = body + step
+    return {f"{groups.get(group, '')}.{name}": values for group, name, values in found}
+
+
+def _values(content: bytes, at: int, processor: int) -> Values:
+    """Return the values of a parameter whose type stands at a place."""
+    kind, dimensions = struct.unpack_from("bB", content, at)
+    sizes = list(content[at + 2 : at + 2 + dimensions])
+    count = int(np.prod(sizes, dtype=np.int64)) if sizes else 1
+    data = content[at + 2 + dimensions : at + 2 + dimensions + count * abs(kind)]
+    if kind == -1:
+        width = sizes[0] if sizes else 1
+        texts = [data[start : start + width] for start in range(0, len(data), max(width, 1))]
+        return [text.decode("latin-1").rstrip("\0 ")[:LONGEST_LABEL_CHARACTERS] for text in texts]
+    if kind not in {1, 2, 4} or len(data) < count * kind:
+        raise InputError(f"a parameter of type {kind} and sizes {sizes} does not fit; export the capture again")
+    return _numbers(data, {1: "u1", 2: "u2", 4: "f4"}[kind], count, 0, processor)
+
+
+def write_c3d(path: Path, content: C3dFile) -> None:
+    """Write a file; texts are ASCII, numbers have single precision.
+
+    More frames than the header can number stand in ``TRIAL`` as two whole numbers each, and in ``POINT:LONG_FRAMES``.
+    """
+    frames, points = content.points.shape[:2]
+    numbered = min(frames, MOST_FRAMES)
+    curves = len(content.analog_labels)
+    groups: dict[str, dict[str, int | float | Values]] = {
+        "POINT": {
+            **{"USED": points, "SCALE": -1.0, "RATE": content.rate_hz, "DATA_START": 0, "FRAMES": numbered},
+            **{"LABELS": list(content.labels), "DESCRIPTIONS": [""] * points, "UNITS": [content.unit]},
+        },
+        "ANALOG": {
+            **{"USED": curves, "LABELS": list(content.analog_labels), "DESCRIPTIONS": [""] * curves},
+            **{"GEN_SCALE": 1.0, "OFFSET": np.zeros(curves, np.int16), "SCALE": np.ones(curves, np.float32)},
+            **{"UNITS": list(content.analog_units), "RATE": content.rate_hz},
+        },
+        "MANUFACTURER": {"SOFTWARE": [content.software]},
+    }
+    if frames > numbered:
+        groups["POINT"]["LONG_FRAMES"] = float(frames)
+        start, end = (np.array([number % OVERFLOW, number // OVERFLOW]) for number in (1, frames))
+        groups["TRIAL"] = {"ACTUAL_START_FIELD": start, "ACTUAL_END_FIELD": end}
+    blocks = -(-(4 + len(_section(groups))) // BLOCK)
+    groups["POINT"]["DATA_START"] = 2 + blocks
+    section = bytes([1, MARK, blocks, INTEL_PROCESSOR]) + _section(groups)
+    header = struct.pack("<BB5HfHHf", 2, MARK, points, curves, 1, numbered, 10, -1.0, 2 + blocks, 1, content.rate_hz)
+    seen = np.isfinite(content.points).all(axis=2)
+    data = np.zeros((frames, points * 4 + curves), "<f4")
+    placed = np.concatenate([content.points, np.where(seen, 0.0, -1.0)[..., None]], axis=2)
+    data[:, : points * 4] = np.nan_to_num(placed).reshape(frames, -1)
+    if curves:
+        data[:, points * 4 :] = content.analog
+    with path.open("wb") as file:
+        file.write(header.ljust(BLOCK, b"\0") + section.ljust(blocks * BLOCK, b"\0") + data.tobytes())
+        file.write(b"\0" * (-data.nbytes % BLOCK))
+
+
+def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
+    """Return groups and parameters as bytes."""
+    parts = []
+    for number, (group, parameters) in enumerate(groups.items(), 1):
+        parts.append(struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0))
+        for name, value in parameters.items():
+            body = _stored_parameter(value) + b"\0"
+            head = struct.pack("<bb", len(name), number) + name.encode()
+            parts.append(head + struct.pack("<h", 2 + len(body)) + body)
+    return b"".join(parts) + b"\0\0"
+
+
+def _stored_parameter(value: int | float | Values) -> bytes:
+    if isinstance(value, list):
+        width = max((len(text.encode("ascii", "replace")) for text in value), default=0)
+        texts = b"".join(text.encode("ascii", "replace").ljust(width) for text in value)
+        return struct.pack("<bBBB", -1, 2, width, len(value)) + texts
+    numbers = np.asarray(value)
+    kind = "<u2" if numbers.dtype.kind == "i" else "<f4"
+    sizes = bytes([numbers.ndim, *numbers.shape])
+    return struct.pack("<b", 2 if kind == "<u2" else 4) + sizes + numbers.astype(kind).tobytes()
+
+
+def check(motion: Motion) -> None:
+    """Raise ExportError if motion does not fit: no frames, or names that are no labels."""
+    if not len(motion.values):
+        raise ExportError("the motion has no frames, required at least one in .c3d")
+    if "" in motion.names:
+        raise ExportError("a channel has no name, required one in .c3d; write .json or .npz")
+    for text in [text for channel in motion.channels for text in (channel.name, channel.unit)]:
+        if not (
+            text.isascii() and text.isprintable() and text == text.strip() and len(text) <= LONGEST_LABEL_CHARACTERS
+        ):
+            raise ExportError(
+                f"the name or unit {text[:60]!r} of a channel does not fit into .c3d, required up to 64 ASCII "
+                "characters, without blanks at its ends"
+            )
+    points = len(_points(motion))
+    if max(len(motion.names) - 3 * points, points + len(EYES)) > MOST_CURVES:
+        raise ExportError(f"more than {MOST_CURVES} points, or other channels, which .c3d cannot name; write .npz")
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write all channels of the motion; points are those with x, y and z."""
+    motion, points = generation.motion, _points(generation.motion)
+    frames = len(motion.values)
+    places = [np.stack([motion[f"{axis}_{point}"] for axis in "xyz"], axis=1) for point in points]
+    places += [np.broadcast_to([x, 0.0, 0.0], (frames, 3)) for _, x in EYES]
+    held = {f"{axis}_{point}" for point in points for axis in "xyz"}
+    others = [column for column, name in enumerate(motion.names) if name not in held]
+    content = C3dFile(
+        labels=(*map(_label, points), *(name for name, _ in EYES)),
+        points=np.stack(places, axis=1) * MILLIMETRES,
+        rate_hz=motion.rate_hz,
+        software=SOFTWARE,
+        analog=motion.values[:, others].astype(np.float64),
+        analog_labels=tuple(motion.names[column] for column in others),
+        analog_units=tuple(motion.channels[column].unit for column in others),
+    )
+    write_c3d(path, content)
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the markers of a file as motion in the head's frame, and an empty timeline.
+
+    Markers named ``LIP_13`` or ``P13`` are that point of the face mesh; with the middles and corners of the lips among
+    them, ``opening``, ``width`` and ``outer`` are computed. Markers without a name are left out.
+    Raises InputError: not a C3D file, or no marker that is seen in half of the frames.
+    """
+    content = read_c3d(path)
+    if content.software == SOFTWARE:
+        eyes = {name for name, _ in EYES}
+        numbers = {column: MARKER.match(label) for column, label in enumerate(content.labels) if label not in eyes}
+        points = {column: found[1] for column, found in numbers.items() if found}
+        curves = zip(content.analog_labels, content.analog_units, strict=True)
+        channels = [Channel(name, unit or EYE_DISTANCE) for name, unit in curves]
+        channels += [Channel(f"{axis}_{point}") for point in points.values() for axis in "xyz"]
+        places = content.points[:, list(points)].reshape(len(content.points), -1) / MILLIMETRES
+        analog = content.analog[:, : len(content.analog_labels)]
+        values = np.concatenate([analog, places], axis=1) if len(analog) else places
+        return Motion(values, content.rate_hz, tuple(channels)), Timeline(())
+    named = {label.split(":")[-1].strip(): column for column, label in enumerate(content.labels)}
+    markers = {
+        name: bridged
+        for name, column in named.items()
+        if name and not _UNLABELLED.match(name) and (bridged := _bridged(content.points[:, column])) is not None
+    }
+    lost = [name for name in named if name and not _UNLABELLED.match(name) and name not in markers]
+    if not markers:
+        some = ", ".join(content.labels[:6])
+        raise InputError(f"no marker with a name is seen in half of the frames; the labels: {some or 'none'}")
+    if lost:
+        what = f"{len(lost)} of {len(lost) + len(markers)} markers are seen in less than half of the frames"
+        LOG.warning("%s: %s and left out: %s", path, what, ", ".join(lost[:8]))
+    return motion_of_markers(in_head_frame(markers, content.unit), content.rate_hz), Timeline(())
+
+
+def _points(motion: Motion) -> list[int]:
+    """Return the numbers of the points that have all three channels, in order."""
+    numbers = [int(found[1]) for name in motion.names if (found := _POINT.match(name)) and name.startswith("x")]
+    eyes = {Channel(f"{axis}_{point}") for point in numbers for axis in "xyz"} & set(motion.channels)
+    return [point for point in numbers if all(Channel(f"{axis}_{point}") in eyes for axis in "xyz")]
+
+
+def _label(point: int) -> str:
+    template = mouth_template()
+    return f"JAW_{point}" if point == CHIN or point in np.array(template.points)[template.jaw] else f"LIP_{point}"
+
+
+def _bridged(places: Array) -> Array | None:
+    """Return the places of a marker [shape=(T, 3)] without gaps, or None where it is hardly ever seen."""
+    seen = np.isfinite(places).all(axis=1)
+    if seen.mean() < LEAST_SEEN_SHARE or not seen.any():
+        return None
+    frames = np.arange(len(places))
+    return np.stack([np.interp(frames, frames[seen], axis[seen]) for axis in places.T], axis=1)
+
+
+MOTION_FORMAT = MotionFormat(write, read, check)

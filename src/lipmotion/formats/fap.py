@@ -1,0 +1,110 @@
+"""``.fap``: MPEG-4 facial animation parameters of lips and jaw, as text.
+
+Source: ISO/IEC 14496-2, Annex C, and the files of its reference software: a line ``2.1 NAME FPS FRAMES``; for each
+frame a line of 68 marks, which parameters follow, and a line with the number of the frame and their values. The
+parameters 1 (viseme) and 2 (expression) have four and six values; they are passed over, and never written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.formats.base import MotionFormat
+from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.meshes.fitting.facial_animation import FAP, PARAMETERS
+from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
+
+VERSION = "2.1"
+COUNT = 68
+MANY_VALUES = {1: 4, 2: 6}
+"""How many values the first two parameters have."""
+NAMES = {number: f"fap{number}_{name}" for number, name, *_ in PARAMETERS}
+LARGEST_VALUE = 1_000_000
+LONGEST_LINE = 1 << 14
+MOST_FRAMES = 10_000_000
+
+
+def check(motion: Motion) -> None:
+    """Raise ExportError if motion holds anything but these parameters."""
+    others = [name for name in motion.names if _number(name) is None]
+    if others or not motion.names:
+        raise ExportError(f"no parameters of MPEG-4 but {shortened(', '.join(others[:4])) or 'nothing'}; write .json")
+    if len({_number(name) for name in motion.names}) < len(motion.names):
+        raise ExportError("two channels are the same parameter of MPEG-4, required each once; write .json")
+
+
+def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write the parameters of every frame, rounded to whole numbers."""
+    motion = generation.motion
+    columns = sorted(range(len(motion.names)), key=lambda column: _number(motion.names[column]) or 0)
+    numbers = [_number(motion.names[column]) for column in columns]
+    mask = " ".join("1" if number in numbers else "0" for number in range(1, COUNT + 1))
+    name = "".join(letter if letter.isalnum() else "_" for letter in Path(source.get("file", "lipmotion")).stem)
+    with path.open("w", encoding="ascii", errors="replace", newline="\n") as file:
+        file.write(f"{VERSION} {name or 'lipmotion'} {motion.rate_hz:.9g} {len(motion.values)}\n")
+        for frame, row in enumerate(np.rint(motion.values[:, columns]).astype(int).tolist()):
+            file.write(f"{mask}\n{frame} {' '.join(map(str, row))}\n")
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the parameters of a file, and an empty timeline; where one is not given, it keeps its value.
+
+    Raises InputError: not such a file, cut short, or values that no face has.
+    """
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
+            head = next(lines, "").split()
+            if len(head) < 4 or not head[0].startswith("2."):
+                raise ValueError(f"it begins with {shortened(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
+            rate, frames = head[-2:]
+            held, used = _frames(lines, int(frames))
+    except ValueError as error:
+        raise InputError(f"not a file of facial animation parameters ({error}); export it again") from error
+    numbers = np.flatnonzero(used) + 1
+    channels = tuple(Channel(NAMES.get(int(number), f"fap{number}"), FAP) for number in numbers)
+    return Motion(held[:, numbers - 1].astype(np.float64), exact_rate(float(rate)), channels), Timeline(())
+
+
+def _frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Return the values of all parameters [shape=(T, 68)], and which of them are given in any frame [shape=(68,)]."""
+    rows: list[NDArray[np.int32]] = []
+    current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
+    if not 0 < count <= MOST_FRAMES:
+        raise ValueError(f"{count} frames, required 1 to {MOST_FRAMES}")
+    for frame in range(count):
+        marks, values = next(lines, "").split(), next(lines, "").split()[1:]
+        if len(marks) != COUNT or set(marks) - {"0", "1"}:
+            raise ValueError(f"frame {frame} of {count} has {len(marks)} marks, required {COUNT} of 0 or 1")
+        given = [number for number, mark in enumerate(marks, 1) if mark == "1"]
+        needed = sum(MANY_VALUES.get(number, 1) for number in given)
+        if len(values) != needed:
+            raise ValueError(f"frame {frame} of {count} has {len(values)} values, required {needed}")
+        skipped = sum(MANY_VALUES[number] for number in given if number in MANY_VALUES)
+        places = [number - 1 for number in given if number not in MANY_VALUES]
+        whole = [int(value) for value in values[skipped:]]
+        if max(map(abs, whole), default=0) > LARGEST_VALUE:
+            raise ValueError(f"frame {frame} has a value over {LARGEST_VALUE}")
+        current = current.copy()
+        current[places] = whole
+        used[places] = True
+        rows.append(current)
+    return np.stack(rows), used
+
+
+def _number(name: str) -> int | None:
+    """Return the number of a parameter by the name of its channel, or None."""
+    digits = name.removeprefix("fap").partition("_")[0]
+    fitting = (
+        name.startswith("fap") and digits.isascii() and digits.isdecimal() and len(MANY_VALUES) < int(digits) <= COUNT
+    )
+    return int(digits) if fitting else None
+
+
+MOTION_FORMAT = MotionFormat(write, read, check, curves="fap")

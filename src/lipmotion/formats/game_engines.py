@@ -1,0 +1,160 @@
+"""Animations of blendshapes for game engines, as text.
+
+``.anim``: an animation clip of Unity that moves blendshapes of the object that it is put on.
+``.tres``: an Animation of Godot 4 that moves the blend shapes of the root node of its AnimationPlayer.
+
+Unity's AnimationClip is as Unity 2019 and later serialise it (YAML), serializedVersion 6; weights go to 100. Godot's
+tracks (``TYPE_BLEND_SHAPE``) have keys of time, transition and value, one after another.
+In both, everything is linear between keys. Keys that a straight line between others replaces are left out, and held
+poses change at once (constant tangents; ``interp`` 0).
+
+Source: files of Unity; Godot 4, scene/resources/animation.cpp.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError
+from lipmotion.formats.base import MotionFormat, key_frames
+from lipmotion.types import WEIGHT, Generation, Motion
+
+Array = NDArray[np.float64]
+FULL = 100.0
+"""A blendshape's weight in Unity where it has its whole effect."""
+UNITY_TOLERANCE, GODOT_TOLERANCE = 0.01, 1e-4
+"""Largest error of a curve through the keys that are kept, of 100 and of 1."""
+UNITY_DECIMALS, GODOT_DECIMALS = 4, 5
+RENDERER = 137
+"""The class of SkinnedMeshRenderer."""
+LINEAR, CONSTANT = 69, 103
+"""Modes of the tangents of a key in Unity: straight, or held until the next key, on both sides."""
+RATE_HZ = 60.0
+_PLAIN = re.compile(r"[A-Za-z][\w.]*", re.ASCII)
+"""Names that need no quotes."""
+_EMPTY = ("m_RotationCurves", "m_CompressedRotationCurves", "m_EulerCurves", "m_PositionCurves", "m_ScaleCurves")
+NODE = "."
+"""The node whose blend shapes move in Godot: the root node of the AnimationPlayer itself."""
+FORBIDDEN = frozenset('".:@/%')
+"""Characters that no name in a path of Godot has."""
+
+
+def _weights(motion: Motion) -> list[str]:
+    return [channel.name for channel in motion.channels if channel.unit == WEIGHT]
+
+
+def _keys(generation: Generation, name: str, full: float, decimals: int, tolerance: float) -> tuple[Array, Array, bool]:
+    """Return times and values of the keys of a weight, and whether it is held between them."""
+    motion, held = generation.motion, name in generation.stepped
+    values: Array = np.round(full * motion[name].astype(np.float64), decimals) + 0.0
+    kept = key_frames(motion.time_s, values, tolerance, stepped=held)
+    return motion.time_s[kept], values[kept], held
+
+
+def check_unity(motion: Motion) -> None:
+    """Raise ExportError if motion has no weights, or fewer than two frames."""
+    if not _weights(motion) or len(motion.values) < 2:
+        raise ExportError("the motion has no blendshapes, or no two frames; write .json or .csv")
+
+
+def write_unity(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write one clip, named as the recording, with a curve for each weight of the motion."""
+    motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
+    end_s = float(motion.time_s[-1])
+    curves = [line for weight in _weights(motion) for line in _curve(generation, weight)]
+    lines = [
+        *("%YAML 1.1", "%TAG !u! tag:unity3d.com,2011:", "--- !u!74 &7400000", "AnimationClip:"),
+        *("  m_ObjectHideFlags: 0", "  m_CorrespondingSourceObject: {fileID: 0}", "  m_PrefabInstance: {fileID: 0}"),
+        *("  m_PrefabAsset: {fileID: 0}", f"  m_Name: {_quoted(name)}", "  serializedVersion: 6", "  m_Legacy: 0"),
+        *("  m_Compressed: 0", "  m_UseHighQualityCurve: 1", *(f"  {name}: []" for name in _EMPTY)),
+        *(
+            "  m_FloatCurves:",
+            *curves,
+            "  m_PPtrCurves: []",
+            f"  m_SampleRate: {motion.rate_hz:.9g}",
+            "  m_WrapMode: 0",
+        ),
+        *("  m_Bounds:", "    m_Center: {x: 0, y: 0, z: 0}", "    m_Extent: {x: 0, y: 0, z: 0}"),
+        *("  m_ClipBindingConstant:", "    genericBindings: []", "    pptrCurveMapping: []"),
+        *("  m_AnimationClipSettings:", "    serializedVersion: 2", "    m_AdditiveReferencePoseClip: {fileID: 0}"),
+        *("    m_AdditiveReferencePoseTime: 0", "    m_StartTime: 0", f"    m_StopTime: {end_s:.6f}"),
+        *("    m_OrientationOffsetY: 0", "    m_Level: 0", "    m_CycleOffset: 0", "    m_HasAdditiveReferencePose: 0"),
+        *("    m_LoopTime: 0", "    m_LoopBlend: 0", "    m_LoopBlendOrientation: 0", "    m_LoopBlendPositionY: 0"),
+        *("    m_LoopBlendPositionXZ: 0", "    m_KeepOriginalOrientation: 0", "    m_KeepOriginalPositionY: 1"),
+        *("    m_KeepOriginalPositionXZ: 0", "    m_HeightFromFeet: 0", "    m_Mirror: 0"),
+        *("  m_EditorCurves:", *curves, "  m_EulerEditorCurves: []", "  m_HasGenericRootTransform: 0"),
+        *("  m_HasMotionFloatCurves: 0", "  m_Events: []"),
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _quoted(name: str) -> str:
+    """Return a name as YAML has it: in quotes, where it needs some."""
+    return name if _PLAIN.fullmatch(name) else json.dumps(name, ensure_ascii=False)
+
+
+def _curve(generation: Generation, name: str) -> Iterator[str]:
+    times_s, keys, steps = _keys(generation, name, FULL, UNITY_DECIMALS, UNITY_TOLERANCE)
+    slopes = np.diff(keys) / np.diff(times_s)
+    yield from ("  - curve:", "      serializedVersion: 2", "      m_Curve:")
+    for number, (time_s, key) in enumerate(zip(times_s.tolist(), keys.tolist(), strict=True)):
+        before, after = slopes[max(number - 1, 0)], slopes[min(number, len(slopes) - 1)]
+        yield from (
+            *(
+                "      - serializedVersion: 3",
+                f"        time: {time_s:.6f}",
+                f"        value: {key:.{UNITY_DECIMALS}f}",
+            ),
+            f"        inSlope: {'Infinity' if steps else f'{before:.6g}'}",
+            f"        outSlope: {'Infinity' if steps else f'{after:.6g}'}",
+            *(f"        tangentMode: {CONSTANT if steps else LINEAR}", "        weightedMode: 0"),
+            *("        inWeight: 0.33333334", "        outWeight: 0.33333334"),
+        )
+    yield from ("      m_PreInfinity: 2", "      m_PostInfinity: 2", "      m_RotationOrder: 4")
+    attribute = f"blendShape.{name}"
+    yield f"    attribute: {_quoted(attribute)}"
+    yield from ("    path: ", f"    classID: {RENDERER}", "    script: {fileID: 0}")
+
+
+def check_godot(motion: Motion) -> None:
+    """Raise ExportError if motion has no weights, or a name that no path of Godot can have."""
+    names = _weights(motion)
+    if not names or not len(motion.values):
+        raise ExportError("the motion has no blendshapes, or no frames; write .json or .csv")
+    for name in names:
+        if FORBIDDEN & {*name}:
+            raise ExportError(
+                f'the blendshape {name!r} has one of the letters . : @ / % ", which Godot replaces; rename it'
+            )
+
+
+def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write one resource with a track for each weight of the motion."""
+    motion = generation.motion
+    lines = [
+        *('[gd_resource type="Animation" format=3]', "", "[resource]", 'resource_name = "speech"'),
+        *(f"length = {float(motion.time_s[-1]):.6g}", f"step = {1 / motion.rate_hz:.6g}"),
+    ]
+    for number, name in enumerate(_weights(motion)):
+        times_s, values, steps = _keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
+        keys = ", ".join(
+            f"{time_s:.6g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in zip(times_s, values, strict=True)
+        )
+        track = f"tracks/{number}"
+        lines += [
+            *(f'{track}/type = "blend_shape"', f"{track}/imported = false", f"{track}/enabled = true"),
+            f"{track}/path = NodePath({json.dumps(f'{NODE}:{name}', ensure_ascii=False)})",
+            *(f"{track}/interp = {0 if steps else 1}", f"{track}/loop_wrap = false"),
+            f"{track}/keys = PackedFloat32Array({keys})",
+        ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+UNITY = MotionFormat(write_unity, check=check_unity, curves="face", rate_hz=RATE_HZ, other_curves=True, keyed=True)
+GODOT = MotionFormat(write_godot, check=check_godot, curves="face", other_curves=True, keyed=True)

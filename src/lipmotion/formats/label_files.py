@@ -1,0 +1,448 @@
+"""Files of labels in time, by the suffix or by their content, and those of one recording, which lie beside it."""
+
+from __future__ import annotations
+
+import logging
+import re
+from dataclasses import dataclass, replace
+from io import StringIO
+from itertools import islice
+from pathlib import Path
+
+from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.formats.base import motion_suffix
+from lipmotion.formats.base import read_units as read_units_of_motion
+from lipmotion.formats.label_services import DamagedJsonError, described, is_json, service_tiers
+from lipmotion.formats.label_tiers import (
+    LINES,
+    OTHER,
+    PHONE_LABELS,
+    RECOGNISED_LABEL,
+    RECOGNISED_PHONES,
+    WORDS,
+    LabelTier,
+    TimedLabel,
+    holds_phones,
+    in_inventory,
+    in_seconds,
+    merged_timelines,
+    phone_timeline,
+    tier_transcript,
+    tiers_of_speakers,
+    with_words,
+)
+from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, subtitle_tier, write_subrip, write_webvtt
+from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
+from lipmotion.formats.timed_lines import line_tiers
+from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, xml_tiers
+from lipmotion.printable import is_line
+from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import check_kind
+from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
+from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, phone_named, with_confidences
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
+from lipmotion.units.mood_tags import tagged_text, without_known_tags
+from lipmotion.units.text_normalisation import checked_tokens
+from lipmotion.units.written_forms import readings
+
+LOG = logging.getLogger("lipmotion")
+RECOGNISED = tuple(".srt .vtt .ass .ssa .sbv .lrc .ttml .dfxp .json .jsonl .ctm .stm .tsv".split())
+"""Suffixes of subtitles and of what recognisers write."""
+FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNISED)
+"""Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
+may be recognised last."""
+FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
+"""Suffixes in whose files phones are searched, in order."""
+LARGEST_LABELS = 1 << 24
+"""Most bytes of a label file: labels of a day."""
+MOTION = re.compile(r'"lipmotion\.motion"|time_s,')
+"""How our own motion files begin: a quick answer for large ones."""
+MASTER = "#!MLF!#"
+"""The start of HTK's master label files, which hold the labels of many recordings."""
+MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
+"""The start of RTF, HTML, XML and JSON."""
+JUDGED_LINES = 1000
+"""Lines of a text that are judged for whether they hold times."""
+NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
+TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
+"""Seconds with decimals, or a number that counts parts of a second."""
+NAMED_TIERS = 12
+"""Most names in a message."""
+READABLE = (".textgrid", ".eaf", ".lab", ".phn", ".txt", ".json", ".jsonl", ".marks", ".csv", ".tsv")
+"""Suffixes of files of phones in time, in lower case; their content decides which form they have. ``.json`` and
+``.csv`` may also be motion."""
+_WRITERS = {".TextGrid": write_textgrid, ".vtt": write_webvtt, ".srt": write_subrip}
+LABEL_SUFFIXES = tuple(_WRITERS)
+"""Suffixes of label files that are written, as programs write them; capitals do not matter."""
+
+
+@dataclass(frozen=True)
+class RecordingLabels:
+    """The transcript and the phones of a recording, from its label files.
+
+    transcript : what is said, with the times that the file gives, or None
+    phones     : phones in time without gaps, or None; the end of the last may be infinite
+    """
+
+    transcript: TimedTranscript | None = None
+    phones: Timeline[Unit] | None = None
+
+    @property
+    def words(self) -> tuple[str, ...] | None:
+        """The words of the transcript, lower case, as they are usually read, or None."""
+        said = self.transcript.words if self.transcript else ()
+        return tuple(word for token in said for word in readings(token)[0]) or None
+
+
+def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
+    """Return the labels from the files beside a recording that have its name, with a suffix of ``FOR_WORDS``.
+
+    Those of ``RECOGNISED`` may have a language as well (``take.en.vtt``), or the whole name (``take.mp4.srt``); JSON
+    that is no transcript, as motion, is passed over.
+    ignored : files that are no labels (the lists of the splits)
+    Raises InputError: one of them cannot be read.
+    """
+    seen: list[Path] = []
+    found: list[tuple[Path, RecordingLabels]] = []
+    for path in label_files_beside(recording):
+        if path not in ignored and not any(path.samefile(other) for other in seen):
+            labels = _read(path, unknown_json=path.suffix == ".json")
+            found += [(path, labels)] if labels is not None else []
+            seen.append(path)
+    in_order = sorted(found, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
+    transcripts = (labels.transcript for _, labels in found if labels.transcript)
+    return RecordingLabels(next(transcripts, None), next((each.phones for _, each in in_order if each.phones), None))
+
+
+def label_files_beside(recording: Path) -> list[Path]:
+    """Return the files beside a recording that ``labels_beside`` reads, in the order of ``FOR_WORDS``."""
+    names: list[Path] = []
+    for suffix in dict.fromkeys((*FOR_WORDS, *FOR_PHONES)):
+        names.append(recording.with_suffix(suffix))
+        if suffix in RECOGNISED:
+            names += [recording.with_suffix(f".en{suffix}"), recording.with_name(recording.name + suffix)]
+    return [path for path in names if path.is_file()]
+
+
+def read_labels(path: Path) -> RecordingLabels:
+    """Return the words and phones of one file.
+
+    Read are TextGrids, ELAN's ``.eaf``, labels with times (HTK, Audacity, TIMIT), tables, subtitles, the JSON of
+    recognisers, voices and aligners, CTM, the texts of LRS, and plain text; the content decides, not the name.
+    Phones of which some are unknown are left out, with a warning.
+    Raises InputError: not text, damaged, overlapping phones, or labels among phones that are no phones.
+    """
+    return _read(path, unknown_json=False) or RecordingLabels()
+
+
+def read_transcript(path: Path | str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
+    """Return the text of a file of plain text, or the words in time of one of another kind that ``read_labels`` reads.
+
+    path : or a text itself, of which subtitles alone are read
+    tier, speaker : which tier and whose words; empty: all that hold words are read, and a warning names the speakers
+    Raises InputError: as ``read_labels``, no such file, phones without words, or no such tier or speaker.
+    """
+    if isinstance(path, str) and not is_subtitles(path):
+        return path
+    text, path = (path, Path("the transcript")) if isinstance(path, str) else (_text(path, "transcript"), path)
+    tiers = _timed_tiers(text, str(path))
+    if tiers is None:
+        _check_plain(text, path)
+        return text
+    transcript = _transcript(tiers, str(path), tier, speaker)
+    if transcript is None:
+        what = "phones in time, but no words; give them as units" if any(map(holds_phones, tiers)) else "no word"
+        raise InputError(f"{path}: the transcript holds {what}")
+    return transcript
+
+
+def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]:
+    """Return the phones in time of a TextGrid or of another file of labels with times; they may have gaps.
+
+    They have the words of the tier of words, and are recognised, not known, where the tier of recognised phones has the
+    same. Vowels stay as they are labelled, whatever words another tier has; the end of the last phone may be infinite.
+    Speech of which the phones are not known (``spn``, ``<unk>``) has the unit ``units.UNKNOWN_PHONES``, and its word
+    where that is known.
+    tier, speaker : which tier and whose phones; empty: those of all speakers, whom a warning names
+    Raises InputError: no such file or tier or speaker, as ``read_labels``, or no phones in time.
+    """
+    text, where = _text(path, "units"), str(path)
+    tiers = _chosen(_timed_tiers(text, where) or [], where, tier, speaker)
+    phones = _tiers_of_phones(tiers, where)
+    if not phones and any(each.role in (WORDS, LINES) for each in tiers):
+        raise InputError(f"{where}: holds words in time, but no phones; give it as a transcript (--transcript)")
+    if not phones:
+        held = f"{described(text, where)}; " if is_json(text) else "holds no phones in time, "
+        raise InputError(
+            f"{where}: {held}required a motion file (.json, .npz), a TextGrid with a tier of "
+            "phones, or labels with times, one phone a line"
+        )
+    _name_speakers(phones, where)
+    units = merged_timelines(
+        [with_words(phone_timeline(each, (), where, with_gaps=True), _words_of(each, tiers)) for each in phones]
+    )
+    recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
+    found = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
+    rows = (RecognisedPhone(each.start_s, each.end_s, match[1], float(match[2])) for each, match in found if match)
+    return units if recognised is None else with_confidences(units, rows)
+
+
+def speakers_in(path: Path) -> tuple[str, ...]:
+    """Return the speakers whom a file of labels names, none of another or a damaged file."""
+    if not path.is_file() or path.stat().st_size > LARGEST_LABELS:
+        return ()
+    try:
+        tiers = _timed_tiers(_text(path), "") or []
+    except InputError:  # said by the reader
+        return ()
+    return tuple(dict.fromkeys(tier.speaker for tier in tiers_of_speakers(tiers) if tier.speaker))
+
+
+def holds_timings(path: Path) -> bool:
+    """Return whether a file has the timings of a voice or an aligner; False: it is another file, or no file at all."""
+    if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_LABELS:
+        return False
+    text = _text(path)
+    try:
+        if MOTION.search(text[:64]):
+            return False
+        return bool(service_tiers(text, "")) if is_json(text) else line_tiers(text, "") is not None
+    except InputError as error:  # said by the reader, if it is damaged by that of motion
+        return not isinstance(error, DamagedJsonError)
+
+
+def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
+    """Return the labels of a file; None for JSON of another kind, if that is expected, else an error."""
+    text = "" if unknown_json and path.stat().st_size > LARGEST_LABELS else _text(path)
+    tiers = _timed_tiers(text, str(path)) if is_json(text) or not unknown_json else None
+    if tiers is not None or unknown_json:
+        return None if tiers is None else _labels(tiers, str(path))
+    _check_plain(text, path)
+    text, tags = tagged_text(text)
+    tokens = text.split()
+    one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
+    if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
+        raise InputError(f"{path}: a list of phones without times; add their times, or give the words instead")
+    if not tokens:
+        LOG.warning("%s: is empty: it counts as no transcript; write the words that are said, or remove it", path)
+        return RecordingLabels()
+    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, checked_tokens(text)))),), tags))
+
+
+def _labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
+    """Return the words and the phones of tiers. Raises InputError: there are labels, and none is a phone or a word."""
+    chosen = _chosen(tiers, where)
+    phones = _tiers_of_phones(chosen, where)
+    transcript = _transcript(tiers, where)
+    if not phones:
+        if transcript is None and any(tier.role != LINES and tier.labels for tier in chosen):
+            raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
+        return RecordingLabels(transcript)
+    several = len(phones) > 1
+    timeline = merged_timelines(
+        [phone_timeline(tier, _words_of(tier, chosen), where, with_gaps=several) for tier in phones]
+    )
+    unknown = [span for span in timeline if span.label.unit == UNKNOWN_PHONES]
+    if unknown:
+        LOG.warning(
+            "%s: the phones of %d stretches of speech are not known, the first at %.2f s; its phones are left out, and "
+            "its words are aligned",
+            where,
+            len(unknown),
+            unknown[0].start_s,
+        )
+    return RecordingLabels(transcript, None if unknown else timeline)
+
+
+def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
+    """Return the tiers of a text whose form has times, in the phones of the inventory; None of any other text."""
+    try:
+        if is_textgrid(text):
+            tiers: list[LabelTier] | None = in_seconds(parse_interval_tiers(text, where), where)
+        elif (found := ROOT.match(text)) and found[1] in READ_ROOTS:
+            tiers = xml_tiers(text, where)
+        elif is_subtitles(text):
+            tiers = [subtitle_tier(text, where)]
+        else:
+            tiers = service_tiers(text, where) if is_json(text) else line_tiers(text, where)
+    except RecursionError as error:
+        raise InputError(f"{where}: is nested too deeply; give the words in time alone") from error
+    return None if tiers is None else [in_inventory(tier, where) for tier in tiers]
+
+
+def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> list[LabelTier]:
+    """Return the tiers that are said or seen, of those the ones that are asked for.
+
+    tier, speaker : names, in any case; of a tier, all of its speaker stay that hold something else
+    Raises InputError: there is no such tier or speaker.
+    """
+    tiers = tiers_of_speakers(tiers)
+    if speaker:
+        tiers = [each for each in tiers if each.speaker.lower() == speaker.lower()] or _refuse(
+            "speaker", speaker, [each.speaker for each in tiers], where
+        )
+    if tier:
+        named = next((each for each in tiers if each.name.lower() == tier.lower()), None)
+        if named is None and any(each.speaker.lower() == tier.lower() for each in tiers):
+            return _chosen(tiers, where, speaker=tier)
+        named = named or _refuse("tier", tier, [each.name for each in tiers], where)[0]
+        if not named.role or named.role == OTHER:
+            named = replace(named, role=PHONE_LABELS if holds_phones(replace(named, role="")) else LINES)
+        same = (WORDS, LINES, "", OTHER) if named.role in (WORDS, LINES) else (PHONE_LABELS,)
+        others = [each for each in tiers if each.role not in same and each.speaker == named.speaker]
+        return [in_inventory(named, where), *(each for each in others if each.role and each.name != named.name)]
+    return [each for each in tiers if each.role != OTHER]
+
+
+def _refuse(kind: str, name: str, known: list[str], where: str) -> list[LabelTier]:
+    """Raise InputError: there is no such speaker or tier."""
+    names = ", ".join(map(repr, list(dict.fromkeys(filter(None, known)))[:NAMED_TIERS])) or "none with a name"
+    raise InputError(f"{where}: has no {kind} {shortened(name)!r}; it has: {names}")
+
+
+def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
+    """Return the tiers of phones, one of each speaker. Raises InputError: a speaker has several."""
+    phones: dict[str, LabelTier] = {}
+    for tier in filter(holds_phones, tiers):
+        if tier.speaker in phones:
+            first = phones[tier.speaker].name
+            raise InputError(f"{where}: tier {first!r} and tier {tier.name!r} both hold phones; choose one with --tier")
+        phones[tier.speaker] = tier
+    return list(phones.values())
+
+
+def _transcript(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> TimedTranscript | None:
+    """Return the words of the best tier of each speaker: one of words, of lines, or else the first of another kind."""
+    chosen = [each for each in _chosen(tiers, where, tier, speaker) if not holds_phones(each)]
+    best: dict[str, LabelTier] = {}
+    for role in (WORDS, LINES, ""):
+        for each in chosen:
+            if each.role == role and any(label.text or label.parts for label in each.labels):
+                best.setdefault(each.speaker, each)
+    if any(best):
+        best.pop("", None)
+    first = best.get("")
+    others = [each.name for each in chosen if first and not first.role and each is not first and each.labels]
+    if first and others:
+        names = ", ".join(map(repr, others[:NAMED_TIERS]))
+        LOG.warning("%s: the words of tier %r are read; others are %s; --tier chooses", where, first.name, names)
+    _name_speakers(list(best.values()), where)
+    transcript = tier_transcript(list(best.values()), where)
+    return transcript if transcript.lines else None
+
+
+def _name_speakers(tiers: list[LabelTier], where: str) -> None:
+    """Log a warning if tiers are of several speakers."""
+    speakers = [tier.speaker for tier in tiers if tier.speaker]
+    if len(speakers) > 1:
+        names = ", ".join(map(shortened, speakers[:NAMED_TIERS]))
+        LOG.warning("%s: %d people speak: %s; all are read; --tier NAME chooses one", where, len(speakers), names)
+
+
+def _words_of(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ...]:
+    """Return the words in time of the speaker of some phones; none where labels hold several."""
+    said = [tier for tier in tiers if tier.speaker == phones.speaker and not holds_phones(tier)]
+    words = next((tier.labels for role in (WORDS, "") for tier in said if tier.role == role), ())
+    return words if all(len(label.text.split()) < 2 for label in words) else ()
+
+
+def read_plain_text(path: Path) -> str:
+    """Return the text of a file of words alone.
+
+    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT_BYTES``, not UTF-8 text, or labels in time.
+    """
+    text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT_BYTES)
+    check_plain_text(text, str(path))
+    return text
+
+
+def check_plain_text(text: str, where: str) -> None:
+    """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words.
+
+    where : the file's name, for messages
+    """
+    if is_textgrid(text) or line_tiers(text, where) is not None:
+        raise InputError(f"{where}: holds labels in time, required the words alone; write them into a text file")
+    _check_no_labels(text, where)
+
+
+def _check_no_labels(text: str, where: str) -> None:
+    """Raise InputError for labels, subtitles and documents in forms that are not read."""
+    start, found = text[:200].lstrip(), NO_ARROW.search(text)
+    line = shortened(found[0].strip()) if found else ""
+    clock = "00:00:01,000 --> 00:00:02,500"
+    timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
+    forms = {
+        "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
+        "is a master label file of many recordings; write a .lab beside each": start.startswith(MASTER),
+        f"begins with {shortened(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
+        "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),
+        f"has the line {line!r}, two times as in subtitles; required: times as in {clock}, or the words alone": found,
+        f"{timed}; save it in one of these forms, or give the words alone": _seems_timed(text),
+    }
+    wrong = next((message for message, is_so in forms.items() if is_so), None)
+    if wrong is not None:
+        raise InputError(f"{where}: {wrong}")
+
+
+def _seems_timed(text: str) -> bool:
+    """Return whether most of the first lines begin with a number and some with a time, or half hold two times."""
+    lines = numbered = timed = with_two = 0
+    header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
+    body = (line.strip() for line in StringIO(text[header.end() if header else 0 :]))
+    for line in islice(filter(None, body), JUDGED_LINES):
+        lines += 1
+        numbered += NUMBERED.match(line) is not None
+        times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))
+        timed += TIME.match(line) is not None
+        with_two += times > 1
+    return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * with_two >= lines)
+
+
+def _check_plain(text: str, path: Path) -> None:
+    """Raise InputError for a text that is no plain text, or more than a transcript has."""
+    if len(text) > LARGEST_TRANSCRIPT_BYTES:
+        raise InputError(
+            f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT_BYTES}: is it a transcript?"
+        )
+    if is_json(text):
+        raise InputError(f"{path}: {described(text, str(path))}")
+    _check_no_labels(without_known_tags(text), str(path))
+
+
+def _text(path: Path, kind: str = "label") -> str:
+    return read_text_file(path, kind, LARGEST_LABELS, western=True)
+
+
+def read_units(path: str | Path, tier: str = "", speaker: str = "") -> Timeline[Unit]:
+    """Return the phones in time of a file.
+
+    path : a motion file (``.json``, ``.npz``); a ``.json`` with the member ``units`` alone; or any file of labels that
+           corpora may have (``READABLE``): a TextGrid with a tier of phones, Audacity's or HTK's labels, the
+           timings of a voice or an aligner
+    tier, speaker : of labels, which tier and whose phones (``read_phones``)
+    Raises InputError: no such file, not one of these, or without phones.
+    """
+    path = Path(path)
+    check_kind(path, "motion file", "units file")
+    is_label = path.suffix.lower() in READABLE
+    if motion_suffix(path) and not (is_label and holds_timings(path)):
+        return read_units_of_motion(path)
+    if is_label:
+        return read_phones(path, tier, speaker)
+    required = "use one of .json, .npz, .TextGrid, .eaf, .lab, .txt, .jsonl, .marks"
+    raise InputError(f"{path}: cannot read phones from {path.suffix!r}; {required}")
+
+
+def write_labels(path: Path, units: Timeline[Unit]) -> None:
+    """Write phones and words in time in the format of the suffix.
+
+    Raises ExportError: a label that is no line of text, or the file cannot be written.
+    """
+    for label in [span.label for span in units]:
+        if not is_line(label.phone + label.unit + label.word):
+            raise ExportError(
+                f"{path}: {shortened(repr(label))} has a line end, a control character or half a character"
+            )
+    write = next(write for suffix, write in _WRITERS.items() if suffix.lower() == path.suffix.lower())
+    write(path, units)

@@ -1,0 +1,584 @@
+"""JSON of services: words and phones in time of recognisers, voices and aligners, by one table of their shapes.
+
+What a file is follows from the names in it, whatever their spelling (``start_time``, ``StartTime``, ``privStartTime``),
+and the unit of its times from how long its words last. Whatever else a service writes is passed over.
+
+Source: the public documentation of each service; figures and names of fields alone.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import re
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.base import next_at
+from lipmotion.formats.label_tiers import (
+    EARLIEST_S,
+    LINES,
+    PHONE_LABELS,
+    TICKS_PER_S,
+    WORDS,
+    LabelTier,
+    TimedLabel,
+    check_count,
+    in_seconds,
+    ipa_labels,
+    named_tier,
+    unit_of_times,
+    with_pauses,
+)
+from lipmotion.types import values
+from lipmotion.types.values import clock_seconds, number_of, require
+from lipmotion.units import SILENCE
+from lipmotion.units.spoken_text import check_word_count, spoken_text
+from lipmotion.units.text_normalisation import words_in
+
+LOG = logging.getLogger("lipmotion")
+_TEXT = values.text(1 << 20)
+Objects = list[tuple[str, dict[str, Any]]]
+"""Objects of a file, each with its place, for messages."""
+LATEST_S = 1e6
+"""Times beyond eleven days are an error, or in another unit."""
+SINGLE_SHARE, LONGEST_JUDGED, DEEPEST = 0.9, 1000, 12
+"""A list is one of words where so many of its texts are single ones; letters of a text that are judged; how deep lists
+are searched in lists."""
+ROUNDING_S = 1.0
+"""An end may be so much before its start; recognisers write that at the edges of their windows."""
+
+
+class Times(NamedTuple):
+    """The names of the times of an item; ``per_s``: how many are a second, 0: how long words last decides.
+
+    usual  : how many usually are, where nothing can be told; 0: their own form must say it, else they are frames
+    pieces : tokens are pieces of words, and one without a blank before it goes on with the word ahead of it
+    """
+
+    start: str
+    end: str = ""
+    duration: str = ""
+    per_s: int = 0
+    usual: int = 1
+    pieces: bool = False
+
+
+POLLY = Times("time", usual=1000)
+SPEECHIFY = Times("starttime", "endtime", "duration", 1000)
+"""Of marks whose start and end are places in the text."""
+TIMES = (
+    Times("offsetsfrom", "offsetsto", per_s=1000),  # whisper.cpp
+    Times("timestampstart", "timestampend", per_s=1),  # transformers
+    Times("startms", "endms", "durationms", 1000, pieces=True),  # Soniox
+    Times("starttimems", "endtimems", "durationms", 1000),
+    Times("starttime", "endtime", "duration"),  # AWS, Google, Yandex, Speechmatics, Qwen3-ASR, servers of Kokoro
+    Times("start", "end", "duration"),  # Whisper, Vosk, Deepgram, AssemblyAI (ms), Gladia, ElevenLabs, Gentle
+    Times("startts", "endts", per_s=1),  # Kokoro
+    Times("ts", "endts", "duration", 1),  # Rev.ai
+    Times("begin", "end", "dur"),  # aeneas
+    Times("tstartms", "", "ddurationms", 1000),  # YouTube, json3
+    Times("offsetinticks", "", "durationinticks", TICKS_PER_S),  # Azure, batch transcription
+    Times("offsetmilliseconds", "", "durationmilliseconds", 1000),  # Azure, fast transcription
+    Times("audiooffset", "", "duration", usual=TICKS_PER_S),  # Azure, speech synthesis
+    Times("offset", "", "duration", usual=TICKS_PER_S),  # Azure, speech recognition
+    Times("startoffset", "endoffset", usual=0),  # Google, version 2 ("0.1s"); NeMo's are frames
+    Times("timestart", "timeend"),  # PlayHT
+    Times("timebegin", "timeend", per_s=1000),  # MiniMax, Hume
+    Times("from", "to"),
+    Times("timeseconds", per_s=1),  # Google, text to speech
+    Times("", "resultendtime", per_s=1),  # Google, a result without words
+    Times("", "resultendoffset", per_s=1),
+)
+TEXTS = (
+    "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
+    "displaytext segs alternatives nbest"
+).split()
+"""The names of what is said, in order; of alternatives it is the first one."""
+ALTERNATIVES = ("alternatives", "nbest")
+WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints", "timestampedwords")
+"""Members that hold words in time, within a line or alone."""
+LINE_LISTS = (
+    "segments transcription utterances monologues events chunks fragments channels recognizedphrases sentences phrases "
+    "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
+).split()
+"""Members in which lines or further lists are searched, in this order."""
+MISSED = "not-found-in-audio"
+"""Gentle's case of a word that is not said."""
+KINDS = ("type", "boundarytype", "kind", "category")
+NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
+"""Kinds of items that are no words."""
+SPEAKERS = "speaker speakerid speakerlabel speakertag channellabel channeltag channel".split()
+POLLY_VISEMES = {
+    "sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s",
+    "l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao",
+    "B": "v", "D": "dh", "J": "n", "G": "g", "x": "k", "w": "w",
+}  # fmt: skip
+"""A phone with the mouth of each viseme of Amazon Polly; those of the last row are of other languages than English."""
+AZURE_VISEMES = "sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split()
+"""A phone with the mouth of each of Azure's 22 visemes, by its number."""
+KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
+KOKORO_FRAMES_PER_S = 40
+"""Durations are in frames of 600 samples at 24 kHz."""
+EVENTS = ("audiooffset", "time", "timeseconds")
+"""Starts of events, which last to the next one: of Azure, of Amazon Polly, of Google's marks."""
+POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
+MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")
+"""A name of one of Google's marks that is the word after it."""
+COLUMNS = (
+    ("characters", ("characters", "characterstarttimesseconds", "characterendtimesseconds"), 1),  # ElevenLabs
+    ("characters", ("chars", "charstarttimesms", "chardurationsms"), 1000),  # ElevenLabs' web socket
+    ("characters", ("chars", "charstarttimesms", "charsdurationsms"), 1000),
+    ("characters", ("tokens", "timestamps"), 1),  # sherpa-onnx, pieces of words that last to the next one
+    (WORDS, ("words", "wordstarttimeseconds", "wordendtimeseconds"), 1),  # Inworld
+    (WORDS, ("words", "start", "end"), 1),  # Cartesia, word_timestamps
+    (PHONE_LABELS, ("phonemes", "start", "end"), 1),  # Cartesia, phoneme_timestamps
+)
+"""Parallel lists of texts, starts and ends (durations where they are named so), and how many units are a second."""
+COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps", "wordalignment")
+SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
+"""A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
+TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
+"""Members of what a recogniser says without times."""
+KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
+DIGITS = re.compile(r"(?:PT)?([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
+
+
+class DamagedJsonError(InputError):
+    """A text that begins as JSON is none."""
+
+
+UNTIMED = Times("")
+
+
+@dataclass(frozen=True)
+class Row:
+    """An item of a list: its times as they stand, NaN where they are missing, their names, and what it is."""
+
+    start: float
+    end: float
+    text: str
+    place: str
+    times: Times = UNTIMED
+    speaker: str = ""
+    role: str = ""
+    parts: tuple[Row, ...] = ()
+
+
+def is_json(text: str) -> bool:
+    """Return whether a text begins as an object or a list of objects does."""
+    return re.match(r'\s*(?:\{\s*["}]|\[\s*[\[{\]])', text) is not None
+
+
+def service_tiers(text: str, where: str) -> list[LabelTier] | None:
+    """Return the tiers of words, lines and phones of the JSON of a service; None: it has none.
+
+    where : the file's name, for messages
+    Raises InputError: it is damaged (with its line), a symbol in it is not known, or a time is none.
+    """
+    numbered = [(f"line {line}", value) for line, value in _documents(text, where)]
+    if len(numbered) == 1 and isinstance(numbered[0][1], list):
+        numbered = [(f"item {number}", value) for number, value in enumerate(numbered[0][1], 1)]
+    objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
+    if not objects or any("mouthcues" in item or {"format", "channels"} <= item.keys() for _, item in objects):
+        return None
+    for reader in (_column_tiers, _duration_tiers, _named_tiers):
+        tiers = reader(objects, where)
+        if tiers is not None and not any(tier.labels for tier in tiers):
+            raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
+        if tiers is not None:
+            break
+    else:
+        tiers = _listed_tiers(objects, where) if len(objects) == len(numbered) else None
+    return tiers and [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
+
+
+def described(text: str, where: str) -> str:
+    """Return what JSON is that holds no words in time, for a message."""
+    value = next(_documents(text, where), (1, None))[1]
+    first = value[0] if isinstance(value, list) and value else value
+    names = list(first) if isinstance(first, dict) else []
+    for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
+        if name in names:
+            return f"holds {what}, which is motion and no labels; render it"
+    named = ", ".join(map(shortened, names[:8])) or "no names"
+    return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
+
+
+def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
+    """Yield the values of a text, one after another, each with the number of its first line.
+
+    Names of members are in lower case, without underscores and JavaScript's ``priv``; those of tiers stay.
+    Raises DamagedJsonError: with the line.
+    """
+
+    def plain(name: str) -> str:
+        return name if " " in name else name.replace("_", "").lower().removeprefix("priv")
+
+    decoder = json.JSONDecoder(
+        object_pairs_hook=lambda pairs: {plain(name): value for name, value in pairs},
+        parse_constant=lambda _: None,  # NaN: missing
+    )
+    at, line, counted = next_at(text, 0), 1, 0
+    while at < len(text):
+        line, counted = line + text.count("\n", counted, at), at
+        try:
+            value, at = decoder.raw_decode(text, at)
+        except json.JSONDecodeError as error:
+            raise DamagedJsonError(
+                f"{where}: line {error.lineno}: damaged JSON ({error.msg}); write it again"
+            ) from error
+        except (ValueError, RecursionError) as error:
+            raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
+        yield line, value
+        at = next_at(text, at)
+
+
+def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
+    """Return a time, NaN where it is missing, and how many such are a second where its form says that, else ``per_s``.
+
+    Times are numbers, texts (``"1.5"``, ``"1.500s"``, ``"PT1.5S"``, ``"00:00:01,500"``), or seconds with nanos.
+    Raises InputError: it is none of these.
+    """
+    if isinstance(value, dict) and value.keys() & {"seconds", "nanos"}:
+        seconds, nanos = (_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
+        return seconds + nanos / 1e9, 1
+    if not isinstance(value, str):
+        missing = value in (None, -1)  # some services write -1 where they have none
+        return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
+    found, clock_s = DIGITS.fullmatch(value.strip()), clock_seconds(value)
+    if found is None and not math.isnan(clock_s):
+        return clock_s, 1
+    if found is not None:
+        value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
+    if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
+        return math.nan, per_s
+    return number_of(value, f"{where}: a time is", "a number of seconds"), per_s
+
+
+def _seconds(value: Any, where: str, per_s: float = 1) -> float:
+    """Return a time in seconds. Raises InputError: it is missing, or no number."""
+    time, own = _number(value, where)
+    if math.isnan(time):
+        raise InputError(f"{where} has no time")
+    if abs(time / (own or per_s)) > LATEST_S:
+        raise InputError(f"{where}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
+    return time / (own or per_s)
+
+
+def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
+    """Return an item with its text and the times that it has; None: it has no text."""
+    text = next((text for name in TEXTS if name in item and (text := _text(item[name])) is not None), None)
+    role = WORDS if "word" in item or name in WORD_LISTS else ""
+    if text is None and any(item.get(name) for name in ("text", "word")):
+        found = shortened(repr(item.get("text") or item.get("word"))[:200])
+        raise InputError(f"{where}: {place}: its text is {found}, required a text")
+    if "visemeid" in item or item.get("type") == "viseme":
+        text, role = _viseme(item.get("visemeid", item.get("value")), f"{where}: {place}"), PHONE_LABELS
+    if text is not None and "markname" in item and not MARK.fullmatch(text):
+        raise InputError(
+            f"{where}: {place} is the mark {shortened(text)!r}, which is no word; name every mark as the word that "
+            'follows it, <mark name="hello"/>hello, or give the words as a transcript'
+        )
+    start, end, times = _times(item, f"{where}: {place}")
+    return None if text is None else Row(start, end, text, place, times, _speaker(item), role)
+
+
+def _times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
+    """Return the start and the end of an item by the first row of ``TIMES`` that it has."""
+    stamp, given = item.get("timestamp"), item
+    if isinstance(stamp, list) and len(stamp) == 2:
+        given = {**given, "timestampstart": stamp[0], "timestampend": stamp[1]}
+    for name in ("time", "offsets"):  # an object of both
+        if isinstance(item.get(name), dict):
+            given = {**given, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
+    times = next((row for row in TIMES if (row.start or row.end) in given), UNTIMED)
+    if item.get("type") in POLLY_KINDS and times not in TIMES[:2]:
+        is_speechify = {"start", "starttime"} <= given.keys()
+        times = POLLY if given.get("time") is not None else SPEECHIFY if is_speechify else times
+    start, per_s = _number(given.get(times.start), where, times.per_s)
+    end, per_s = _number(given.get(times.end), where, per_s)
+    if math.isnan(end) and times.duration in given:
+        end = start + _number(given[times.duration], where)[0]
+    return start, end, times._replace(per_s=per_s)
+
+
+def _text(value: Any) -> str | None:
+    """Return the text of a member: of a list its lines, of alternatives the first; None: it is no text."""
+    if isinstance(value, list) and value:
+        if all(isinstance(line, str) for line in value):
+            return " ".join(value)
+        if all(isinstance(part, dict) and "utf8" in part for part in value):
+            return "".join(str(part["utf8"]) for part in value)
+        value = value[0]
+    if isinstance(value, dict):
+        return next((_text(value[name]) for name in TEXTS if name in value), None)
+    return value if isinstance(value, str) else None
+
+
+def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) -> list[Row]:
+    """Return the lines and words in a value, in order; ``name``: of the member that it is."""
+    if depth > DEEPEST:
+        return []
+    if isinstance(value, dict):
+        said = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
+        return _rows_of_object(value, place, where, name, depth) if said else []
+    rows: list[Row] = []
+    items = value if isinstance(value, list) else []
+    for number, each in enumerate(items[:1] if name in ALTERNATIVES else items, 1):
+        is_stamp = isinstance(each, list) and len(each) == 3 and isinstance(each[0], str)  # IBM's
+        item = dict(zip(("word", "start", "end"), each, strict=True)) if is_stamp else each
+        found: list[Row] = []
+        if isinstance(item, dict):
+            found = _rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
+        elif name in ("segments", "words"):
+            require(values.members({}), item, f"{where}: {name!r}, item {number}")
+        for row in found:  # a token that is a piece of a word goes on with the one ahead of it
+            piece = name == "tokens" and row.times.pieces and not row.text[:1].isspace()
+            if rows and piece and row.speaker == rows[-1].speaker:
+                end = rows[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
+                rows[-1] = replace(rows[-1], end=end, text=rows[-1].text + row.text)
+            else:
+                rows.append(row)
+        check_count(len(rows), where)
+    return rows
+
+
+def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
+    """Return an object's lines with words in time, else its words, alone or within its own time, else its lines."""
+
+    def first_of(names: Iterable[str]) -> list[Row]:
+        members = (each for each in names if isinstance(item.get(each), dict | list))
+        return next((rows for each in members if (rows := _rows(item[each], place, where, each, depth + 1))), [])
+
+    own = _row(item, place, where, name)
+    timed = own is not None and not math.isnan(own.start)
+    if name == "words" and own is None:
+        raise InputError(f"{where}: {place}: no text; required a member 'word'")
+    words = [row for row in first_of(each for each in WORD_LISTS if not (timed and each == "tokens")) if row.text]
+    lines = first_of(LINE_LISTS)
+    if words and not any(line.parts for line in lines):
+        lines = [replace(own, parts=tuple(words))] if own is not None and timed else words
+    elif not lines and not timed:  # under a name that is not known
+        lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS))
+        lines = [line for line in lines if line.parts or not math.isnan(line.start)]
+    if not lines and (own is None or item.get("case") == MISSED):
+        return []
+    if not lines and own is not None:  # a word, perhaps with Gentle's phones
+        phones = _durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
+        spans = _in_a_row(phones, own.start, where) if phones else []
+        rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
+        return [own, *(Row(*row, own.times, own.speaker, PHONE_LABELS) for row in rows)]
+    if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
+        lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
+    speaker = own.speaker if own is not None else _speaker(item)
+    return [line if line.speaker else replace(line, speaker=speaker) for line in lines]
+
+
+def _speaker(item: dict[str, Any]) -> str:
+    return next((str(item[name]) for name in SPEAKERS if item.get(name) not in (None, "")), "")
+
+
+def _viseme(value: Any, where: str) -> str:
+    """Return the phone with the mouth of a viseme of Azure (a number) or of Polly (a name)."""
+    if isinstance(value, str):
+        if value not in POLLY_VISEMES:
+            known = " ".join(POLLY_VISEMES)
+            raise InputError(f"{where}: no viseme of Polly is {shortened(value)!r}; known are: {known}")
+        return POLLY_VISEMES[value]
+    return AZURE_VISEMES[require(values.whole(0, len(AZURE_VISEMES) - 1), value, f"{where}: the viseme")]
+
+
+def _listed_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return lists of items in time: their phones, and the words of each speaker; None: there are none."""
+    rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
+    check_count(len(rows), where)
+    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
+    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
+    if missed and where:
+        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
+    timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
+    if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
+        lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
+        return [] if lists and not any(lists) else None
+    phones = _until_next([row for row in rows if row.role == PHONE_LABELS], [])
+    spoken = [LabelTier(PHONE_LABELS, tuple(_labels(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
+    silences = [row.start for row in phones if row.text == SILENCE]
+    return spoken + _said_tiers(_until_next([row for row in rows if row.role != PHONE_LABELS], silences), where)
+
+
+def _said_tiers(rows: list[Row], where: str) -> list[LabelTier]:
+    """Return a tier of each speaker: of words, if nearly all are single ones, else of lines."""
+    half = len(rows) // 2
+    first, again = ([(row.text, row.start) for row in part] for part in (rows[:half], rows[half:]))
+    if half and first == again and rows[0].speaker != rows[-1].speaker:
+        rows = rows[half:]  # Google's last result has the words of all again, with their speakers
+    if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
+        rows = [part for row in rows for part in row.parts or (row,)]
+    counts = [len(words_in(spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
+    check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
+    single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
+    role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
+    by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
+    for row, label in zip(rows, _labels(rows, role, where), strict=True):
+        by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
+    return [LabelTier(who or role, tuple(said), role, who) for who, said in by_speaker.items()]
+
+
+def _until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
+    """Return rows, of which events last to the next one or to a silence, and the last one is open."""
+    starts = [row.start for row in rows if row.times.start in EVENTS]
+    if not starts:
+        return rows
+    edges = sorted([*starts, *silences])
+    later = [*edges, math.inf]
+    in_time = sorted(rows, key=lambda row: row.start)
+    return [replace(row, end=later[bisect_right(edges, row.start)]) if math.isnan(row.end) else row for row in in_time]
+
+
+def _labels(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
+    """Return rows in seconds, in the unit that their names say, or else in the one that their lengths do.
+
+    Raises InputError: one ends long before it starts, or its time is none, or the unit is not known.
+    """
+    parts = [part for row in rows for part in row.parts or (row,)]
+    judged = [part for part in parts if not part.times.per_s and not math.isnan(part.start)]
+    if any(row.times.usual == 0 for row in judged):
+        raise InputError(
+            f"{where}: its times are offsets in frames, whose length is not known; required start and end in seconds"
+        )
+    spans = [(row.start, row.end, row.text) for row in judged]
+    per_s = unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
+
+    def label(row: Row) -> TimedLabel:
+        start_s, end_s = (time / (row.times.per_s or per_s) for time in (row.start, row.end))
+        for time, time_s in ((row.start, start_s), (row.end, end_s)):
+            if LATEST_S < abs(time_s) < math.inf:
+                raise InputError(f"{where}: {row.place}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
+        start_s = math.nan if start_s <= EARLIEST_S else start_s
+        if end_s < start_s - ROUNDING_S:
+            raise InputError(f"{where}: {row.place} ends at {end_s:g} s, before its start at {start_s:g} s; correct it")
+        end_s = start_s if end_s < start_s else end_s
+        return TimedLabel(start_s, end_s, row.text, row.place, tuple(map(label, row.parts)))
+
+    return [label(row) for row in rows]
+
+
+def _durations(items: Any, text: str, length: str, place: str, per_s: float) -> list[tuple[str, Any, Any, float]]:
+    """Return the items of a list of objects: place, text, length and how many of its units are a second."""
+    fields = [each if isinstance(each, dict) else {} for each in (items if isinstance(items, list) else [])]
+    return [(f"{place} {number}", each.get(text), each.get(length), per_s) for number, each in enumerate(fields, 1)]
+
+
+def _in_a_row(items: Sequence[tuple[str, Any, Any, float]], start_s: float, where: str) -> list[TimedLabel]:
+    """Return labels of which the lengths are given, one after another."""
+    check_count(len(items), where)
+    labels: list[TimedLabel] = []
+    for place, text, length, per_s in items:
+        end_s = start_s + _seconds(length, f"{where}: {place}", per_s)
+        labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
+        start_s = end_s
+    return labels
+
+
+def _word_and_phone_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
+    check_count(max(len(words), len(phones)), where)
+    phones = ipa_labels(phones, where)
+    tiers = (LabelTier(WORDS, tuple(words), WORDS), LabelTier(PHONE_LABELS, tuple(phones), PHONE_LABELS))
+    return [tier for tier in tiers if tier.labels]
+
+
+def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return words and phones of parallel lists: of ElevenLabs' characters, of Cartesia's messages."""
+    found: dict[str, list[TimedLabel]] = defaultdict(list)
+    pieces = 0
+    for place, item in objects:
+        for name in ("result", "timestampinfo"):
+            item = item[name] if isinstance(item.get(name), dict) else item  # noqa: PLW2901
+        owners = {name: item[name] for name in COLUMN_OWNERS if isinstance(item.get(name), dict)}
+        owners.pop("alignment" if "normalizedalignment" in owners else "", None)
+        for name, owner in (owners or {"lists": item}).items():
+            for role, names, per_s in COLUMNS:
+                if isinstance(owner.get(names[0]), list) and owner.keys() >= {*names}:
+                    found[role] += _columns(owner, names, per_s, f"{where}: {place}, {name}")
+                    pieces += per_s != 1 or "wordstarttimeseconds" in names
+    if pieces > 1:
+        raise InputError(f"{where}: holds {pieces} pieces whose times each begin at 0; save the sound of each apart")
+    characters = found["characters"]
+    owner_of = [number for number, label in enumerate(characters) for _ in label.text]
+    for match in SPOKEN_WORD.finditer("".join(label.text for label in characters).replace("▁", " ")):
+        first, last = characters[owner_of[match.start()]], characters[owner_of[match.end() - 1]]
+        found[WORDS].append(replace(first, end_s=last.end_s, text=match[0]))
+    tiers = _word_and_phone_tiers(found[WORDS], found[PHONE_LABELS], where)
+    return in_seconds(tiers, where) if any(found.values()) else None
+
+
+def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
+    """Return the items of parallel lists. Raises InputError: they are no lists, or of several lengths."""
+    lists = [owner[name] for name in names]
+    if not all(isinstance(each, list) for each in lists) or len({len(each) for each in lists}) > 1:
+        raise InputError(f"{where}: required are the lists {', '.join(names)}, all of one length")
+    check_count(len(lists[0]), where)
+    lists += [[*lists[1][1:], math.inf][: len(lists[1])]] if len(lists) == 2 else []
+    labels = []
+    for number, (text, *times) in enumerate(zip(*lists, strict=True), 1):
+        start_s, end_s = (time if time is math.inf else _seconds(time, f"{where} {number}", per_s) for time in times)
+        end_s += start_s if "duration" in names[-1] else 0.0
+        labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where} {number}"), f"{names[0]} {number}"))
+    return labels
+
+
+def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return the phones of Piper (samples) and Kokoro (frames), whose durations alone are given, and Kokoro's words."""
+    piper = [(place, item) for place, item in objects if isinstance(item.get("phonemealignments"), list)]
+    kokoro = [item for _, item in objects if "phonemes" in item and isinstance(item.get("preddur"), list)]
+    if len(kokoro) > 1:
+        raise InputError(f"{where}: holds {len(kokoro)} sentences, whose times each begin at 0; give those of one")
+    if not kokoro and (len(piper) < len(objects)):
+        return None
+    items: list[tuple[str, Any, Any, float]] = []
+    for place, item in piper:
+        rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
+        items += _durations(item["phonemealignments"], "phoneme", "numsamples", f"{place}, phoneme", rate)
+    for item in kokoro:
+        letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
+        if len(item["preddur"]) != len(letters):
+            raise InputError(
+                f"{where}: {len(item['preddur'])} durations of {len(letters) - 2} phonemes, required two more than "
+                "phonemes"
+            )
+        pairs = enumerate(zip(letters, item["preddur"], strict=True))
+        items += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
+    phones = _in_a_row(items, 0.0, where)
+    words = [row for item in kokoro for row in _rows({"tokens": item.get("tokens")}, "", where)]
+    timed = _labels([row for row in words if not math.isnan(row.start)], WORDS, where)
+    return _word_and_phone_tiers(timed, phones, where)
+
+
+def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return the tiers of the JSON of the Montreal Forced Aligner and of praatIO, by their names."""
+    named = objects[0][1].get("tiers") if len(objects) == 1 else None
+    if isinstance(named, list) and all(isinstance(tier, dict) and "name" in tier for tier in named):
+        named = {str(tier["name"]): tier for tier in named}
+    if not isinstance(named, dict) or not all(
+        isinstance(tier, dict) and isinstance(tier.get("entries"), list) for tier in named.values()
+    ):
+        return None
+    tiers = []
+    for name, tier in named.items():
+        check_count(len(tier["entries"]), where)
+        labels = []
+        for number, entry in enumerate(tier["entries"], 1):
+            place = f"tier {name!r}, entry {number}"
+            if not isinstance(entry, list) or len(entry) not in (2, 3):
+                raise InputError(f"{where}: {place} is no list of start, end and label")
+            *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
+            labels.append(TimedLabel(times_s[0], times_s[-1], require(_TEXT, text, f"{where}: {place}"), place))
+        if len(tier["entries"][0] if tier["entries"] else ()) == 3:
+            tiers.append(named_tier(name, labels))
+    return tiers

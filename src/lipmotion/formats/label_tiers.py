@@ -1,0 +1,459 @@
+"""Tiers of labels as in a file: what each holds, who speaks in it, and the phones or words that it stands for."""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+from bisect import bisect_left, bisect_right
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from statistics import median
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.printable import is_line
+from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, in_order
+from lipmotion.types.values import number_of
+from lipmotion.units import (
+    PAUSE,
+    PHONES,
+    RECOGNISED,
+    SILENCE,
+    UNKNOWN_PHONES,
+    is_silent,
+    phone_named,
+    with_reduced_vowels,
+)
+from lipmotion.units.ipa_phones import ipa_phones, token_phones, xsampa_as_ipa
+from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS, SHORT_PAUSE_S
+from lipmotion.units.spoken_text import (
+    SpokenAs,
+    check_word_count,
+    line_words,
+    speaker_names,
+    spoken_as,
+    spoken_text,
+    timed_words,
+)
+
+LOG = logging.getLogger("lipmotion")
+EARLIEST_S = -1.0
+"""A time up to this is none; recognisers write others a little before 0, where the sound begins."""
+WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones", "recognised", "other"
+"""What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
+ROLES = (
+    (OTHER, r"^(kan|kas|mas|pho)\b|canonical|syll|tones?\b|tobi|gloss|transl|comment|notes?\b|pos\b|lemma|gesture"),
+    (PHONE_LABELS, r"phon([eéè]|$|s\b)|fonem|fones?\b|segment|(?<!-)\bmau\b|^laute?\b|ipa\b|x?-?sampa|音素|фонем"),
+    (WORDS, r"\b_?words?\b|\bort\b|orthogr|\bmots?\b|\bw(ö|oe)rter\b|\bwort\b|palabras?|parole\b|tokens?\b|単語|слов"),
+    (LINES, r"\btrn\b|transcri|utteranc|sentence|phrase|\btext\b|äußerung|énoncé|enunciado"),
+)  # fmt: skip
+"""What names of tiers say that they hold: those of Praat's users, of WebMAUS (``ORT-MAU``, ``KAN-MAU``, ``MAU``), of
+aligners, of ELAN's users, in some languages."""
+SPEAKERS = (r"(?P<speaker>.+?)\s*[-_/:]\s*(?:words?|phones?|phonemes?)", r"[^@]+@(?P<speaker>.+)")
+"""Names of tiers that hold a speaker's, too: ``ann - words`` of the Montreal Forced Aligner, ``words@ANN`` of ELAN."""
+PHONES_SHARE = 0.75
+"""A tier of which this share of the labels are phones is one of phones; the other labels are errors."""
+SHARED_TIME = 0.5
+"""Tiers of unknown kinds of which so much is at the same time are versions of one text; else they are of speakers."""
+ROUNDING_S = 1e-3
+"""Times may differ by this much: they are written with three digits or more."""
+WHOLE_WORD_S = 0.03
+"""A span of unknown phones whose ends are so near to those of a word is all of it."""
+IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
+"""Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
+GLOTTAL_STOP = "q"
+"""TIMIT's: a sound of the throat, with any lips."""
+STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
+RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
+"""A phone or unit, and its confidence from 0 to 1."""
+MOST_LABELS = 250_000
+"""Most labels of a file: phones of five hours of speech."""
+TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3
+"""How long a phone, and a word, alone or of a line, last."""
+UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
+"""If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
+WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
+"""The same for whole numbers of words and phones, which may be frames (0), too; lines in seconds last that long."""
+TICKS_PER_S = 10_000_000
+UNITS = {1: "seconds", 100: "hundredths of a second", 1000: "milliseconds", 1_000_000: "microseconds"}
+UNITS[TICKS_PER_S] = "ticks of 100 ns"
+PAUSES = frozenset((" ", *' ^ $ . , ; : ! ? — – … ( ) “ ” " « » ¡ ¿'.split(" ")))
+"""Symbols of voices for silence: padding, blanks and punctuation, which last as long as the pause."""
+LONGEST_SYMBOL = 40
+"""Most letters of a phone with all its marks."""
+WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ"}
+"""Diphthongs as the Montreal Forced Aligner writes them."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimedLabel:
+    """One label: its time, its text, and its position in the file, for messages.
+
+    start_s, end_s : NaN where they are not known; an end that is open is infinite
+    parts          : the words of a line, where these have times of their own
+    """
+
+    start_s: float
+    end_s: float
+    text: str
+    position: str
+    parts: tuple[TimedLabel, ...] = ()
+
+
+@dataclass(frozen=True)
+class LabelTier:
+    """A series of labels; its name as in the file, what it holds, and who speaks. Empty: the file does not say."""
+
+    name: str
+    labels: tuple[TimedLabel, ...]
+    role: str = ""
+    speaker: str = ""
+
+
+def named_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
+    """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
+    found = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
+    role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
+    if name == RECOGNISED:
+        role = RECOGNISED_PHONES
+    last_s = -math.inf
+    known_s = [last_s := label.start_s if label.start_s > EARLIEST_S else last_s for label in labels]
+    in_time = [label for _, label in sorted(zip(known_s, labels, strict=True), key=lambda pair: pair[0])]
+    return LabelTier(name, tuple(in_time), role, speaker or (found["speaker"].strip() if found else ""))
+
+
+def check_count(count: int, where: str) -> None:
+    """Raise InputError for more labels than a recording has."""
+    if count > MOST_LABELS:
+        raise InputError(f"{where}: more than {MOST_LABELS} labels; give those of one recording")
+
+
+def required_time(text: str, place: str, where: str) -> float:
+    """Return a time from its text, also with a decimal comma. Raises InputError: it is none, or not finite."""
+    return number_of(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
+
+
+def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
+    """Return how many units of time are a second, by how long words, of a line each of them, or phones last.
+
+    spans : start, end and text, in the unit
+    where : the file's name; empty: nothing is logged
+    usual : how many it usually is, where one span says nothing; a warning names what is neither this nor seconds
+    Raises InputError: the times are samples or frames, whose rate is not known.
+    """
+    lengths = [
+        (end - start) / (1 if role == PHONE_LABELS else max(len(text.split()), 1))
+        for start, end, text in spans
+        if math.inf > end > start and spoken_as(text) is SpokenAs.SPEECH
+    ]
+    whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
+    if len(lengths) < 1 + (usual == 1):
+        return usual if whole else 1
+    times = median(lengths) / (TYPICAL_PHONE_S if role == PHONE_LABELS else TYPICAL_WORD_S)
+    limits = WHOLE_LIMITS if whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
+    per_s = next((per_s for limit, per_s in limits if times < limit), TICKS_PER_S)
+    if not whole and per_s != 1000:
+        return 1
+    starts = [start for start, *_ in spans if not math.isnan(start)]
+    if per_s == 0 or (per_s > 1 and len(lengths) > 2 and max(starts) - min(starts) < median(lengths)):
+        what = "frames" if times < WHOLE_LIMITS[1][0] else "samples of the sound" if per_s == 0 else "in two units"
+        raise InputError(f"{where}: its times seem to be {what} (one lasts {median(lengths):g}), required seconds")
+    if where and per_s not in (1, usual):
+        LOG.warning("%s: its times are taken for %s; write seconds if they are not", where, UNITS[per_s])
+    return per_s
+
+
+def in_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[LabelTier]:
+    """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
+
+    per_s : how many of their units are a second; 0: how long words last decides
+    Raises InputError: as ``unit_of_times``.
+    """
+    said = [tier for tier in tiers if tier.role != OTHER]
+    judged = next((tier for tier in said if tier.role == WORDS or holds_phones(tier)), next(iter(said), None))
+    spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
+    role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
+    per_s = per_s or unit_of_times(spans, role, where)
+    scaled = [
+        [replace(each, start_s=each.start_s / per_s, end_s=each.end_s / per_s) for each in t.labels] for t in tiers
+    ]
+    return [replace(tier, labels=tuple(labels)) for tier, labels in zip(tiers, scaled, strict=True)]
+
+
+def holds_phones(tier: LabelTier) -> bool:
+    """Return whether a tier's name says that it holds phones, or most of its labels other than silence are phones."""
+    spoken = [label for label in tier.labels if spoken_as(label.text) is SpokenAs.SPEECH]
+    if tier.role:
+        return tier.role == PHONE_LABELS and any(label.text for label in tier.labels)
+    return bool(spoken) and sum(phone_of(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
+
+
+def tiers_of_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
+    """Return tiers; those of unknown kinds that hold words at other times than each other are named as speakers."""
+    unknown = [tier for tier in tiers if not tier.role and any(label.text for label in tier.labels)]
+    if len(unknown) < 2 or any(tier.speaker or tier.role in (WORDS, LINES) for tier in tiers):
+        return tiers
+    said = [[label for label in tier.labels if line_words(spoken_text(label.text), tier.name)] for tier in unknown]
+    if any(map(holds_phones, unknown)) or not all(said):
+        return tiers
+    first, others = said[0], [label for labels in said[1:] for label in labels]
+    shared_s = sum(
+        max(min(a.end_s, b.end_s) - max(a.start_s, b.start_s), 0.0) for a in first[:1000] for b in others[:1000]
+    )
+    spoken_s = sum(min(label.end_s - label.start_s, 60.0) for label in first[:1000])
+    if shared_s > SHARED_TIME * spoken_s:
+        return tiers
+    return [replace(tier, speaker=tier.name, role=LINES) if tier in unknown else tier for tier in tiers]
+
+
+def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
+    """Return phones in time, each with the word of a tier in which its middle lies; silence has none.
+
+    A span of unknown phones has a word only if it is all of it.
+    """
+    timed = [label for label in labels if not math.isnan(label.start_s + label.end_s)]
+    starts_s = [label.start_s for label in timed]
+    spans: list[Span[Unit]] = []
+    place = -1
+    for span in units:
+        middle_s, before = (span.start_s + span.end_s) / 2, place
+        place = bisect_right(starts_s, middle_s) - 1
+        inside = place >= 0 and middle_s < timed[place].end_s and not is_silent(span.label.phone)
+        if inside and span.label.unit == UNKNOWN_PHONES:
+            edges = (span.start_s - timed[place].start_s, span.end_s - timed[place].end_s)
+            inside = max(map(abs, edges)) <= WHOLE_WORD_S
+        word = timed[place].text if inside else ""
+        said = word if is_line(word) and spoken_as(word) is SpokenAs.SPEECH else ""
+        again = place > before and bool(spans) and said == spans[-1].label.word != ""
+        spans.append(replace(span, label=replace(span.label, word=said, again=again)))
+    return Timeline(tuple(spans))
+
+
+def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
+    """Return the words of tiers with their times, in order; silence, sounds and markup are left out.
+
+    Each label is a line; words have its time where it is one of words, or a single word.
+    Raises InputError: a label ends before it starts, or there are too many words.
+    """
+    names = speaker_names(label.text for tier in tiers for label in tier.labels)
+    lines: list[TranscriptLine] = []
+    count = 0
+    for tier in tiers:
+        for label in tier.labels:
+            place = f"{where}: {label.position}"
+            start_s, end_s = _times(label, where)
+            words: list[TimedWord] = []
+            for part in label.parts or (label,):
+                text = spoken_text(part.text, names) if spoken_as(part.text) is SpokenAs.SPEECH else ""
+                single = not tier.role and len(line_words(text, place)) == 1
+                timed = bool(label.parts) or tier.role == WORDS or single
+                words += timed_words(text, *(_times(part, where) if timed else (None, None)), where=place)
+            lines.append(TranscriptLine(tuple(words), start_s, end_s))
+            count += len(words)
+            check_word_count(count, where)
+    return in_order(lines)
+
+
+def _times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
+    """Return the times of a label, None where they are not known: nothing is said before the sound begins.
+
+    Raises InputError: it ends before it starts.
+    """
+    if label.end_s < label.start_s:
+        raise _reversed(label, where)
+    start_s, end_s = (time_s if EARLIEST_S < time_s < math.inf else None for time_s in (label.start_s, label.end_s))
+    return start_s and max(start_s, 0.0), end_s and max(end_s, 0.0)
+
+
+def _reversed(label: TimedLabel, where: str) -> InputError:
+    return InputError(
+        f"{where}: {label.position} ends at {label.end_s:g} s, before its start at {label.start_s:g} s; correct it"
+    )
+
+
+def phone_timeline(
+    tier: LabelTier, words: Sequence[TimedLabel], where: str, *, with_gaps: bool = False
+) -> Timeline[Unit]:
+    """Return the phones of a tier in time; speech of unknown phones has the unit ``UNKNOWN_PHONES``.
+
+    words : the words of the same recording in time; if the phones have no stress marks, the lexicon's rule reduces the
+            vowels of each word
+    with_gaps : gaps between labels are allowed, and stay
+    Raises InputError: a label that is no phone, or labels that overlap or leave a gap.
+    """
+    _check_order(tier.labels, where, with_gaps=with_gaps)
+    labels = _whole_phones(tier.labels)
+    phones: list[str] = []
+    for label in labels:
+        phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
+        if phone is None:
+            found = f"{label.position} is {label.text[:40]!r}"
+            raise InputError(f"{where}: {found}, which is no phone; the phones are: {' '.join(PHONES)}")
+        phones.append(phone)
+    marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
+    if words and not marked:
+        phones = _reduced(labels, phones, words)
+    starts_s = [max(label.start_s, 0.0) for label in labels]
+    ends_s = [
+        label.end_s if following_s > label.end_s + ROUNDING_S else following_s
+        for label, following_s in zip(labels, starts_s[1:], strict=False)
+    ] + [max(labels[-1].end_s, 0.0)]
+    units = (Unit("", UNKNOWN_PHONES) if phone == UNKNOWN_PHONES else Unit(phone) for phone in phones)
+    return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, units, strict=True)))
+
+
+def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -> None:
+    """Raise InputError for labels without times, that overlap or end before they start, or that leave a gap."""
+    end_s = 0.0
+    for number, label in enumerate(labels):
+        if not min(label.start_s, label.end_s) > EARLIEST_S:
+            raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
+        if label.end_s < label.start_s:
+            raise _reversed(label, where)
+        late_s, found = label.start_s - end_s, f"{where}: {label.position} starts at {label.start_s:g} s, "
+        if late_s < -ROUNDING_S:
+            raise InputError(f"{found}before the one ahead of it ends ({end_s:g} s); labels must not overlap")
+        if number and not with_gaps and late_s > ROUNDING_S:
+            raise InputError(
+                f"{found}the one before it ends at {end_s:g} s; phones must follow each other without a gap: label "
+                "silence as sil"
+            )
+        end_s = label.end_s
+
+
+def merged_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
+    """Return what several speakers say in order, without silence; where two speak at once, who began goes on."""
+    if len(timelines) == 1:
+        return timelines[0]
+    merged: list[Span[Unit]] = []
+    spoken = (span for units in timelines for span in units if not is_silent(span.label.phone))
+    for span in sorted(spoken, key=lambda span: span.start_s):
+        end_s = merged[-1].end_s if merged else -math.inf
+        if span.end_s > end_s:
+            merged.append(replace(span, start_s=max(span.start_s, end_s)))
+    return Timeline(tuple(merged))
+
+
+def phone_of(text: str) -> str | None:
+    """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
+    text = STATE_NUMBER.sub("", text)
+    inner = IN_CONTEXT.sub(r"\1", text)
+    name = phone_named(text) or phone_named(inner)
+    if name is not None or text == GLOTTAL_STOP:
+        return name or "hh"
+    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(spoken_as(inner))
+
+
+def _whole_phones(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
+    """Return labels of whole phones: states of a phone (``...[2]``, ``...[3]``, ...) become one, and a closure of
+    TIMIT's with what it opens to (``pcl``, ``p``).
+    """
+    whole: list[TimedLabel] = []
+    last = -1
+    for label in labels:
+        match = STATE_NUMBER.search(label.text)
+        state = int(match[1]) if match else -1
+        name = STATE_NUMBER.sub("", label.text)
+        before = whole[-1].text.lower() if whole else ""
+        if (whole and state > last >= 0 and before == name.lower()) or name.lower() in CLOSURES.get(before, ()):
+            whole[-1] = replace(whole[-1], end_s=label.end_s, text=name)
+        else:
+            whole.append(replace(label, text=name))
+        last = state
+    return whole
+
+
+def _reduced(labels: Sequence[TimedLabel], phones: Sequence[str], words: Sequence[TimedLabel]) -> list[str]:
+    """Return the phones with the unstressed vowels of every word reduced by the lexicon's rule."""
+    result = list(phones)
+    middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
+    in_time = sorted(range(len(labels)), key=middles_s.__getitem__)
+    sorted_s = [middles_s[i] for i in in_time]
+    end = 0
+    for word in words:
+        start, end = max(end, bisect_left(sorted_s, word.start_s)), max(end, bisect_left(sorted_s, word.end_s))
+        inside = [i for i in sorted(in_time[start:end]) if not is_silent(phones[i])]
+        reduced = with_reduced_vowels(word.text.lower(), tuple(phones[i] for i in inside))
+        for i, phone in zip(inside, reduced, strict=True):
+            result[i] = phone
+    return result
+
+
+def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
+    """Return phones in IPA as phones of the inventory, in the same time.
+
+    Symbols that are one sound together are one phone, as ``a`` and ``ɪ``; a symbol of several sounds is divided into
+    equal times; marks, as those of stress and length, are part of the phone before. Source: ``units.ipa_phones``.
+    Raises InputError: a symbol that is none of IPA, with its place.
+    """
+    unspoken = [label.text in PAUSES or spoken_as(label.text) is not SpokenAs.SPEECH for label in labels]
+    for label, pause in zip(labels, unspoken, strict=True):
+        if len(label.text) > LONGEST_SYMBOL:
+            length = len(label.text)
+            raise InputError(
+                f"{where}: {label.position} has {length} letters, required a phone: {LONGEST_SYMBOL} at most"
+            )
+        unknown = "" if pause else ipa_phones(label.text)[1]
+        if unknown:
+            raise InputError(
+                f"{where}: {label.position} is {shortened(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
+                f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
+            )
+    begun: dict[int, list[str]] = defaultdict(list)
+    # no sound goes on beyond silence
+    tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
+    for phone, number in token_phones(tokens):
+        begun[number].append(phone)
+    found: list[TimedLabel] = []
+    for number, label in enumerate(labels):
+        phones = begun.get(number, [])
+        if phones:
+            each_s = (label.end_s - label.start_s) / len(phones)
+            edges_s = [label.start_s + place * each_s for place in range(len(phones))] + [label.end_s]
+            found += [
+                replace(label, start_s=start_s, end_s=end_s, text=phone)
+                for phone, start_s, end_s in zip(phones, edges_s[:-1], edges_s[1:], strict=True)
+            ]
+        elif not unspoken[number] and found and found[-1].end_s >= label.start_s:
+            found[-1] = replace(found[-1], end_s=label.end_s)
+        else:
+            is_speech = spoken_as(label.text) is SpokenAs.UNKNOWN
+            found.append(replace(label, text=UNKNOWN_PHONES if is_speech else SILENCE))
+    return found
+
+
+def in_inventory(tier: LabelTier, where: str) -> LabelTier:
+    """Return a tier; one of phones in the phones of the inventory, from those, X-SAMPA or IPA, as they make sense.
+
+    Raises InputError: as ``ipa_labels``.
+    """
+    labels = tier.labels if tier.role == PHONE_LABELS else ()
+    spoken = [WITH_GLIDES.get(label.text, label.text) for label in labels if spoken_as(label.text) is SpokenAs.SPEECH]
+    in_inventory = sum(phone_of(text) is not None for text in spoken)
+    in_xsampa = sum(bool(xsampa_as_ipa(text)) for text in spoken)
+    if in_inventory == len(spoken) or (in_inventory >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
+        return tier
+    as_ipa = WITH_GLIDES
+    if all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
+        as_ipa = {text: xsampa_as_ipa(text) or text for text in spoken}
+    symbols = [replace(label, text=as_ipa.get(label.text, label.text)) for label in labels]
+    return replace(tier, labels=tuple(ipa_labels(symbols, where)))
+
+
+def with_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:
+    """Return phones with silence in the gaps between them; where it is short, a pause."""
+    filled: list[TimedLabel] = []
+    for label in phones:
+        gap_s = label.start_s - filled[-1].end_s if filled else 0.0
+        if gap_s > ROUNDING_S:
+            filled.append(replace(label, start_s=filled[-1].end_s, end_s=label.start_s, text=SILENCE))
+        filled.append(label)
+    return tuple(
+        replace(label, text=PAUSE)
+        if spoken_as(label.text) is SpokenAs.SILENCE
+        and 0 < number < len(filled) - 1
+        and label.end_s - label.start_s < SHORT_PAUSE_S
+        else label
+        for number, label in enumerate(filled)
+    )

@@ -1,0 +1,266 @@
+"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``,
+Whisper's table of lines (``.tsv``), and lyrics (``.lrc``).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import LINES, LabelTier, TimedLabel, check_count
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Timeline, Unit
+from lipmotion.types.values import clock_seconds
+from lipmotion.units import is_silent, words_in_time
+from lipmotion.units.spoken_text import speaker_names, spoken_text
+
+TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
+ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
+"""The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
+CUE = re.compile(
+    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d",
+    re.MULTILINE,
+)
+"""The times of a subtitle."""
+FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
+NO_ARROW = re.compile(rf"^\s{{0,20}}{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$", re.MULTILINE)
+"""A line of two times without an arrow that is known; times of day, as 5:30, do not count."""
+TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
+SBV = re.compile(rf"\A{TIME}\s?,\s?{TIME}\s*?$", re.MULTILINE)
+"""The times of YouTube's own format, ``0:00:01.000,0:00:02.500``."""
+WORD_TIME = re.compile(rf"<{TIME}>")
+"""The time at which the words after it are said, as in the captions that YouTube makes."""
+NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
+"""The start of a block of WebVTT that is not shown."""
+HEADER = "start\tend\ttext"
+"""The first line of Whisper's table; times are in milliseconds."""
+ROW = re.compile(r"(\d{1,12})\t(\d{1,12})\t(.*)")
+BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
+"""Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
+of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
+SUBSTATION = re.compile(rf"\A\s*\[(?i:Script Info)\]|^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.MULTILINE)
+"""SubStation Alpha: its first line, or, where an editor saved none, a line that is shown, with its start and end."""
+DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text".split()
+"""The fields of a line where no line ``Format:`` says them."""
+STYLES = re.compile(r"(\{[^{}]{0,200}\})")
+DRAWING_MODE = re.compile(r"\\p(\d)")
+"""Begins a drawing (``{\\p1}``) or ends it (``{\\p0}``): the numbers in between are no words."""
+BREAK = re.compile(r"\\[Nnh]")
+"""Line breaks and hard blanks within the text."""
+LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
+"""What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
+LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]")
+"""The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``."""
+LYRICS_LINE = re.compile(rf"((?:\[{TIME}\]\s{{0,4}}){{1,100}}).*")
+PHONES = ".phones"
+"""A file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words."""
+_ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+
+
+def is_subtitles(text: str) -> bool:
+    """Return whether a text is a file of subtitles or lyrics, or Whisper's table of lines."""
+    found = (form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
+    return text.startswith(("WEBVTT", HEADER)) or any(found)
+
+
+def subtitle_tier(text: str, where: str) -> LabelTier:
+    """Return the lines of subtitles, a cue each; words that have times of their own are parts of it.
+
+    Left out are notes and styles, the repetitions of captions that scroll, and what stands before the first cue.
+    Numbers of cues may be missing, and blank lines too.
+    where : the file's name, for messages
+    Raises InputError: times that are damaged or end before they start, with their line; too many cues or words.
+    """
+    read = _rows if text.startswith(HEADER) else _lyrics if LYRICS.search(text) else _cues
+    cues = list((_dialogue if read is _cues and SUBSTATION.search(text) else read)(text, where))
+    labels = (replace(cue, parts=_words(cue)) for cue in _without_repetitions(cues))
+    return LabelTier("subtitles", tuple(labels), LINES)
+
+
+def subtitle_words(text: str) -> str:
+    """Return what is said of subtitles as a text. Raises InputError: as ``subtitle_tier``."""
+    lines = [label.text for label in subtitle_tier(text, "the text").labels]
+    names = speaker_names(lines)
+    return "\n".join(spoken_text(WORD_TIME.sub("", line), names) for line in lines)
+
+
+def _lyrics(text: str, where: str) -> Iterator[TimedLabel]:
+    """Yield the lines of lyrics in order, each to the next; several times before a line repeat it."""
+    cues: list[TimedLabel] = []
+    found = re.search(r"\[offset:\s?([+-]?\d{1,7})\s?\]", text)
+    early_s = int(found[1]) / 1000 if found else 0.0
+    for number, row in enumerate(StringIO(text), 1):
+        line = row.strip()
+        timed = LYRICS_LINE.fullmatch(line)
+        if timed is None:
+            if cues and not re.fullmatch(LYRICS_TAG, line):
+                cues[-1] = replace(cues[-1], text=f"{cues[-1].text}\n{line}")
+            continue
+        for time in re.finditer(TIME, timed[1]):
+            check_count(len(cues), where)
+            start_s = max(clock_seconds(time[1]) - early_s, 0.0)
+            cues.append(TimedLabel(start_s, math.inf, line[timed.end(1) :], f"line {number}"))
+    cues.sort(key=lambda cue: cue.start_s)
+    for cue, end_s in zip(cues, [*(cue.start_s for cue in cues[1:]), math.inf], strict=True):
+        yield replace(cue, end_s=end_s)
+
+
+def _cues(text: str, where: str) -> Iterator[TimedLabel]:
+    cue, lines, count = None, list[str](), 0
+    for number, row in enumerate(StringIO(text), 1):
+        line = row.rstrip("\r\n")
+        times = (TIMES.fullmatch(line) or SBV.fullmatch(line)) if ":" in line else None
+        if times is None and (CUE.match(line) or NO_ARROW.match(line)):
+            wanted = "00:00:01,000 --> 00:00:02,500"
+            raise InputError(f"{where}: line {number} is {shortened(line.strip())!r}; required times as in {wanted}")
+        if times is None:
+            lines.append(line)
+            continue
+        if cue is not None:
+            yield replace(cue, text=_shown(lines))
+        count += 1
+        check_count(count, where)
+        cue, lines = TimedLabel(clock_seconds(times[1]), clock_seconds(times[2]), "", f"line {number}"), []
+    if cue is not None:
+        yield replace(cue, text=_shown([*lines, "", ""]))
+
+
+def _shown(lines: list[str]) -> str:
+    """Return the lines that a cue shows, of all up to the times of the next one: without that one's name, and notes."""
+    blank = [number for number, line in enumerate(lines) if not line]
+    if lines and (lines[-1].strip().isdecimal() or (blank and blank[-1] == len(lines) - 2)):
+        lines = lines[:-1]  # the number or the name of the next cue
+    shown: list[str] = []
+    hidden = False
+    for before, line in zip(["-", *lines], lines, strict=False):
+        hidden = (hidden and bool(line)) or (not before and NO_CUE.match(line) is not None)
+        if line.strip() and not hidden:
+            shown.append(line)
+    return "\n".join(shown)
+
+
+def _rows(text: str, where: str) -> Iterator[TimedLabel]:
+    """Yield the rows of Whisper's table as cues."""
+    for number, row in enumerate(StringIO(text), 1):
+        line = row.rstrip("\r\n")
+        if number == 1 or not line.strip():
+            continue
+        check_count(number, where)
+        found = ROW.fullmatch(line)
+        if found is None:
+            raise InputError(f"{where}: line {number} is {shortened(line)!r}; required: start, end and text, with tabs")
+        yield TimedLabel(int(found[1]) / 1000, int(found[2]) / 1000, found[3], f"line {number}")
+
+
+def _without_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
+    """Return cues without the lines that captions that scroll repeat."""
+    plain = [tuple(" ".join(WORD_TIME.sub("", line).split()) for line in cue.text.split("\n")) for cue in cues]
+    plain = [tuple(spoken_text(line).strip() for line in lines) for lines in plain]
+    bridges = sum(
+        cue.end_s - cue.start_s < BRIDGE_S and shown[-len(lines) :] == lines
+        for cue, lines, shown in zip(cues[1:], plain[1:], plain, strict=False)
+    )
+    if bridges < BRIDGES_SHARE * len(cues) or bridges < 2:
+        return cues
+    kept = cues[:1]
+    for before, cue, shown, lines in zip(cues, cues[1:], plain, plain[1:], strict=False):
+        most = min(len(lines), len(shown)) if cue.start_s <= before.end_s + NEAR_S else 0
+        repeated = next((n for n in range(most, 0, -1) if shown[-n:] == lines[:n]), 0)
+        kept.append(replace(cue, text="\n".join(cue.text.split("\n")[repeated:])))
+    return kept
+
+
+def _words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
+    """Return the words of a cue with times, where these stand between them."""
+    text = cue.text
+    marks = list(WORD_TIME.finditer(text))
+    if not marks:
+        return ()
+    edges = [0, *(mark.end() for mark in marks)]
+    ends = [*(mark.start() for mark in marks), len(text)]
+    times_s = [cue.start_s, *(min(max(clock_seconds(mark[1]), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
+    return tuple(
+        TimedLabel(start_s, max(start_s, end_s), text[first:end], cue.position)
+        for first, end, start_s, end_s in zip(edges, ends, times_s, times_s[1:], strict=False)
+    )
+
+
+def _dialogue(text: str, where: str) -> Iterator[TimedLabel]:
+    """Yield the dialogue of SubStation Alpha, without drawings; comments, styles and what else it holds are left out.
+
+    The tags of styles (``{\\an8}``, ``{\\i1}``) are left out too. The text is the last field, and may hold commas.
+    where : the file's name, for messages
+    Raises InputError: a line of dialogue with too few fields, times that are none, or an end before the start, with its
+    line; too many lines.
+    """
+    fields, in_events = DEFAULT_FIELDS, True
+    for number, row in enumerate(StringIO(text), 1):
+        line = row.strip()
+        name, _, rest = line.partition(":")
+        if line.startswith("["):
+            in_events = line.lower() == "[events]"
+        elif in_events and name.lower() == "format":
+            fields = [field.strip().lower() for field in rest.split(",")]
+        elif in_events and name.lower() == "dialogue":
+            check_count(number, where)
+            values = rest.split(",", maxsplit=len(fields) - 1)
+            by_name = dict(zip(fields, values, strict=False))
+            start, end = (re.fullmatch(TIME, by_name.get(edge, "").strip()) for edge in ("start", "end"))
+            if start is None or end is None or len(values) < len(fields):
+                wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
+                raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
+            shown, drawing = "", False
+            for place, part in enumerate(STYLES.split(by_name.get("text", values[-1]))):
+                modes = DRAWING_MODE.findall(part) if place % 2 else []  # of a tag
+                drawing = modes[-1] != "0" if modes else drawing
+                shown += "" if drawing or place % 2 else part
+            times = (clock_seconds(start[1]), clock_seconds(end[1]))
+            yield TimedLabel(*times, BREAK.sub("\n", shown), f"line {number}")
+
+
+def shown_labels(path: Path, units: Timeline[Unit]) -> list[tuple[float, float, str]]:
+    """Return start, end and text of each word, or of each phone where the name of the file asks for them; no silence.
+
+    Words are those of ``units.words_in_time``.
+    """
+    if path.stem.lower().endswith(PHONES):
+        spoken = [span for span in units if not is_silent(span.label.phone)]
+        return [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
+    return [(span.start_s, span.end_s, span.label) for span in words_in_time(units) if span.label]
+
+
+def clock(seconds: float, mark: str) -> str:
+    """Return a time as ``HH:MM:SS.mmm``; ``mark``: what stands before the thousandths."""
+    thousandths = round(seconds * 1000)
+    minutes, rest = divmod(thousandths, 60_000)
+    return f"{minutes // 60:02d}:{minutes % 60:02d}:{rest // 1000:02d}{mark}{rest % 1000:03d}"
+
+
+def write_subrip(path: Path, units: Timeline[Unit]) -> None:
+    """Write the words in time, or the phones where the name ends with ``.phones.srt``, one a cue; silence has none.
+
+    After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    """
+    lines: list[str] = []
+    for number, (start_s, end_s, text) in enumerate(shown_labels(path, units), 1):
+        lines += [f"{number}", f"{clock(start_s, ',')} --> {clock(end_s, ',')}", text, ""]
+    with whole_file(path) as temporary:
+        temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
+
+
+def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
+    """Write the words in time, or the phones where the name ends with ``.phones.vtt``, one a cue; silence has none.
+
+    After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    """
+    lines = ["WEBVTT", ""]
+    for start_s, end_s, text in shown_labels(path, units):
+        shown = "".join(_ESCAPES.get(letter, letter) for letter in text)
+        lines += [f"{clock(start_s, '.')} --> {clock(end_s, '.')}", shown, ""]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines), encoding="utf-8", newline="\n")

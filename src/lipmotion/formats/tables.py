@@ -1,0 +1,368 @@
+"""Tables of curves over time: lipmotion's own, takes of Live Link Face, and what other programs write.
+
+``.csv``: a table for spreadsheets and scripts: ``time_s`` and one column per channel, without units.
+``.livelink.csv``: a take as the app Live Link Face records it, for Unreal and for all that reads such takes.
+
+A take begins ``Timecode,BlendshapeCount,EyeBlinkLeft,…``. A timecode is ``HH:MM:SS:FF.mmm``: FF frames of the
+timecode's rate, and thousandths of a frame.
+Read are also Audio2Face-3D's ``animation_frames.csv`` (``,timeCode,blendShapes.JawOpen,…``), scripts around MediaPipe
+(``frame,timestamp_ms,_neutral,browDownLeft,…``, or one blendshape a row with its score), and any other with a column of
+times. Source: files of these programs.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.formats.base import MotionFormat, formatted_rows
+from lipmotion.meshes.files.steady_rate import (
+    TIME_COLUMN,
+    column_key,
+    exact_rate,
+    in_seconds,
+    motion_at_times,
+    tabulated,
+)
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, is_known
+from lipmotion.storage.text_table import LONGEST_LINE, TextTable, numbers_in, open_table
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
+
+Array = NDArray[np.float64]
+LOG = logging.getLogger("lipmotion")
+
+TIME = "time_s"
+"""The first column."""
+LONGEST_S = 1e6
+"""Largest time that is accepted: more than eleven days."""
+CURVES = (
+    *("EyeBlinkLeft", "EyeLookDownLeft", "EyeLookInLeft", "EyeLookOutLeft", "EyeLookUpLeft", "EyeSquintLeft"),
+    *("EyeWideLeft", "EyeBlinkRight", "EyeLookDownRight", "EyeLookInRight", "EyeLookOutRight", "EyeLookUpRight"),
+    *("EyeSquintRight", "EyeWideRight", "JawForward", "JawRight", "JawLeft", "JawOpen", "MouthClose", "MouthFunnel"),
+    *("MouthPucker", "MouthRight", "MouthLeft", "MouthSmileLeft", "MouthSmileRight", "MouthFrownLeft"),
+    *("MouthFrownRight", "MouthDimpleLeft", "MouthDimpleRight", "MouthStretchLeft", "MouthStretchRight"),
+    *("MouthRollLower", "MouthRollUpper", "MouthShrugLower", "MouthShrugUpper", "MouthPressLeft", "MouthPressRight"),
+    *("MouthLowerDownLeft", "MouthLowerDownRight", "MouthUpperUpLeft", "MouthUpperUpRight", "BrowDownLeft"),
+    *("BrowDownRight", "BrowInnerUp", "BrowOuterUpLeft", "BrowOuterUpRight", "CheekPuff", "CheekSquintLeft"),
+    *("CheekSquintRight", "NoseSneerLeft", "NoseSneerRight", "TongueOut", "HeadYaw", "HeadPitch", "HeadRoll"),
+    *("LeftEyeYaw", "LeftEyePitch", "LeftEyeRoll", "RightEyeYaw", "RightEyePitch", "RightEyeRoll"),
+)
+"""The 61 curves in the order of the app's own takes: ARKit's 52 blendshapes, then angles of head and eyes."""
+TICKS_HZ = 60
+"""The frames of a timecode are counted in 60ths of a second at any rate: Unreal's importer divides them by 60."""
+TAKE_DECIMALS = 6
+BEFORE_CURVES = ("Timecode", "BlendshapeCount")
+FIRST, COUNT = (name.lower() for name in BEFORE_CURVES)
+"""Names of the first two columns of the app; capitals do not matter, for versions of the app differ."""
+SPEECH_CURVES = frozenset(
+    (*ARKIT_MOUTH, "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight")
+)
+"""The curves that speech moves: those of mouth, jaw, tongue, cheeks and nose."""
+NO_CURVES = re.compile(r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|blendshapecount|neutral)")
+"""The same of columns that are no curves: numbers of frames and faces, and what MediaPipe calls neutral."""
+SCORES = ("score", "value", "weight", "coefficient")
+TIMECODE_RATES = (24, 25, 30, 48, 50, 60, 120)
+APP_RATE = 60
+"""Frames a second of the timecode where a take does not show it: what the app has by default."""
+DAY_S = 86_400.0
+MISREAD_ROWS = 10
+"""More rows a second apart are frames, of which a spreadsheet made seconds."""
+MOST_CURVES = 2000
+_TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(?:[.,]\d{1,9})?))?", re.ASCII)
+
+
+def check_table(motion: Motion) -> None:
+    """Raise ExportError if a channel's name would break the header."""
+    for name in motion.names:
+        if set(name) & set(',;"') or not name.isprintable():
+            raise ExportError(f"the channel name {shortened(name)!r} does not fit in a table; write .json or .npz")
+    if len(",".join([TIME, *motion.names])) >= LONGEST_LINE:
+        raise ExportError(f"the channel names do not fit in a line of {LONGEST_LINE} letters; write .json or .npz")
+
+
+def write_table(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write a header and one line per frame."""
+    motion = generation.motion
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join([TIME, *motion.names]) + "\n")
+        for time_s, row in zip(motion.time_s.tolist(), formatted_rows(motion.values), strict=True):
+            shortest = f"{time_s:.9f}".rstrip("0").rstrip(".")
+            file.write(f"{shortest},{row}\n")
+
+
+def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the motion of a table and an empty timeline.
+
+    Channels with ARKit's names are weights, all others are eye distances. Tables of other programs are read as
+    ``read_curve_table`` says.
+    Raises InputError: not a table of numbers with a header, or times that are not even.
+    """
+    try:
+        with open_table(path) as table:
+            if table.names[0] == TIME and len(table.names) > 1:
+                return _even_table(table), Timeline(())
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
+    return read_curve_motion(path)
+
+
+def _even_table(table: TextTable) -> Motion:
+    """Return the motion of a table of ``write_table``. Raises ValueError: a field is no number, or rows are uneven."""
+    columns, numbers = len(table.names), array("d")
+    for line, fields in table.rows:
+        if len(fields) != columns:
+            raise ValueError(f"line {line} has {len(fields)} fields, required {columns} numbers in each")
+        numbers.extend(numbers_in(fields, line))
+    values = np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
+    channels = (Channel(name, WEIGHT if arkit_name(name) else EYE_DISTANCE) for name in table.names[1:])
+    time_s = values[:, 0]
+    if len(time_s) < 2:
+        raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
+    if not np.abs(time_s).max() < LONGEST_S:
+        raise InputError(f"the column time_s holds values that are no times, required seconds up to {LONGEST_S:.0f}")
+    step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
+        raise InputError("the column time_s must begin at 0 and rise in even steps")
+    return Motion(values[:, 1:], exact_rate(round(float(1 / step_s), 6)), tuple(channels))
+
+
+def timecode(time_s: float) -> str:
+    """Return a time as the app writes it, ``HH:MM:SS:FF.mmm``, with ``FF.mmm`` in 60ths of a second.
+
+    >>> timecode(3725.025)
+    '01:02:05:01.500'
+    """
+    thousandths = round(time_s * TICKS_HZ * 1000)
+    seconds, part = divmod(thousandths, TICKS_HZ * 1000)
+    frames, part = divmod(part, 1000)
+    return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}:{frames:02d}.{part:03d}"
+
+
+def write_take(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write a header and one line a frame; curves that the motion does not have are 0."""
+    motion = generation.motion
+    table = np.zeros((len(motion.values), len(CURVES)))
+    names = {name[:1].upper() + name[1:]: column for column, name in enumerate(motion.names)}
+    for column, name in enumerate(CURVES):
+        if name in names:
+            table[:, column] = motion.values[:, names[name]]
+    form = ",".join([f"%.{TAKE_DECIMALS}f"] * len(CURVES))
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.write(",".join([*BEFORE_CURVES, *CURVES]) + "\n")
+        for time_s, row in zip(motion.time_s.tolist(), table + 0.0, strict=True):
+            file.write(f"{timecode(time_s)},{len(CURVES)},{form % tuple(row.tolist())}\n")
+
+
+class Timecode(NamedTuple):
+    """One timecode: whole seconds since midnight, frames (fractions included), and what stands before the frames.
+
+    mark : ``:``, ``;`` (drop-frame), ``.`` where not frames but parts of a second follow, or empty: nothing follows
+    """
+
+    seconds: int
+    frames: float
+    mark: str
+
+
+def is_live_link(names: Sequence[str]) -> bool:
+    """Return whether the columns of a table are those of Live Link Face."""
+    lower = [name.lower() for name in names[:2]]
+    return lower[:1] == [FIRST] and (lower[1:] in ([], [COUNT]) or (is_known(names[1]) and "." not in names[1]))
+
+
+def is_live_link_file(path: Path) -> bool:
+    """Return whether a file is such a table; a file that cannot be read is none."""
+    try:
+        with open_table(path) as table:
+            return is_live_link(table.plain_names)
+    except (OSError, ValueError):
+        return False
+
+
+def speech_curves(motion: Motion) -> Motion:
+    """Return the curves that speech moves, without those of eyes, brows and head. Raises InputError: there are none."""
+    columns = [column for column, name in enumerate(motion.names) if name in SPEECH_CURVES]
+    if not columns:
+        raise InputError("none of its curves is one of mouth or jaw, required jawOpen, mouthClose, ...")
+    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+
+
+def read_curve_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the curves of a table as of ``read_curve_table``, and an empty timeline."""
+    return read_curve_table(path)[0], Timeline(())
+
+
+def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
+    """Return the curves of a table at a steady rate from its first row on, and in which frames a face was seen.
+
+    Names that are understood become ARKit's. Angles have the unit ``radian``; all others are weights in a take of Live
+    Link Face, and else eye distances where they are no blendshapes. What is done with rows without a face, and with
+    times that are not even, ``motion_at_times`` says.
+    Raises InputError: not such a table, a field that is no number, times that go back, or gaps without end.
+    """
+    try:
+        with open_table(path) as table:
+            names = table.plain_names
+            keys = list(map(column_key, names))
+            timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
+            used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
+            if timed is None or not 0 < len(used) <= MOST_CURVES:
+                raise ValueError(
+                    f"the first line is {shortened(','.join(names))!r}, required 'time_s,opening,...', or curves "
+                    "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
+                )
+            times, names, values = _rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
+            coded = bool(re.search("[:;]", times[0][1]))
+            if coded:
+                time_s = _seconds([_timecode(text, line) for line, text in times])
+            else:
+                time_s = in_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
+            return motion_at_times(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
+    except (ValueError, OverflowError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
+
+
+def _rows(
+    rows: Iterator[tuple[int, list[str]]], names: list[str], timed: int, used: list[int], counted: int | None
+) -> tuple[list[tuple[int, str]], list[str], Array]:
+    """Return the lines and times of the rows, and names and values of curves [shape=(N, P)]: NaN without a face."""
+    times: list[tuple[int, str]] = []
+    faces: list[int] = []
+    numbers = array("d")
+    columns = len(names)
+    for line, fields in rows:
+        while len(fields) > columns and not fields[-1].strip():
+            fields.pop()
+        times.append((line, fields[timed].strip() if timed < len(fields) else ""))
+        found = [fields[column] for column in used if column < len(fields)]
+        if not any(map(str.strip, found)) or (counted is not None and fields[counted : counted + 1] in (["0"], [" 0"])):
+            continue
+        if len(fields) != columns:
+            curves = len(fields) - columns + len(used)
+            raise ValueError(f"line {line} has {curves} curves, required {len(used)}; delete it if it is the last")
+        if not faces:
+            texts = [column for column in used if _is_text(fields[column], names[column])]
+            used = [column for column in used if column not in texts]
+            if not used:
+                raise ValueError(f"line {line} has no numbers beside the time")
+            of_names = [c for c in texts if is_known(fields[c].strip()) or fields[c].strip() == "_neutral"]
+            if of_names:
+                return _of_single_scores(chain([(line, fields)], rows), names, timed, of_names[0], used)
+            if texts:
+                named = ", ".join(shortened(names[column]) for column in texts)
+                LOG.warning("%d columns hold text, not numbers, and are left out: %s", len(texts), named)
+                found = [fields[column] for column in used]
+        faces.append(len(times) - 1)
+        numbers.extend(numbers_in(found, line))
+    if not times:
+        raise ValueError("there are no rows")
+    values = np.full((len(times), len(used)), np.nan)
+    values[faces] = np.frombuffer(numbers, np.float64).reshape(len(faces), len(used)) if numbers else np.nan
+    return times, [names[column] for column in used], values
+
+
+def _is_text(field: str, name: str) -> bool:
+    """Return whether a field is no number, in a column whose name does not promise one."""
+    try:
+        numbers_in([field], 0)
+    except ValueError:
+        return not is_known(name)
+    return False
+
+
+def _of_single_scores(
+    rows: chain[tuple[int, list[str]]], names: list[str], timed: int, named: int, used: list[int]
+) -> tuple[list[tuple[int, str]], list[str], Array]:
+    """Return what ``_rows`` does of a table with one blendshape a row: its name in one column, its score in another."""
+    score = next((column for column in used if names[column].strip().lower() in SCORES), used[-1])
+    frames: dict[str, dict[str, float]] = {}
+    lines: dict[str, int] = {}
+    for line, fields in rows:
+        if len(fields) <= max(timed, named, score):
+            raise ValueError(f"line {line} has {len(fields)} fields, required {len(names)}")
+        time = fields[timed].strip()
+        lines.setdefault(time, line)
+        frames.setdefault(time, {})[fields[named].strip()] = numbers_in([fields[score]], line)[0]
+    known, values = tabulated(list(frames.values()))
+    return [(line, time) for time, line in lines.items()], known, values
+
+
+def _timecode(text: str, line: int) -> Timecode:
+    found = _TIMECODE.fullmatch(text)
+    if found is None or int(found[2]) > 59 or int(found[3]) > 59:
+        raise ValueError(
+            f"line {line} begins with {shortened(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
+            "shorten it: take the file as it was recorded"
+        )
+    seconds = (int(found[1]) * 60 + int(found[2])) * 60 + int(found[3])
+    if found[4] is None:
+        return Timecode(seconds, 0.0, "")
+    if found[4] in ".,":
+        return Timecode(seconds, float("0." + re.sub("[.,]", "", found[5])), ".")
+    return Timecode(seconds, float(found[5].replace(",", ".")), found[4])
+
+
+def _seconds(codes: list[Timecode]) -> Array:
+    """Return timecodes as seconds since the midnight before the first [shape=(N,)]."""
+    whole = np.array([code.seconds for code in codes], float)
+    frames = np.array([code.frames for code in codes])
+    day_s, mark = DAY_S, codes[0].mark
+    if mark == "." and len(codes) > MISREAD_ROWS and (frames == frames[0]).all():
+        mark = ""
+    if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(whole)) == 1:
+        LOG.warning("rows are a second apart: the last field of the timecodes is taken for frames (MM:SS:FF)")
+        whole, frames, mark = whole // 60, whole % 60, ":"
+    if not mark:
+        starts = np.flatnonzero(np.diff(whole)) + 1
+        if len(starts) < 2:
+            raise ValueError(
+                "the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet has shortened them"
+            )
+        rate = (starts[-1] - starts[0]) / ((whole[starts[-1]] - whole[starts[0]]) % DAY_S)
+        LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(whole), rate)
+        return np.asarray(np.arange(len(whole)) / rate)
+    if mark == ".":
+        time_s = whole + frames
+    else:
+        passed = np.flatnonzero(np.diff(whole) == 1)
+        most = int(frames.max() if len(passed) > 1 else frames[passed].max() if len(passed) else frames.max())
+        if most >= TIMECODE_RATES[-1]:
+            raise InputError(f"a timecode has frame {most}, required less than {TIMECODE_RATES[-1]}")
+        shown = next(rate for rate in TIMECODE_RATES if rate > most)
+        rate = shown if len(passed) else max(shown, APP_RATE)
+        time_s = whole + frames / rate
+        if mark == ";" or _drops_frames(whole, frames, rate):
+            time_s, day_s = _dropped_s(whole, frames, rate), float(_dropped_s(np.array(DAY_S), np.array(0.0), rate))
+    over = np.concatenate([[0.0], np.cumsum(np.diff(time_s) < -DAY_S / 2)])
+    return time_s + day_s * over
+
+
+def _dropped_s(whole: Array, frames: Array, rate: int) -> Array:
+    """Return drop-frame timecodes in seconds: every minute but each tenth leaves out numbers 0 and 1 (SMPTE 12M)."""
+    minutes = np.floor(whole / 60)
+    dropped = rate / 15 * (minutes - np.floor(minutes / 10))
+    return (whole * rate + frames - dropped) * 1001 / (1000 * rate)
+
+
+def _drops_frames(whole: Array, frames: Array, rate: int) -> bool:
+    """Return whether every full minute but each tenth follows the last frame of a second with frame 2 (4 of 60)."""
+    first = np.flatnonzero((np.diff(whole) == 1) & (whole[1:] % 60 == 0) & (whole[1:] % 600 != 0)) + 1
+    jumps = (frames[first - 1] >= rate - 1) & (np.floor(frames[first]) == rate // 15)
+    return rate in {30, 60} and bool(len(first)) and bool(jumps.all())
+
+
+TABLE = MotionFormat(write_table, read_table_motion, check_table)
+LIVE_LINK = MotionFormat(write_take, read_curve_motion, curves="face", rate_hz=float(TICKS_HZ))

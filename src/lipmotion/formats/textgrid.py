@@ -1,0 +1,149 @@
+"""``.TextGrid``: labels of Praat in time, written in long text form, read in long and short form.
+
+Written are the tiers ``phones`` and ``words``. Source: Praat manual, "TextGrid file formats".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, named_tier, required_time
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Timeline, Unit
+from lipmotion.units import RECOGNISED, recognised_phones, words_in_time
+
+TOKEN = re.compile(
+    r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
+)
+"""What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
+MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
+Interval = tuple[float, float, str]
+"""Start and end in seconds, and the text."""
+INTERVALS, POINTS = "IntervalTier", "TextTier"
+
+
+class _DamagedError(Exception):
+    """The file ends too early, or another token was expected."""
+
+
+def is_textgrid(text: str) -> bool:
+    """Return whether a text begins as Praat's files do."""
+    return MARK.match(text) is not None
+
+
+def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
+    """Return the interval tiers of a TextGrid; point tiers are ignored.
+
+    where : the file's name, for messages
+    Raises InputError: not a whole TextGrid.
+    """
+    tokens = _tokens(text)
+    tiers: list[LabelTier] = []
+    total = 0
+    place = "the header"
+    try:
+        _take(tokens, "text")
+        if _take(tokens, "text") != "TextGrid":
+            raise InputError(f"{where}: a Praat file of another kind; save a TextGrid")
+        _take(tokens, "number"), _take(tokens, "number")  # from when to when it lasts
+        tier_count = _count(tokens) if _take(tokens, "flag") == "exists" else 0
+        for number in range(1, tier_count + 1):
+            place = f"tier {number}"
+            kind, name = _take(tokens, "text"), _take(tokens, "text")
+            place = f"tier {shortened(name)!r}"
+            _take(tokens, "number"), _take(tokens, "number")
+            count = _count(tokens)
+            total += count
+            check_count(total, where)
+            if count and kind not in (INTERVALS, POINTS):
+                raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
+            labels = []
+            for position in (f"{place}, interval {i + 1}" for i in range(count)):
+                start_s = required_time(_take(tokens, "number"), position, where)
+                end_s = required_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
+                labels.append(TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), position))
+            tiers += [named_tier(name, labels)] if kind == INTERVALS else []
+        place = "what follows the last tier"
+        if next(tokens, None) is not None:
+            raise _DamagedError("more is there than the counts say")
+    except _DamagedError as error:
+        raise InputError(f"{where}: {place} is damaged: {error}; save it again in Praat") from error
+    return tiers
+
+
+def _tokens(text: str) -> Iterator[tuple[str, str]]:
+    """Yield kind (text, flag, number) and value of every token."""
+    at = 0
+    while match := TOKEN.search(text, at):
+        at = match.end()
+        if match.lastgroup == "text":
+            while (
+                text[at : at + 1] == '"' and (closing := text.find('"', at + 1)) > 0
+            ):  # written twice: one in the text
+                at = closing + 1
+            yield "text", text[match.start() + 1 : at - 1]
+        elif match.lastgroup:
+            yield match.lastgroup, match[match.lastgroup]
+
+
+def _count(tokens: Iterator[tuple[str, str]]) -> int:
+    value = _take(tokens, "number")
+    if re.fullmatch("[0-9]{1,18}", value) is None:
+        raise _DamagedError(f"there stands number {value[:40]}, required a count")
+    return int(value)
+
+
+def _take(tokens: Iterator[tuple[str, str]], wanted: str) -> str:
+    """Return the value of the next token. Raises _DamagedError: it is of another kind."""
+    kind, value = next(tokens, ("the end of the file", ""))
+    if kind != wanted:
+        raise _DamagedError(f"there stands {kind} {' '.join(value[:40].split())}".rstrip() + f", required a {wanted}")
+    return value
+
+
+def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
+    """Write phones in time to a TextGrid in long text form, with the tiers ``phones`` and ``words``.
+
+    units : the phones; where a label has no phone, the name of its unit is written
+    Words are those of ``units.words_in_time``. If phones were recognised, a third tier, ``recognised``, holds these
+    with their confidence (``p 0.37``), so that a reader can tell them from corrected ones (``units.recognised``).
+    Times are as exact as floats are. After a failure there is no partial file.
+    Raises ExportError: the file cannot be written.
+    Source: Praat manual, "TextGrid file formats".
+    """
+    phones = [(float(span.start_s), float(span.end_s), span.label.phone or span.label.unit) for span in units]
+    words = [(float(span.start_s), float(span.end_s), span.label) for span in words_in_time(units)]
+    tiers = [("phones", phones), ("words", words)]
+    recognised = [
+        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in recognised_phones(units)
+    ]
+    if recognised:
+        tiers.append((RECOGNISED, recognised))
+    end_s = max((float(span.end_s) for span in units), default=0.0)
+    lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
+    lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
+    for number, (name, intervals) in enumerate(tiers, 1):
+        whole = _filled(intervals, end_s)
+        lines += [f"    item [{number}]:", '        class = "IntervalTier"', f'        name = "{name}"']
+        lines += ["        xmin = 0", f"        xmax = {end_s}", f"        intervals: size = {len(whole)}"]
+        for place, (start_s, stop_s, text) in enumerate(whole, 1):
+            quoted = text.replace('"', '""')
+            lines += [f"        intervals [{place}]:", f"            xmin = {start_s}", f"            xmax = {stop_s}"]
+            lines.append(f'            text = "{quoted}"')
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _filled(intervals: list[Interval], duration_s: float) -> list[Interval]:
+    """Return intervals from 0 s to the end that follow each other; what was a gap has no text. Praat requires that."""
+    whole: list[Interval] = []
+    end_s = 0.0
+    for start_s, stop_s, text in intervals:
+        if start_s > end_s:
+            whole.append((end_s, start_s, ""))
+        whole.append((end_s if start_s < end_s else start_s, stop_s, text))
+        end_s = stop_s
+    return [*whole, (end_s, duration_s, "")] if end_s < duration_s else whole

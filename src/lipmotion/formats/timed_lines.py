@@ -1,0 +1,211 @@
+"""Labels in time, one a line: of HTK, Audacity and TIMIT, NIST's CTM and STM, tables with a header, texts of LRS."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from io import StringIO
+from itertools import islice
+from pathlib import Path
+from statistics import median
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import (
+    LINES,
+    MOST_LABELS,
+    PHONE_LABELS,
+    TICKS_PER_S,
+    WORDS,
+    LabelTier,
+    TimedLabel,
+    check_count,
+    in_seconds,
+    named_tier,
+    phone_of,
+    required_time,
+)
+
+SHORTEST_TICKS = 10_000
+"""Whole numbers below a millisecond are not taken as ticks at sight: "20 30 people" is a sentence."""
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
+WHOLE = re.compile(r"(\d+)\s+(\d+)\s+(\S+)(?:\s.*)?")
+STARTS = re.compile(r"(\d+)\s+([^\d\s]\S*)")
+SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?|([-+]?\d+,\d+)\t([-+]?\d+,\d+)(?:\t(.*))?")
+CTM = re.compile(rf"(\S+)\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")
+"""Recording, channel, start and duration in seconds, word, confidence."""
+STM = re.compile(rf"(\S+)\s+\S+\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(?:<[^<>]*>\s*)?(.*)")
+"""Recording, channel, speaker, start and end in seconds, kind, words."""
+RTTM = re.compile(r"(?:SPEAKER|SPKR-INFO)\s+\S+\s+\S+\s")
+COMMENT = (";;", "#")
+LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
+"""The first line of a text of LRS: what is said."""
+LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
+COLUMNS = {
+    "start": {"begin", "start", "starttime", "starts", "tmin", "onset"},
+    "end": {"end", "endtime", "ends", "stop", "tmax", "offset"},
+    "duration": {"duration", "dur"},
+    "text": {"label", "text", "word", "phone", "transcript", "transcription", "utterance"},
+    "kind": {"type", "tier", "tiername"},
+    "speaker": {"speaker", "speakerid", "participant"},
+}
+"""Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
+TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
+LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
+"""Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
+
+
+def line_tiers(text: str, where: str) -> list[LabelTier] | None:
+    """Return the labels of a text whose lines hold times, or None if they do not; the first line decides.
+
+    HTK's lines are ``start end label`` in 100 ns (further columns are ignored), or ``start label``, where each label
+    ends where the next one starts; Audacity's are ``start end label`` in seconds; TIMIT's in samples at 16 kHz.
+    where : the file's name, for messages
+    Raises InputError: a later line is of another form, or has a time that is none, with its number.
+    """
+    first = next((line for _, line in _lines(text)), "")
+    if RTTM.match(first):
+        raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
+    columns = _header(first)
+    if columns or LRS_TEXT.match(text):
+        return _table(text, columns, where) if columns else _lrs(text, where)
+    whole, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
+    if SECONDS.fullmatch(first):
+        return [_spans(text, SECONDS, where)]
+    if whole and (float(whole[2]) >= SHORTEST_TICKS or _are_spans(text)):
+        return [_spans(text, WHOLE, where)]
+    lines = [line for _, line in islice(_lines(text), MOST_LABELS + 1)] if starts else []
+    last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
+    if last and float(last[1]) >= SHORTEST_TICKS:
+        rows = list(_fitted(text, STARTS, "start label", where))
+        edges_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
+        spans = zip(edges_s, edges_s[1:], rows, strict=False)
+        return [LabelTier("labels", tuple(TimedLabel(a, b, row[1], f"line {number}") for a, b, (number, row) in spans))]
+    first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
+    for form in (STM, CTM):
+        found = form.fullmatch(first)
+        if found is not None and "." in found[3] + found[4] and not re.match(rf"(?:{NUMBER})(?:\s|$)", found[5]):
+            return _nist(text, form, where)
+    return None
+
+
+def _lines(text: str) -> Iterator[tuple[int, str]]:
+    """Yield number and text of every line, except blank ones and Audacity's pitch ranges."""
+    for number, line in enumerate(StringIO(text), 1):
+        stripped = line.strip()
+        if stripped and not stripped.startswith("\\"):
+            yield number, stripped
+
+
+def _fitted(text: str, form: re.Pattern[str], wanted: str, where: str) -> Iterator[tuple[int, tuple[str, ...]]]:
+    """Yield number and groups of every line. Raises InputError: one is of another form, or there are too many."""
+    for count, (number, line) in enumerate(_lines(text), 1):
+        check_count(count, where)
+        match = form.fullmatch(line)
+        if match is None and not (wanted.startswith("recording") and line.startswith(COMMENT)):
+            raise InputError(f"{where}: line {number} is {shortened(line)!r}; required, as in line 1: {wanted}")
+        if match is not None:
+            yield number, tuple(group for group in match.groups(default="") if group or form is not SECONDS)
+
+
+def _are_spans(text: str) -> bool:
+    """Return whether whole numbers before every label are times: they are in order, and last too long for seconds."""
+    found = [WHOLE.fullmatch(line) for _, line in islice(_lines(text), 1000)]
+    spans = [(int(match[1]), int(match[2])) for match in found if match and len(match[1]) < 15 > len(match[2])]
+    in_order = all(a <= b for a, b in spans) and spans == sorted(spans)
+    return len(found) == len(spans) > 2 and in_order and median(end - start for start, end in spans) > 45
+
+
+def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
+    """Return the labels of lines with start and end, in seconds, samples, milliseconds or ticks."""
+    labels = []
+    for number, (start, end, *words) in _fitted(text, form, "start end label", where):
+        place = f"line {number}"
+        start_s, end_s = (required_time(time, place, where) for time in (start, end))
+        labels.append(TimedLabel(start_s, end_s, words[0].strip() if words else "", place))
+    tier = LabelTier("labels", tuple(labels))
+    if form is SECONDS:
+        return in_seconds([tier], where)[0]
+    lengths = [label.end_s - label.start_s for label in labels if label.end_s > label.start_s]
+    is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(label.text == TIMIT_SILENCE for label in labels)
+    short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
+    if is_timit or not short:
+        return in_seconds([tier], where, TIMIT_HZ if short else TICKS_PER_S)[0]
+    role = PHONE_LABELS if all(phone_of(label.text) for label in labels) else WORDS
+    return in_seconds([replace(tier, role=role)], where)[0]
+
+
+def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
+    """Return the words of a CTM or the lines of an STM in order of time, a tier for each channel or speaker.
+
+    Raises InputError: a line of another form, or with a time that is none (with its number), or several recordings.
+    """
+    wanted = "recording channel start duration word" if form is CTM else "recording channel speaker start end words"
+    by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
+    recording = ""
+    for number, (name, speaker, start, end, words) in _fitted(text, form, wanted, where):
+        recording = recording or name
+        if name != recording:
+            names = f"{shortened(recording)!r} and {shortened(name)!r}"
+            raise InputError(f"{where}: line {number}: words of two recordings, {names}; keep those of one")
+        start_s, end_s = (required_time(time, f"line {number}", where) for time in (start, end))
+        if form is CTM and end_s < 0:
+            raise InputError(f"{where}: line {number}: a duration of {end_s:g} s, required 0 or more")
+        end_s += start_s if form is CTM else 0.0
+        by_speaker[speaker].append(TimedLabel(start_s, end_s, words, f"line {number}"))
+    role = WORDS if form is CTM else LINES
+    several = len(by_speaker) > 1
+    return [
+        LabelTier(speaker, tuple(sorted(labels, key=lambda label: label.start_s)), role, speaker if several else "")
+        for speaker, labels in by_speaker.items()
+    ]
+
+
+def _lrs(text: str, where: str) -> list[LabelTier]:
+    """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds."""
+    heading, said = LRS_WORDS.search(text), LRS_TEXT.match(text)
+    if heading is None:
+        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, said[1] if said else "", "line 1"),), LINES)]
+    rows = re.split(r"\n\s*\n", text[heading.start() :], maxsplit=1)[0]
+    padded = "\n" * text.count("\n", 0, heading.start()) + re.sub(r"[ \t]+", "\t", rows)
+    return _table(padded, _header("WORD\tSTART\tEND"), where)
+
+
+def _header(line: str) -> dict[str, int]:
+    """Return the columns of a table whose first line names a start, an end or a duration, and a text; else none."""
+    if len(line) > 1000 or "\ufeff" in line:
+        return {}
+    names = [re.sub(r"[\s_]", "", name.strip(' "')).lower() for name in re.split(r"[,;\t]", line)]
+    found = {kind: place for kind, known in COLUMNS.items() for place, name in enumerate(names) if name in known}
+    return found if {"start", "text"} <= found.keys() and {"end", "duration"} & found.keys() else {}
+
+
+def _table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
+    """Return the tiers of a table with a header: of the Montreal Forced Aligner, Praat, or anybody.
+
+    Raises InputError: a line of another form, with its number.
+    """
+    header = next(line for _, line in _lines(text))
+    delimiter = max(",;\t", key=header.count)
+    kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)
+    named = re.split(r"[,;\t]", header)[columns["text"]].strip(' "')
+    for number, line in islice(_lines(text), 1, None):
+        check_count(number, where)
+        place = f"line {number}"
+        try:
+            fields = next(csv.reader([line], delimiter=delimiter))
+            row = {
+                kind: fields[column] for kind, column in columns.items() if column < len(fields) or kind != "speaker"
+            }
+            times = (row["start"], row.get("end") or row["duration"])
+        except (ValueError, IndexError, KeyError, csv.Error) as error:
+            raise InputError(f"{where}: {place} is {shortened(line)!r}; required, as in line 1: {header}") from error
+        start_s, end_s = (required_time(time, place, where) for time in times)
+        end_s += 0.0 if row.get("end") else start_s
+        key = (row.get("kind", named), row.get("speaker", ""))
+        kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
+    tiers = [named_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
+    return in_seconds(tiers, where)

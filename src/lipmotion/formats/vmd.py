@@ -1,0 +1,225 @@
+"""``.vmd``: a motion of MikuMikuDance: the morphs あ い う え お ん, blinks, brows, and the turns of head and eyes.
+
+Source: the layout as MikuMikuDance 9 writes it: a header, then counted lists of keys of bones (name, frame, place,
+rotation, 64 bytes of interpolation), of morphs (name, frame, weight), of the camera, of lights and of shadows, 30
+frames a second. Names are in Shift JIS, or as other countries' programs write them. Camera, lights and shadows are
+passed over, and between keys of bones everything is linear.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.errors import InputError
+from lipmotion.formats.base import MotionFormat, key_frames
+from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_weights, given_gaze
+from lipmotion.meshes.model.head_angles import ANGLES, head_angles, head_quaternions
+from lipmotion.meshes.model.other_shapes import CLOSED
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_VOWELS, arkit_name, vowel_name
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
+from lipmotion.types.motion import RADIAN
+
+Keys = Sequence[tuple[int, float]]
+"""Frames and values."""
+Turns = Sequence[tuple[int, tuple[float, float, float, float]]]
+"""Frames and rotations, as quaternions x, y, z, w."""
+
+RATE_HZ = 30.0
+MARK, OLD_MARK = b"Vocaloid Motion Data 0002", b"Vocaloid Motion Data file"
+MARK_BYTES, MODEL_BYTES, OLD_MODEL_BYTES = 30, 20, 10
+ENCODING = "cp932"
+ENCODINGS = (ENCODING, "gb18030", "euc_jp", "utf-8", "big5", "euc_kr")
+"""Encodings of names, the usual one first: programs in other countries write their own."""
+BONE_KEY, MORPH_KEY, COUNT = struct.Struct("<15sI3f4f64s"), struct.Struct("<15sIf"), struct.Struct("<I")
+_SLOW, _FAST = bytes([20]), bytes([107])
+LINEAR = (
+    *(_SLOW * 2 + bytes(2) + _SLOW * 4 + _FAST * 8),
+    *(_SLOW * 7 + _FAST * 8 + bytes(1)),
+    *(_SLOW * 6 + _FAST * 8 + bytes(2)),
+    *(_SLOW * 5 + _FAST * 8 + bytes(3)),
+)
+"""The bytes of a bone's key that say: straight on to the next one."""
+LARGEST_FILE_BYTES = 1 << 28
+LAST_FRAME = 86_400 * 30
+"""Frames of a day."""
+MORPHS: Mapping[str, tuple[str, ...]] = {
+    "あ": ("aa",),
+    "い": ("ih",),
+    "う": ("ou",),
+    "え": ("ee",),
+    "お": ("oh",),
+    "ん": (CLOSED,),
+    "まばたき": ("eyeBlinkLeft", "eyeBlinkRight"),
+    "上": ("browInnerUp",),
+    "下": ("browDownLeft", "browDownRight"),
+    "びっくり": ("eyeWideLeft", "eyeWideRight"),
+}
+"""The standard morphs of models, and the channels whose mean each is: vowels, pressed lips, blinks, raised brows; of
+moods, lowered brows and wide eyes."""
+HEAD, EYES = "頭", "両目"
+"""The bones of the head, and of both eyes."""
+MIRRORED = np.array([-1.0, -1.0, 1.0, 1.0])
+"""Signs that turn a rotation of glTF's axes into one of MikuMikuDance's, whose z goes into the face, and back."""
+TOLERANCE = 1e-7
+"""Keys are left out where a straight line is that near."""
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write keys of the morphs and of the head whose channels the motion has, in 30ths of a second."""
+    motion = generation.motion
+    time_s = motion.time_s
+    frames = np.rint(time_s * RATE_HZ).astype(int).tolist()
+    morphs: list[tuple[int, str, float]] = []
+    for morph, sources in MORPHS.items():
+        if all(name in motion.names for name in sources):
+            values = np.mean([motion[name] for name in sources], axis=0)
+            stepped = bool({*sources} & {*generation.stepped})
+            kept = key_frames(time_s, values, TOLERANCE, stepped=stepped)
+            if stepped:  # between keys everything is linear
+                kept = sorted({*kept, *(frame - 1 for frame in kept if frame)})
+            morphs += [(frames[frame], morph, float(values[frame])) for frame in kept]
+    curves = {name: motion[name].astype(np.float64) for name in (*ANGLES, *MOVED_BY["gaze"]) if name in motion.names}
+    angles = {}
+    if {*ANGLES} <= {*curves}:
+        angles[HEAD] = np.stack([curves[name] for name in ANGLES], axis=1)
+    if {*MOVED_BY["gaze"]} & {*curves}:
+        still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
+        angles[EYES] = np.pad(given_gaze(still | curves), ((0, 0), (0, 1)))
+    turns = {bone: (head_quaternions(turned) * MIRRORED).tolist() for bone, turned in angles.items()}
+    bones = [
+        (frame, bone, turn)
+        for frame, *each in zip(frames, *turns.values(), strict=True)
+        for bone, turn in zip(turns, each, strict=True)
+    ]
+    with path.open("wb") as file:
+        file.write(MARK.ljust(MARK_BYTES, b"\0") + _named("lipmotion", MODEL_BYTES) + COUNT.pack(len(bones)))
+        for frame, bone, turn in bones:
+            file.write(BONE_KEY.pack(_named(bone, 15), frame, 0, 0, 0, *turn, bytes(LINEAR)))
+        file.write(COUNT.pack(len(morphs)))
+        for frame, morph, value in sorted(morphs, key=lambda key: key[0]):
+            file.write(MORPH_KEY.pack(_named(morph, 15), frame, value))
+        file.write(4 * COUNT.pack(0))  # camera, lights, shadows, and what newer versions hold of inverse kinematics
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the vowels, blinks, brows, gaze and head's angles of a file at 30 frames a second; an empty timeline.
+
+    Weights are linear between keys, and constant before the first and after the last one. Raises InputError: no motion
+    of MikuMikuDance, or none of its morphs is one of the mouth.
+    """
+    morphs, bones, camera = _read_keys(path, lambda name: bool(_channels(name)) or name in {HEAD, EYES})
+    moved = {name for morph in morphs for name in _channels(morph)}
+    if not moved & {*VRM_VOWELS, *ARKIT_MOUTH}:
+        named = ", ".join([*morphs][:8]) or "none"
+        raise InputError(
+            f"the motion has none of the morphs あ い う え お; its morphs are: {named}; "
+            f"it moves {len(bones)} bones and has {camera} keys of a camera; save the motion of the face"
+        )
+    last = max(keys[-1][0] for keys in (*morphs.values(), *bones.values()))
+    frames = np.arange(last + 1)
+    curves: dict[str, tuple[np.ndarray, str]] = {}
+    for morph, keys in sorted(morphs.items(), key=lambda each: each[0] not in MORPHS):
+        at, values = zip(*keys, strict=True)
+        for name in _channels(morph):
+            curves.setdefault(name, (np.interp(frames, at, values), WEIGHT))
+    if HEAD in bones:
+        curves |= {
+            name: (curve, RADIAN) for name, curve in zip(ANGLES, _turned(HEAD, bones[HEAD], frames).T, strict=True)
+        }
+    if EYES in bones:
+        looks = gaze_weights(_turned(EYES, bones[EYES], frames)[:, :2])
+        curves |= {name: (curve, WEIGHT) for name, curve in looks.items()}
+    table = np.stack([curve for curve, _ in curves.values()], axis=1)
+    return Motion(table, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())
+
+
+def _channels(morph: str) -> tuple[str, ...]:
+    """Return the channels that a morph moves: a standard one, or a vowel or blendshape by its name; none of others."""
+    known = vowel_name(morph) or arkit_name(morph)
+    return MORPHS.get(morph, (known,) if known else ())
+
+
+def _turned(bone: str, keys: Turns, frames: np.ndarray) -> np.ndarray:
+    """Return the angles of a bone at some frames [shape=(T, 3)]. Raises InputError: a rotation is none."""
+    at, turns = zip(*keys, strict=True)
+    if not all(map(any, turns)):
+        raise InputError(f"a rotation of the bone {bone} is none (0 0 0 0); save the motion again in MikuMikuDance")
+    angles = np.unwrap(head_angles(np.array(turns) * MIRRORED), axis=0)
+    return np.stack([np.interp(frames, at, column) for column in angles.T], axis=1)
+
+
+def _named(name: str, size: int) -> bytes:
+    """Return a name in Shift JIS in so many bytes, cut between letters."""
+    kept = name.encode(ENCODING, "replace")
+    while len(kept) > size:
+        name = name[:-1]
+        kept = name.encode(ENCODING, "replace")
+    return kept.ljust(size, b"\0")
+
+
+def _read_keys(path: Path, is_known: Callable[[str], bool]) -> tuple[Mapping[str, Keys], Mapping[str, Turns], int]:
+    """Return the keys of morphs and bones by their names, in order, and the number of the camera's.
+
+    Of several keys of one frame, the last counts.
+
+    is_known : whether a name means something: that shows the encoding of all names
+    Raises InputError: not a VMD file, too large, cut short, or a value that is not finite.
+    """
+    size = path.stat().st_size
+    if size > LARGEST_FILE_BYTES:
+        raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the motion")
+    content = path.read_bytes()
+    model_bytes = MODEL_BYTES if content.startswith(MARK) else OLD_MODEL_BYTES
+    if not content.startswith((MARK, OLD_MARK)):
+        raise InputError("not a motion of MikuMikuDance: its first bytes are not those of the format; save it again")
+    at = MARK_BYTES + model_bytes
+    bones: dict[bytes, dict[int, tuple[float, float, float, float]]] = {}
+    morphs: dict[bytes, dict[int, float]] = {}
+    camera = 0
+    try:
+        for name, frame, (_, _, _, x, y, z, w) in _keys(content, at, BONE_KEY):
+            bones.setdefault(name, {})[frame] = (x, y, z, w)
+        at += COUNT.size + COUNT.unpack_from(content, at)[0] * BONE_KEY.size
+        for name, frame, (value,) in _keys(content, at, MORPH_KEY) if at < len(content) else ():
+            morphs.setdefault(name, {})[frame] = value
+        if at < len(content):
+            at += COUNT.size + COUNT.unpack_from(content, at)[0] * MORPH_KEY.size
+            camera = COUNT.unpack_from(content, at)[0] if at + COUNT.size <= len(content) else 0
+    except struct.error as error:
+        raise InputError("the motion of MikuMikuDance is cut short; save it again") from error
+    encoding = max(ENCODINGS, key=lambda each: _understood((*morphs, *bones), each, is_known))
+    return (
+        {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in morphs.items()},
+        {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in bones.items()},
+        camera,
+    )
+
+
+def _understood(names: Iterable[bytes], encoding: str, is_known: Callable[[str], bool]) -> tuple[int, int]:
+    """Return how many names an encoding makes known ones, and minus how many letters it cannot read."""
+    texts = [name.decode(encoding, "replace") for name in names]
+    return sum(map(is_known, texts)), -sum(text.count("\ufffd") for text in texts)
+
+
+def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[bytes, int, list[float]]]:
+    """Yield the name of each key of a counted list, its frame and its numbers.
+
+    Raises struct.error: it is cut short. Raises InputError: a frame of another day, or a value that is not finite.
+    """
+    (count,) = COUNT.unpack_from(content, at)
+    if count * form.size > len(content) - at - COUNT.size:
+        raise struct.error
+    for raw, frame, *values in form.iter_unpack(content[at + COUNT.size : at + COUNT.size + count * form.size]):
+        name = raw.partition(b"\0")[0]
+        numbers = [value for value in values if isinstance(value, float)]
+        if frame > LAST_FRAME or not np.isfinite(numbers).all():
+            text = name.decode(ENCODING, "replace")
+            raise InputError(f"a key of {text!r} at frame {frame} is none; save the motion again in MikuMikuDance")
+        yield name, frame, numbers
+
+
+MOTION_FORMAT = MotionFormat(write, read, curves="vowels", rate_hz=RATE_HZ, fixed_rate=True, keyed=True)

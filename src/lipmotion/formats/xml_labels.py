@@ -1,0 +1,134 @@
+"""XML with labels in time: ELAN's ``.eaf``, TTML (also DFXP, IMSC, lyrics), and YouTube's captions."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import defaultdict
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, named_tier
+from lipmotion.types.values import clock_seconds
+
+ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
+"""The first element of XML; those of ``READ_ROOTS`` hold labels in time."""
+READ_ROOTS = ("ANNOTATION_DOCUMENT", "tt", "transcript", "timedtext")
+OFFSET_TIME = re.compile(r"(\d+(?:\.\d+)?)(h|ms|m|s|f|t)?")
+NEAR_S, DEEPEST = 0.01, 20
+
+
+def xml_tiers(text: str, where: str) -> list[LabelTier]:
+    """Return the tiers of an ``.eaf``, or the lines of captions.
+
+    where : the file's name, for messages
+    Raises InputError: damaged XML, or a time that is none.
+    """
+    if re.search(r"<!(?:DOCTYPE|ENTITY)", text, re.IGNORECASE):
+        raise InputError(f"{where}: its XML declares entities, which are not read; save it without them")
+    try:
+        root = ElementTree.fromstring(text.encode().lstrip())  # noqa: S314 (no entities)
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        raise InputError(f"{where}: damaged XML ({error}); save it again") from error
+    check_count(sum(1 for _ in root.iter()) // 4, where)
+    for element in root.iter():  # without namespaces
+        element.tag = str(element.tag).rpartition("}")[2]
+    return _elan_tiers(root, where) if root.tag == "ANNOTATION_DOCUMENT" else [_caption_tier(root, where)]
+
+
+def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
+    """Return the tiers of ELAN; annotations that divide another without times are one label with its time."""
+    slots_s = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
+    times_s = {name: _seconds(f"{value}ms", {}, where) if value else math.nan for name, value in slots_s.items()}
+    spans_s: dict[str | None, tuple[float, float]] = {}
+    owners: dict[str | None, str | None] = {}
+    for each in root.iter("ALIGNABLE_ANNOTATION"):
+        start_s, end_s = (times_s.get(each.get(f"TIME_SLOT_REF{edge}"), math.nan) for edge in (1, 2))
+        spans_s[each.get("ANNOTATION_ID")] = start_s, end_s
+    for each in root.iter("REF_ANNOTATION"):
+        owners[each.get("ANNOTATION_ID")] = each.get("ANNOTATION_REF")
+    tiers = []
+    for tier in root.iter("TIER"):
+        name = tier.get("TIER_ID", "")
+        texts: dict[str | None, list[str]] = defaultdict(list)
+        for each in (*tier.iter("ALIGNABLE_ANNOTATION"), *tier.iter("REF_ANNOTATION")):
+            aligned = each.get("ANNOTATION_ID")
+            for _ in range(DEEPEST):
+                aligned = owners.get(aligned, aligned) if aligned not in spans_s else aligned
+            texts[aligned].append((each.findtext("ANNOTATION_VALUE") or "").strip())
+        timed = [(spans_s.get(aligned, (math.nan, math.nan)), " ".join(parts)) for aligned, parts in texts.items()]
+        rows = enumerate(sorted(timed, key=lambda row: (math.isnan(row[0][0]), row[0])), 1)
+        labels = [TimedLabel(*span_s, text, f"tier {name!r}, annotation {number}") for number, (span_s, text) in rows]
+        found = named_tier(name, labels, tier.get("PARTICIPANT") or "")
+        role = found.role or (OTHER if tier.get("PARENT_REF") else LINES if found.speaker else "")
+        tiers.append(LabelTier(name, found.labels, role, found.speaker))
+    return tiers
+
+
+def _caption_tier(root: Element, where: str) -> LabelTier:
+    """Return the lines of TTML or of YouTube's captions; spans with times are parts of them."""
+    attributes = {name.rpartition("}")[2]: value for name, value in root.attrib.items()}
+    multiplier = attributes.get("frameRateMultiplier", "1 1").replace(":", " ").split()
+    try:
+        frames = float(attributes.get("frameRate", "30")) * float(multiplier[0]) / float(multiplier[-1])
+        per_s = {"f": frames, "t": float(attributes.get("tickRate") or (frames if "frameRate" in attributes else 1))}
+    except (ValueError, ZeroDivisionError, IndexError):
+        per_s = {"f": 0.0, "t": 0.0}
+    if not min(per_s.values()) > 0:
+        raise InputError(f"{where}: its rate of frames or ticks is no number above 0")
+    labels: list[TimedLabel] = []
+
+    def visit(element: Element, start_s: float, end_s: float) -> None:
+        start_s, end_s = _times(element, start_s, end_s, per_s, where)
+        if element.tag not in ("p", "text"):
+            for child in element:
+                visit(child, start_s, end_s)
+            return
+        place = f"line {len(labels) + 1}"
+        parts: list[TimedLabel] = []
+        glued = False
+        for child in element.iter():
+            child.text = f"\n{child.text or ''}" if child.tag == "br" else child.text
+            if child is element or not {"begin", "t"} & child.attrib.keys():
+                continue
+            text, times_s = "".join(child.itertext()), _times(child, start_s, end_s, per_s, where)
+            if glued and not text[:1].isspace():  # a syllable
+                text, times_s = parts[-1].text + text, (parts.pop().start_s, times_s[1])
+            parts.append(TimedLabel(*times_s, text, place))
+            glued = not f"{text}{child.tail or ''}"[-1:].isspace()
+        shown = "".join(element.itertext())
+        whole = "".join(shown.split()) == "".join("".join(part.text for part in parts).split())
+        labels.append(TimedLabel(start_s, end_s, shown, place, tuple(parts) if whole else ()))
+
+    visit(root, 0.0, math.inf)
+    return LabelTier("captions", tuple(labels), LINES)
+
+
+def _times(element: Element, start_s: float, end_s: float, per_s: dict[str, float], where: str) -> tuple[float, float]:
+    """Return the start and the end of an element within those of its owner, to which its times are relative.
+
+    Where they go beyond the owner's end, and would fit as times of the whole file, they are such.
+    """
+    given = {name: element.get(name) for name in ("begin", "end", "dur", "start", "t", "d")}
+    ms = {name: f"{value}ms" for name, value in given.items() if name in ("t", "d") and value}
+    begin, end, duration = (
+        None if value is None else _seconds(value, per_s, where)
+        for value in (given["begin"] or given["start"] or ms.get("t"), given["end"], given["dur"] or ms.get("d"))
+    )
+    from_s = start_s + (begin or 0.0)
+    until_s = from_s + duration if duration is not None else start_s + end if end is not None else end_s
+    absolute = begin is not None and end is not None and start_s <= begin + NEAR_S and end <= end_s + NEAR_S
+    if begin is not None and end is not None and absolute and until_s > end_s + NEAR_S:
+        return begin, end
+    return from_s, until_s
+
+
+def _seconds(value: str, per_s: dict[str, float], where: str) -> float:
+    """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: it is none."""
+    clock_s, offset = clock_seconds(value, per_s.get("f", 0)), OFFSET_TIME.fullmatch(value.strip())
+    if not math.isnan(clock_s):
+        return clock_s
+    if offset is None:
+        raise InputError(f"{where}: a time is {shortened(value)!r}, required as in 00:00:01.500, 1.5s or 36f")
+    return float(offset[1]) / {"h": 1 / 3600, "m": 1 / 60, "ms": 1000, **per_s}.get(offset[2] or "s", 1)

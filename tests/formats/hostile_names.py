@@ -1,0 +1,258 @@
+"""Names and texts that break formats which do not escape them, and what each writer makes of them."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import html
+import json
+import re
+from collections.abc import Callable, Iterator
+from io import StringIO
+from itertools import product
+from pathlib import Path
+from urllib.parse import quote
+from xml.etree import ElementTree
+
+import numpy as np
+
+from lipmotion.articulation.cue_sheets import CueSheet
+from lipmotion.citations import model_citations
+from lipmotion.errors import ExportError, InputError
+from lipmotion.formats.base import read_motion, write_motion
+from lipmotion.formats.cues import write_cue_file
+from lipmotion.formats.label_files import write_labels
+from lipmotion.formats.textgrid import parse_interval_tiers
+from lipmotion.meshes.files.gltf_container import read_gltf_document
+from lipmotion.meshes.files.gltf_writer import write_gltf_scene
+from lipmotion.meshes.files.usd_writer import write_usda
+from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.batch.marks import Mark
+from lipmotion.pipeline.batch.report import _field, _for_page
+from lipmotion.printable import is_line, printable
+from lipmotion.storage.files import as_text
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion_faces.video.synthetic_mark import mark_metadata
+
+PARTS = (
+    *('"', '""', "'", "'''", "\\", "\\\\", '\\"', "\n", "\r\n", "\r", "\t", "\0", "\x1b[2J", "\x7f", "\x85", "\u2028"),
+    *("]]>", "-->", "--", "<!--", "<script>alert(1)</script>", "</script>", "&amp;", "&#0;", "&", "<", ">", "<b>"),
+    *(
+        "\ud800",
+        "\udcff",
+        "\udc00\ud800",
+        "\u202e",
+        "\u200f",
+        "\u200d",
+        "\ufeff",
+        "\uffff",
+        "\U0001f600",
+        "é",
+        "e\u0301",
+    ),
+    *("@", "@@@", "@@@@", ";", ",", "=cmd()", "+1", "-1", "|", "#", "%s", "{0}", "${x}", "`x`", "$(x)", "//", "/*"),
+    *(
+        "# x",
+        "o x\nv 1 2 3",
+        '"; import os; os.abort(); "',
+        "'+__import__('os').abort()+'",
+        "}\n@misc{x,",
+        "]",
+        "[",
+        "}",
+    ),
+    *(" ", "  ", "\u3000", "\xa0", "", "a b", "NOTE", "WEBVTT", "00:00 --> 00:01", "time_s", "x" * 300, "٣", "fap3_é"),
+)
+
+
+def names() -> Iterator[str]:
+    """Yield every part alone, at both ends and in the middle of a word, and every two of them, each name once."""
+    alone = [name for part in PARTS for name in (part, f"a{part}", f"{part}a", f"a{part}a")]
+    for name in dict.fromkeys([*alone, *(f"a{one}{other}" for one, other in product(PARTS, PARTS))]):
+        if not re.search("[\ud800-\udbff][\udc00-\udfff]", name):  # JSON reads two such halves as one character
+            yield name
+
+
+def generation(name: str, unit: str = "eye_distance", label: Unit | None = None) -> Generation:
+    """Return three frames of a channel of that name."""
+    motion = Motion(np.array([[0.0], [0.5], [0.25]]), 25.0, (Channel(name, unit),))
+    units = Timeline((Span(0.0, 0.1, label or Unit("aa")),))
+    return Generation(motion, np.zeros((3, 1)), units, StateTrace(("",), np.zeros(3, np.intp)))
+
+
+def mesh(name: str) -> Mesh:
+    """Return a triangle with a blendshape, a part and a material of that name."""
+    part = MeshPart(name, 0, 1, Material(name))
+    shape = Blendshape(name, np.array([0]), np.array([[0.0, 0.1, 0.0]]))
+    return Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32), (part,), shapes=(shape,))
+
+
+def _motion_file(suffix: str) -> Callable[[Path, str], None]:
+    def check(folder: Path, name: str) -> None:
+        path = folder / f"a.{suffix}"
+        write_motion(path, generation(name), source={"file": name, "path": name}, model={"name": name})
+        assert read_motion(path)[0].names == (name,)
+
+    return check
+
+
+def _fap(folder: Path, name: str) -> None:
+    path = folder / "a.fap"
+    write_motion(path, generation(f"fap3_{name}"), source={"file": name}, model={})
+    assert read_motion(path)[0].names == ("fap3_open_jaw",)
+
+
+def _script(folder: Path, name: str) -> None:
+    path = folder / "a.blender.py"
+    write_motion(path, generation(name), source={"path": name}, model={})
+    text = path.read_bytes().decode("ascii")
+    body = ast.parse(text[text.index("\nRATE_HZ = ") : text.index("\n}\n") + 3]).body
+    values = {ast.unparse(node.targets[0]): node.value for node in body if isinstance(node, ast.Assign)}
+    assert len(body) == len(values) == 5
+    assert ast.literal_eval(values["SOUND"]) == name
+    assert list(ast.literal_eval(values["MOTION"])) == [name]
+
+
+def _labels(suffix: str, read: Callable[[str], str]) -> Callable[[Path, str], None]:
+    def check(folder: Path, name: str) -> None:
+        path = folder / f"a{suffix}"
+        write_labels(path, generation("a", label=Unit("aa", word=f"x{name}x")).units)
+        assert read(path.read_bytes().decode()) == f"x{name}x"
+
+    return check
+
+
+def _of_textgrid(text: str) -> str:
+    return parse_interval_tiers(text, "a")[1].labels[0].text
+
+
+def _of_webvtt(text: str) -> str:
+    head, times, word, end = text.split("\n")[:1], *text.split("\n")[2:5]
+    assert head == ["WEBVTT"]
+    assert re.fullmatch(r"[\d:.]+ --> [\d:.]+", times)
+    assert end == ""
+    assert "<" not in word
+    assert "-->" not in word
+    return html.unescape(word)
+
+
+def _cues(form: str, read: Callable[[str], list[str]]) -> Callable[[Path, str], None]:
+    def check(folder: Path, name: str) -> None:
+        path, word = folder / f"a.{form}", f"x{name}x"
+        cues = Timeline((Span(0.0, 0.1, "X"), Span(0.1, 0.5, "A")))
+        sheet = CueSheet(cues, 10.0, "ABCDEFX", Timeline((Span(0.1, 0.5, word),)))
+        write_cue_file(path, sheet, as_text(word), form)
+        assert read(path.read_bytes().decode()) in ([as_text(word)], [_seen(as_text(word)), _seen(word)], [])
+
+    return check
+
+
+def _seen(text: str) -> str:
+    """Return a text as formats of lines have it that cannot refuse a word: blanks made one or none."""
+    plain = "".join(text.split()).replace("|", "/")
+    return plain if is_line(plain) else printable(plain)
+
+
+def _of_xml(text: str) -> list[str]:
+    found = ElementTree.fromstring(text)  # noqa: S314 (written by the package)
+    assert [each.text for each in found.iter("mouthCue")] == ["X", "A"]
+    assert found.findtext("metadata/soundFile", "").startswith("x")
+    return []
+
+
+def _of_pgo(text: str) -> list[str]:
+    lines = text.split("\n")
+    assert [line.count("\t") for line in lines] == [0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 3, 4, 0]
+    word, first, last, shapes = lines[12].split()
+    assert (int(first), int(last), int(shapes)) == (1, int(lines[3]) - 1, 1)
+    assert lines[6].strip("\t") == lines[8].strip("\t") == word
+    return ["".join(lines[1].split()), word]
+
+
+def _of_json(text: str) -> list[str]:
+    return [json.loads(text)["metadata"]["soundFile"]]
+
+
+def _of_rows(text: str) -> list[str]:
+    assert [line.split()[-1] for line in text.splitlines()[-3:]] in (["X", "A", "X"], ["rest", "MBP", "rest"])
+    return []
+
+
+def _usda(folder: Path, name: str) -> None:
+    path = folder / "a.usda"
+    write_usda(path, Scene(mesh(name), sound=as_text(f"x{name}")))
+    text = path.read_bytes().decode()
+    assert _usd_tokens(text, "uniform token[] blendShapes") == [as_text(name)]
+    found = re.search(r"filePath = (@@@(?:[^@\n]|@{1,2}(?!@)|\\@@@)*?@{0,2}@@@(?!@)|@[^@\n]*@)\n", text)
+    assert found, text[text.index("filePath") :][:80]
+    mark = 3 if found[1].startswith("@@@") else 1
+    stored = found[1][mark:-mark].replace("\\@@@", "@@@")
+    assert stored.removeprefix("./") == as_text(f"x{name}")
+    assert not re.search(r"[\x00-\x09\x0b-\x1f]", text)
+
+
+def _usd_tokens(text: str, attribute: str) -> list[str]:
+    line = next(line for line in text.split("\n") if line.strip().startswith(attribute))
+    return list(ast.literal_eval(line.partition(" = ")[2]))
+
+
+def _glb(folder: Path, name: str) -> None:
+    path = folder / "a.glb"
+    write_gltf_scene(
+        path, Scene(mesh(name), Motion(np.zeros((2, 1)), 25.0, (Channel(name, WEIGHT),)), sound=f"x{name}")
+    )
+    document = read_gltf_document(path).json
+    assert document["meshes"][0]["extras"]["targetNames"] == [name]
+    assert document["scenes"][0]["extras"]["audio"]["uri"] == quote(as_text(f"x{name}"), safe="/")
+    assert document["materials"][0]["name"] == (name or "part")
+
+
+def _report(_: Path, name: str) -> None:
+    record = {"outputs": [name], "name": name, "recording": f"/{name}"}
+    page = _for_page(record, [name], Path("/"), Mark("redo", name))
+    assert "<" not in page
+    assert "\n" not in page
+    assert json.loads(page)[0] == printable(name)
+    text = StringIO(newline="")
+    csv.writer(text).writerow([_field(name), "b"])
+    text.seek(0)
+    assert list(csv.reader(text)) == [[_field(name), "b"]]
+    assert not _field(name).startswith(("=", "+", "-", "@", "\t", "\r"))
+
+
+def _xmp(_: Path, name: str) -> None:
+    found = ElementTree.fromstring(mark_metadata(f"x{name}x").xmp.encode())  # noqa: S314 (as above)
+    assert any(each.text == printable(f"x{name}x") for each in found.iter())
+
+
+def _bibtex(_: Path, name: str) -> None:
+    entries = model_citations({"engine": "own" + name, "attribution": [f"x{name}x"]})
+    assert sum(line.startswith("@") for line in re.split(r"[\n\r]", entries)) == 1
+
+
+WRITERS: dict[str, Callable[[Path, str], None]] = {
+    **{suffix: _motion_file(suffix) for suffix in ("json", "csv", "npz", "c3d")},
+    "fap": _fap,
+    "blender.py": _script,
+    ".TextGrid": _labels(".TextGrid", _of_textgrid),
+    ".vtt": _labels(".vtt", _of_webvtt),
+    **{form: _cues(form, _of_rows) for form in ("tsv", "dat")},
+    "rhubarb xml": _cues("xml", _of_xml),
+    "rhubarb json": _cues("json", _of_json),
+    "pgo": _cues("pgo", _of_pgo),
+    **{"usda": _usda, "glb": _glb, "reports": _report, "xmp": _xmp, "bibtex": _bibtex},
+}
+"""By format: writes a name into a file of a folder, and reads it back; asserts that it is the same."""
+
+
+def outcome(writer: str, folder: Path, name: str) -> str:
+    """Return ``kept``, or ``refused`` where there is one line and no file instead. Raises what else there is."""
+    try:
+        WRITERS[writer](folder, name)
+    except (ExportError, InputError) as error:
+        good = len(printable(error)) < 1000 and not list(folder.iterdir())
+        return "refused" if good else f"refused with a long line, or a file is left: {error}"
+    for path in folder.iterdir():
+        path.unlink()
+    return "kept"

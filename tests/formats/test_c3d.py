@@ -1,0 +1,316 @@
+"""C3D: what is written is read by others and by us, what others write is read; movements of the head are taken out."""
+
+from __future__ import annotations
+
+import math
+import struct
+import tempfile
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.formats import read_motion, write_motion
+from lipmotion.formats.c3d import BLOCK, C3dFile, read_c3d, write_c3d
+from lipmotion.formats.markers import MILLIMETRES, in_head_frame
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+
+RNG = np.random.default_rng(11)
+POINTS = (61, 291, 13, 14, 152)
+FRAMES = 80
+
+
+@pytest.fixture
+def pointed() -> Generation:
+    """Motion with five points, a distance that they do not show, and a weight."""
+    values = RNG.normal(0, 0.02, (FRAMES, 17)) + np.array([0.1, *np.tile([0.0, -0.8, 0.2], 5), 0.5])
+    names = [f"{axis}_{point}" for point in POINTS for axis in "xyz"]
+    channels = (Channel("opening"), *map(Channel, names), Channel("mouthPucker", WEIGHT))
+    motion = Motion(values, 100.0, channels)
+    return Generation(motion, values, Timeline(()), StateTrace(("a",), np.zeros(FRAMES, np.intp)))
+
+
+@pytest.fixture
+def written(pointed: Generation, tmp_path: Path) -> Path:
+    write_motion(tmp_path / "a.c3d", pointed, source={}, model={})
+    return tmp_path / "a.c3d"
+
+
+def test_motion_comes_back(pointed, written):
+    motion, units = read_motion(written)
+    assert (motion.rate_hz, len(units)) == (100.0, 0)
+    assert set(motion.channels) == set(pointed.motion.channels)
+    for name in motion.names:
+        np.testing.assert_allclose(motion[name], pointed.motion[name], atol=2e-7)
+
+
+def test_others_read_what_is_written(pointed, written):
+    """Oracles: ezc3d and c3d."""
+    ezc3d, c3d = pytest.importorskip("ezc3d"), pytest.importorskip("c3d")
+    theirs = ezc3d.c3d(str(written))
+    labels = theirs["parameters"]["POINT"]["LABELS"]["value"]
+    assert labels == ["LIP_61", "LIP_291", "LIP_13", "LIP_14", "JAW_152", "EYE_L", "EYE_R"]
+    assert theirs["parameters"]["POINT"]["UNITS"]["value"] == ["mm"]
+    assert theirs["parameters"]["POINT"]["RATE"]["value"] == [100.0]
+    places = np.stack([[pointed.motion[f"{axis}_{point}"] for point in POINTS] for axis in "xyz"])
+    np.testing.assert_allclose(theirs["data"]["points"][:3, :5], places * MILLIMETRES, atol=1e-5)
+    np.testing.assert_allclose(theirs["data"]["analogs"][0, 1], pointed.motion["mouthPucker"], atol=1e-7)
+    with written.open("rb") as file:
+        reader = c3d.Reader(file)
+        frames = np.array([points[:, :3] for _, points, _ in reader.read_frames()])
+        assert [label.strip() for label in reader.point_labels] == labels
+        assert reader.point_rate == 100.0
+    np.testing.assert_allclose(frames[:, :5].transpose(2, 1, 0), places * MILLIMETRES, atol=1e-5)
+
+
+@pytest.mark.parametrize("program", ["ezc3d", "c3d"])
+def test_what_others_write_is_read(tmp_path, program):
+    package = pytest.importorskip(program)
+    places = RNG.normal(0, 30, (40, 4, 3))
+    labels, path = ["EYE_L", "EYE_R", "LIP_13", "LIP_14"], tmp_path / "b.c3d"
+    if program == "ezc3d":
+        capture = package.c3d()
+        capture["parameters"]["POINT"]["RATE"]["value"] = [120.0]
+        capture["parameters"]["POINT"]["LABELS"]["value"] = labels
+        capture["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+        capture["data"]["points"] = np.concatenate([places.transpose(2, 1, 0), np.ones((1, 4, 40))])
+        capture.write(str(path))
+    else:
+        writer = package.Writer(point_rate=120)
+        writer.set_point_labels(labels)
+        nothing = np.zeros((4, 2))
+        writer.add_frames([(np.concatenate([frame, nothing], axis=1), np.array([[]])) for frame in places])
+        with path.open("wb") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            writer.write(file)
+    content = read_c3d(path)
+    assert (content.labels, content.rate_hz, content.unit) == (tuple(labels), 120.0, "mm")
+    np.testing.assert_allclose(content.points, places, atol=1e-5)
+
+
+def capture(markers: dict[str, np.ndarray], unit: str = "mm") -> C3dFile:
+    return C3dFile(tuple(markers), np.stack(list(markers.values()), axis=1), 120.0, unit)
+
+
+def face() -> dict[str, np.ndarray]:
+    """Markers in the head's frame, in eye distances: the eyes and the forehead are still."""
+    still = {"Anna:EYE_L": [0.5, 0, 0], "Anna:EYE_R": [-0.5, 0, 0], "Anna:Forehead": [0, 0.5, 0.2]}
+    mouth = {"LIP_13": [0, -0.8, 0.3], "LIP_14": [0, -0.85, 0.3], "chin": [0.01, -1.2, 0.1]}
+    moved = RNG.normal(0, 0.03, (FRAMES, 3, 3))
+    markers = {name: np.tile(np.array(place, float), (FRAMES, 1)) for name, place in still.items()}
+    return markers | {name: np.array(p) + moved[:, n] for n, (name, p) in enumerate(mouth.items())}
+
+
+def turned(angles: np.ndarray) -> np.ndarray:
+    """Return rotations about x, y and z [shape=(T, 3, 3)]."""
+    made = np.tile(np.eye(3), (len(angles), 1, 1))
+    for axis in range(3):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        step = np.tile(np.eye(3), (len(angles), 1, 1))
+        step[:, one, one] = step[:, other, other] = np.cos(angles[:, axis])
+        step[:, one, other], step[:, other, one] = -np.sin(angles[:, axis]), np.sin(angles[:, axis])
+        made = step @ made
+    return made
+
+
+@pytest.mark.parametrize(("unit", "per_mm"), [("mm", 1.0), ("cm", 0.1), ("m", 0.001)])
+def test_movements_of_the_head_are_taken_out(tmp_path, unit, per_mm):
+    still = face()
+    rotations = turned(np.cumsum(RNG.normal(0, 0.02, (FRAMES, 3)), axis=0))
+    shift = np.cumsum(RNG.normal(0, 2, (FRAMES, 3)), axis=0)
+    moved = {n: (np.einsum("tij,tj->ti", rotations, 88 * p) + shift) * per_mm for n, p in still.items()}
+    write_c3d(tmp_path / "a.c3d", capture(moved, unit))
+    motion = read_motion(tmp_path / "a.c3d")[0]
+    assert motion.names == ("opening", *(f"{axis}_{name}" for name in ("13", "14", "chin") for axis in "xyz"))
+    for name, label in (("13", "LIP_13"), ("14", "LIP_14"), ("chin", "chin")):
+        place = np.stack([motion[f"{axis}_{name}"] for axis in "xyz"], axis=1)
+        # one rotation for all frames remains about the axis x, which nothing but the quarter turn fixes
+        np.testing.assert_allclose(np.linalg.norm(place, axis=1), np.linalg.norm(still[label], axis=1), atol=1e-5)
+        np.testing.assert_allclose(place[:, 0], still[label][:, 0], atol=1e-5)
+    expected = np.linalg.norm(still["LIP_13"] - still["LIP_14"], axis=1)
+    np.testing.assert_allclose(motion["opening"], expected, atol=1e-5)
+
+
+def test_axes_with_z_up_are_turned(tmp_path):
+    still = face()
+    z_up = {name: np.stack([p[:, 0], -p[:, 2], p[:, 1]], axis=1) * 90 for name, p in still.items()}
+    write_c3d(tmp_path / "a.c3d", capture(z_up))
+    motion = read_motion(tmp_path / "a.c3d")[0]
+    for axis, column in zip("xyz", range(3), strict=True):
+        np.testing.assert_allclose(motion[f"{axis}_13"], still["LIP_13"][:, column], atol=1e-5)
+
+
+def test_a_face_that_looks_the_other_way_is_turned():
+    still = {name.split(":")[-1]: place for name, place in face().items()}
+    found = in_head_frame({name: place * [-90.0, 90, -90] for name, place in still.items()}, "mm")
+    np.testing.assert_allclose(found["LIP_13"], still["LIP_13"], atol=1e-9)
+
+
+def test_without_eyes_an_eye_distance_is_stated(tmp_path):
+    mouth = {name: place * 90 for name, place in face().items() if ":" not in name}
+    write_c3d(tmp_path / "a.c3d", capture(mouth))
+    np.testing.assert_allclose(read_motion(tmp_path / "a.c3d")[0]["y_chin"], mouth["chin"][:, 1] / 90, atol=1e-6)
+
+
+def test_gaps_are_bridged_and_lost_markers_left_out(tmp_path):
+    markers = face()
+    ramp = np.linspace(0.1, 1, FRAMES)
+    markers["chin"] = np.stack([ramp, ramp, ramp], axis=1)
+    markers["chin"][20:30] = np.nan
+    markers["lost"] = np.where(np.arange(FRAMES)[:, None] < 50, np.nan, markers["LIP_13"])
+    markers["*7"] = markers["LIP_13"]
+    del markers["Anna:EYE_L"]
+    write_c3d(tmp_path / "a.c3d", capture(markers, "m"))
+    motion = read_motion(tmp_path / "a.c3d")[0]
+    np.testing.assert_allclose(motion["x_chin"] * MILLIMETRES / 1000, ramp, atol=1e-6)
+    assert not [name for name in motion.names if "lost" in name or "*" in name]
+
+
+def test_points_as_whole_numbers_are_read(tmp_path):
+    """Scaled 16-bit points, as older files hold them."""
+    places = np.round(RNG.normal(0, 500, (FRAMES, 2, 3)))
+    write_c3d(tmp_path / "a.c3d", C3dFile(("one", "two"), places * 0.1, 120.0))
+    content = (tmp_path / "a.c3d").read_bytes()
+    block = struct.unpack_from("<H", content, 16)[0]
+    head = content[: (block - 1) * BLOCK].replace(struct.pack("<f", -1.0), struct.pack("<f", 0.1))
+    rows = np.concatenate([places, np.zeros((FRAMES, 2, 1))], axis=2).astype("<i2")
+    (tmp_path / "b.c3d").write_bytes(head + rows.tobytes())
+    np.testing.assert_allclose(read_c3d(tmp_path / "b.c3d").points, places * 0.1, rtol=1e-6)
+
+
+DAMAGES = [
+    (lambda _: b"x" * 2000, "not a C3D file"),
+    (lambda content: content[:1600], "cut short|not a C3D file"),
+    (lambda content: content[:-2000], "cut short: .* frames of data, required"),
+    (lambda content: content[:515] + b"\x57" + content[516:], "its processor type is 87, required 84"),
+    (lambda content: content[:2] + b"\xff\xff" + content[4:], "65535 points and"),
+    (lambda content: content[:16] + b"\0\0" + content[18:], "cut short"),
+    (lambda content: content.replace(b"mm", b"ly").replace(b"lipmotion", b"otherprog"), "its unit of length is 'ly'"),
+    (lambda content: content.replace(struct.pack("<f", 100.0), struct.pack("<f", float("nan"))), "rate is nan"),
+    (lambda content: content[:800].ljust(512 * 40, b"\1"), "required|again"),
+]
+
+
+def test_what_is_wrong_is_said(tmp_path, written):
+    for change, message in DAMAGES:
+        (tmp_path / "b.c3d").write_bytes(change(written.read_bytes()))
+        with pytest.raises(InputError, match=message):
+            read_motion(tmp_path / "b.c3d")
+
+
+def test_markers_of_the_mouth_are_required(tmp_path):
+    still = {name: place for name, place in face().items() if ":" in name}
+    write_c3d(tmp_path / "a.c3d", capture(still))
+    with pytest.raises(InputError, match="all markers are those of the head"):
+        read_motion(tmp_path / "a.c3d")
+    write_c3d(tmp_path / "b.c3d", capture({"*1": still["Anna:EYE_L"]}))
+    with pytest.raises(InputError, match=r"no marker with a name is seen in half of the frames; the labels: \*1"):
+        read_motion(tmp_path / "b.c3d")
+    same = {"EYE_L": still["Anna:EYE_L"], "EYE_R": still["Anna:EYE_L"], "LIP_13": still["Anna:EYE_L"]}
+    write_c3d(tmp_path / "c.c3d", capture(same))
+    with pytest.raises(InputError, match="the two eye corners are in one place"):
+        read_motion(tmp_path / "c.c3d")
+
+
+def test_what_does_not_fit_is_refused(tmp_path, pointed):
+    odd = Motion(np.zeros((2, 1)), 100.0, (Channel("öffnen"),))
+    with pytest.raises(ExportError, match="does not fit into"):
+        write_motion(tmp_path / "a.c3d", replace(pointed, motion=odd), source={}, model={})
+
+
+LONG = 70_000
+
+
+@pytest.fixture(scope="module")
+def long_capture() -> bytes:
+    """One marker that moves along in 70,000 frames."""
+    content = C3dFile(("LIP_13",), np.arange(1.0, LONG + 1)[:, None, None] * [1, 0, 0], 100.0)
+    with tempfile.TemporaryDirectory() as folder:
+        write_c3d(Path(folder) / "a.c3d", content)
+        return (Path(folder) / "a.c3d").read_bytes()
+
+
+TWO = b"\x02\x01\x02"
+"""What stands before a parameter of two whole numbers."""
+
+
+def two_words(number: int) -> bytes:
+    return struct.pack("<2H", number % 65_536, number // 65_536)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {b"LONG_FRAMES": b"XXXX_FRAMES"},  # the header stops at 65,535: TRIAL counts on
+        {b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"},  # POINT:LONG_FRAMES alone
+        {b"LONG_FRAMES": b"XXXX_FRAMES", b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"},  # nothing but the data
+        {two_words(LONG): two_words(LONG + 9), TWO + two_words(1): TWO + two_words(10), b"LONG_FRAMES": b"XXXX_FRAMES"},
+    ],
+)
+def test_more_frames_than_the_header_counts(tmp_path, long_capture, change, caplog):
+    head, data = long_capture[: 3 * BLOCK], long_capture[3 * BLOCK :]
+    for old, new in change.items():
+        assert old in head
+        head = head.replace(old, new)
+    (tmp_path / "a.c3d").write_bytes(head + data)
+    places = read_c3d(tmp_path / "a.c3d").points[:, 0, 0]
+    assert np.isfinite(places).sum() == LONG
+    assert places[LONG - 1] == pytest.approx(LONG)
+    assert ("65535" in caplog.text) == (len(change) == 2)
+
+
+def test_a_number_that_began_again_is_seen(tmp_path, long_capture):
+    wrapped = LONG - 65_536
+    head = long_capture[: 3 * BLOCK].replace(b"LONG_FRAMES", b"XXXX_FRAMES").replace(b"ACTUAL_END", b"XXXXXX_END")
+    head = head.replace(struct.pack("<H", 65_535), struct.pack("<H", wrapped))
+    (tmp_path / "a.c3d").write_bytes(head + long_capture[3 * BLOCK :])
+    assert len(read_c3d(tmp_path / "a.c3d").points) == LONG
+
+
+def test_a_header_that_says_another_number_is_named(tmp_path, written, caplog):
+    content = written.read_bytes()
+    (tmp_path / "b.c3d").write_bytes(content[:8] + b"\xf0\xff" + content[10:])
+    assert len(read_motion(tmp_path / "b.c3d")[0].values) == FRAMES
+    assert "80 or 65520" in caplog.text
+
+
+@pytest.mark.parametrize("processor", [85, 86])
+def test_files_of_other_processors(tmp_path, processor):
+    """DEC's fractions have their words the other way round and four times the value; MIPS turns all numbers."""
+    places = np.round(RNG.normal(0, 50, (6, 2, 3)), 3)
+    write_c3d(tmp_path / "a.c3d", C3dFile(("one", "two"), places, 120.0))
+    content = bytearray((tmp_path / "a.c3d").read_bytes())
+    start = (struct.unpack_from("<H", content, 16)[0] - 1) * BLOCK
+
+    def turned_number(at: int, kind: str) -> None:
+        (number,) = struct.unpack_from("<" + kind, content, at)
+        if processor == 86:
+            struct.pack_into(">" + kind, content, at, number)
+        elif kind == "f":
+            word = struct.pack("<f", number * 4)
+            content[at : at + 4] = word[2:] + word[:2]
+
+    for at, kind in [*((n, "h") for n in (2, 4, 6, 8, 10, 16, 18)), (12, "f"), (20, "f")]:
+        turned_number(at, kind)
+    at = BLOCK + 4
+    while content[at]:
+        body = at + 2 + content[at]
+        (step,) = struct.unpack_from("<h", content, body)
+        kind, sizes = struct.unpack_from("bB", content, body + 2)
+        if content[at + 1] < 128 and kind in {2, 4}:
+            count = math.prod(content[body + 4 : body + 4 + sizes])
+            for number in range(count):
+                turned_number(body + 4 + sizes + number * kind, "h" if kind == 2 else "f")
+        turned_number(body, "h")
+        at = body + step
+    for at in range(start, start + places.size // 3 * 16, 4):
+        turned_number(at, "f")
+    content[BLOCK + 3] = processor
+    (tmp_path / "b.c3d").write_bytes(content)
+    read = read_c3d(tmp_path / "b.c3d")
+    np.testing.assert_allclose(read.points, places, rtol=1e-6)
+    assert (read.labels, read.rate_hz) == (("one", "two"), 120.0)

@@ -1,0 +1,206 @@
+"""Phones in time that users give: motion files, units alone, labels of other programs; gaps are silence."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.formats.label_files import read_units
+from lipmotion.pipeline.generate.outlook import outlook_of
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech, understood_speech
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Span, Timeline, Unit
+from lipmotion.units import UNKNOWN_PHONES, is_silent, without_gaps
+
+ROWS = [(0.0, 0.4, "sil"), (0.4, 0.5, "m"), (0.5, 0.7, "aa")]
+
+
+def timeline(*rows: tuple[float, float, str]) -> Timeline[Unit]:
+    return Timeline(tuple(Span(start_s, end_s, Unit(phone)) for start_s, end_s, phone in rows))
+
+
+def phones(units: Timeline[Unit]) -> list[tuple[float, float, str]]:
+    return [(round(span.start_s, 6), round(span.end_s, 6), span.label.phone) for span in units]
+
+
+def test_units_alone_without_names_of_units(tmp_path: Path) -> None:
+    rows = [{"start_s": a, "end_s": b, "phone": phone} for a, b, phone in ROWS]
+    (tmp_path / "a.json").write_text(json.dumps({"units": rows}), encoding="utf-8")
+    assert read_units(tmp_path / "a.json") == timeline(*ROWS)
+    again = {"units": [{**row, "word": "oh", "again": n == 1} for n, row in enumerate(rows)]}
+    (tmp_path / "d.json").write_text(json.dumps(again), encoding="utf-8")
+    assert [span.label.again for span in read_units(tmp_path / "d.json")] == [n == 1 for n in range(len(rows))]
+    (tmp_path / "b.json").write_text('{"units": [{"start_s": 0, "phone": "m"}]}', encoding="utf-8")
+    with pytest.raises(InputError, match=r"b\.json: .*end_s is missing.*; export it again"):
+        read_units(tmp_path / "b.json")
+    (tmp_path / "c.json").write_text('{"phones": []}', encoding="utf-8")
+    with pytest.raises(InputError, match=r"c\.json: not a motion document"):
+        read_units(tmp_path / "c.json")
+
+
+def test_labels_of_audacity_with_a_gap(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("0.0\t0.4\tsil\n0.5\t0.7\taa\n", encoding="utf-8")
+    assert phones(read_units(tmp_path / "a.txt")) == [ROWS[0], ROWS[2]]
+    (tmp_path / "b.txt").write_text("please speak\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"b\.txt: holds no phones in time"):
+        read_units(tmp_path / "b.txt")
+    with pytest.raises(InputError, match=r"c\.txt: no such units file"):
+        read_units(tmp_path / "c.txt")
+
+
+def test_gaps_are_silence() -> None:
+    filled = without_gaps(timeline((0.2, 0.4, "m"), (0.5, 0.7, "aa")), 1.0)
+    expected = [(0.0, 0.2, "sil"), (0.2, 0.4, "m"), (0.4, 0.5, "sil"), (0.5, 0.7, "aa"), (0.7, 1.0, "sil")]
+    assert phones(filled) == expected
+
+
+def test_gaps_of_rounding_belong_to_the_phone_before() -> None:
+    filled = without_gaps(timeline((0.0, 0.4, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")), 1.0)
+    assert phones(filled) == [(0.0, 0.404, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")]
+
+
+def test_whole_timelines_stay_as_they_are() -> None:
+    assert without_gaps(timeline(*ROWS), 0.7) == timeline(*ROWS)
+    named = Timeline((Span(0.1, 0.2, Unit("", "bilabial")),))
+    assert without_gaps(named, 1.0) is named
+
+
+def test_a_last_phone_without_an_end_ends_with_the_recording() -> None:
+    assert phones(without_gaps(timeline((0.0, float("inf"), "aa")), 0.8)) == [(0.0, 0.8, "aa")]
+
+
+def test_other_files_are_no_units(tmp_path: Path) -> None:
+    (tmp_path / "a.wav").write_bytes(b"RIFF")
+    with pytest.raises(
+        InputError, match=r"a\.wav: cannot read phones from '\.wav'; use one of \.json, \.npz, \.TextGrid"
+    ):
+        read_units(tmp_path / "a.wav")
+
+
+WELCOME = Path("examples/welcome.flac")
+
+
+@pytest.fixture(scope="module")
+def audio() -> AnalysedAudio:
+    """Real speech of five seconds."""
+    return analysed(read_audio(WELCOME))
+
+
+@pytest.fixture(scope="module")
+def right(audio: AnalysedAudio) -> Timeline[Unit]:
+    """Its phones in time."""
+    words = WELCOME.with_suffix(".txt").read_text()
+    return understood_speech(load_model(), SpeechRequest(audio, transcript=words)).speech.units
+
+
+def followed(audio: Audio, units: Timeline[Unit]) -> tuple[UnderstoodSpeech, float]:
+    """Return speech of given phones, and the confidence in the outlook."""
+    request = SpeechRequest(audio, units=units)
+    understood = understood_speech(load_model(), request)
+    return understood, outlook_of(request, understood).confidence
+
+
+def test_right_phones_are_followed_without_a_word(
+    audio: AnalysedAudio, right: Timeline[Unit], caplog: pytest.LogCaptureFixture
+) -> None:
+    understood, confidence = followed(audio, right)
+    assert understood.speech.units == right
+    assert confidence == pytest.approx(1)
+    assert not caplog.records
+
+
+needs_network = pytest.mark.skipif(installed_phone_recogniser() is None, reason="no phone recogniser is installed")
+
+
+@needs_network
+@pytest.mark.parametrize("explicit", [False, True])
+def test_phones_that_end_while_somebody_speaks(
+    audio: AnalysedAudio, right: Timeline[Unit], explicit: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What they leave open is recognised, what they call silence stays silent; both are named with their times."""
+    half = [span for span in right if span.end_s < 2.5]
+    end_s = half[-1].end_s
+    silence = [Span(end_s, audio.duration_s, Unit("sil"))] if explicit else []
+    understood, confidence = followed(audio, Timeline((*half, *silence)))
+    units = understood.speech.units
+    assert list(units)[: len(half)] == half
+    spoken = [span for span in list(units)[len(half) :] if not is_silent(span.label.phone)]
+    assert bool(spoken) != explicit
+    assert all(span.label.confidence is not None for span in spoken)
+    assert 0.3 < confidence < 0.8
+    assert understood.fit is not None
+    open_s = [span.start_s for span in right if span.start_s >= end_s and not is_silent(span.label.phone)]
+    closed_s = max(span.end_s for span in right if not is_silent(span.label.phone))
+    assert understood.fit.missing[0][0] == pytest.approx(open_s[0], abs=0.1)
+    assert understood.fit.missing[-1][1] == pytest.approx(closed_s, abs=0.1)
+    fits = understood.fit.of_frames(len(understood.speech.features.values))
+    assert fits[: round(100 * end_s) - 10].mean() > 0.95
+    assert fits[round(100 * end_s) :].mean() < 0.6
+    (record,) = caplog.records
+    assert "leave out speech at" in record.getMessage()
+    assert ("recognised" in record.getMessage()) != explicit
+
+
+@needs_network
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        pytest.param(lambda units: units.shifted(0.6), "are not what is said", id="late"),
+        pytest.param(lambda units: scaled(units, 0.5), "are not what is said", id="too fast"),
+        pytest.param(lambda units: scaled(units, 1e-3), "seconds?", id="a thousandth"),
+        pytest.param(lambda units: scaled(units, 1e3), "in milliseconds", id="milliseconds"),
+        pytest.param(lambda units: scaled(units, 1e7), "in ticks of 100 ns", id="ticks"),
+    ],
+)
+def test_phones_at_other_times_than_they_are_said(
+    audio: AnalysedAudio,
+    right: Timeline[Unit],
+    change: Callable[[Timeline[Unit]], Timeline[Unit]],
+    problem: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    _, confidence = followed(audio, change(right))
+    assert any(problem in text for text in caplog.messages)
+    assert confidence < 0.7
+
+
+def scaled(units: Timeline[Unit], factor: float) -> Timeline[Unit]:
+    return Timeline(tuple(Span(factor * s.start_s, factor * s.end_s, s.label) for s in units))
+
+
+def test_phones_where_nothing_is_said(right: Timeline[Unit], caplog: pytest.LogCaptureFixture) -> None:
+    silence = Audio(np.random.default_rng(0).normal(0, 1e-4, 5 * 16_000).astype(np.float32), 16_000)
+    understood, confidence = followed(silence, right)
+    assert understood.speech.units.spans[: len(right) - 1] == right.spans[: len(right) - 1]
+    assert confidence < 0.2
+    assert any("where nothing is said" in text for text in caplog.messages)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_unknown_phones_are_those_of_the_word_or_recognised(
+    audio: AnalysedAudio, right: Timeline[Unit], known: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    word = "welcome" if any(span.label.word == "welcome" for span in right) else right[1].label.word
+    there = [span for span in right if span.label.word == word]
+    start_s, end_s = there[0].start_s, there[-1].end_s
+    unknown = Span(start_s, end_s, Unit("", UNKNOWN_PHONES, word if known else ""))
+    others = [span for span in right if span.label.word != word]
+    units = Timeline(tuple(sorted([*others, unknown], key=lambda span: span.start_s)))
+    found = followed(audio, units)[0].speech.units
+    inside = [span for span in found if start_s - 1e-6 <= span.start_s and span.end_s <= end_s + 1e-6]
+    if known:
+        assert [span.label.phone for span in inside] == [span.label.phone for span in there]
+        assert (inside[0].start_s, inside[-1].end_s) == pytest.approx((start_s, end_s))
+    else:
+        assert len([span for span in inside if not is_silent(span.label.phone)]) > len(there) / 2
+    assert any(f"at {start_s:.1f} " in text for text in caplog.messages)
+    assert [span for span in found if span not in inside][: len(others) // 2] == others[: len(others) // 2]

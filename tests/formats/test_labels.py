@@ -1,0 +1,216 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.formats.label_files import LARGEST_LABELS, labels_beside, read_labels
+from lipmotion.formats.label_tiers import MOST_LABELS
+from lipmotion.units import PHONES, phone_named
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
+
+SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text: str, name: str = "a.lab"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return read_labels(tmp_path / name)
+
+    return read
+
+
+def rows(found) -> list[tuple[float, float, str]]:
+    return [(span.start_s, span.end_s, span.label.phone) for span in found.phones]
+
+
+def test_htk_counts_in_hundred_nanoseconds(read):
+    found = read("0 1300000 sil\n1300000 2050000 hh -31.5\n2050000 3000000 IY1 -20 he\n")
+    assert rows(found) == [(0, 0.13, "sil"), (0.13, 0.205, "hh"), (0.205, 0.3, "iy")]
+    assert found.words is None
+
+
+def test_htk_without_ends(read):
+    found = read("0 sil\n1300000 hh\n2050000 iy\n")
+    assert rows(found) == [(0, 0.13, "sil"), (0.13, 0.205, "hh"), (0.205, math.inf, "iy")]
+
+
+def test_phones_between_their_neighbours(read):
+    found = read("0 1000000 sil-hh+iy\n1000000 2000000 x^hh-iy+t=ae@1_2/A:0-1-2@1-1&1+4\n2000000 3000000 iy-t+sil\n")
+    assert [phone for *_, phone in rows(found)] == ["hh", "iy", "t"]
+
+
+def test_states_of_a_phone_are_one_phone(read):
+    lines = [
+        f"{t * 100_000} {(t + 1) * 100_000} sil-{p}+sil[{s}]"
+        for t, (p, s) in enumerate((p, s) for p in "ttk" for s in (2, 3, 4))
+    ]
+    assert rows(read("\n".join(lines))) == [(0, 0.03, "t"), (0.03, 0.06, "t"), (0.06, 0.09, "k")]
+
+
+def test_audacity_counts_in_seconds(read):
+    found = read(
+        "0.000000\t0.130000\tsil\n\\\t200.0\t300.0\n0.130000\t0.205000\tHH\n0.205000\t0.300000\tIY0\n", "a.txt"
+    )
+    assert rows(found) == [(0, 0.13, "sil"), (0.13, 0.205, "hh"), (0.205, 0.3, "iy")]
+    assert read("0.5\t1.0\tHello\n1.0\t1.5\tyou there\n2.0\t2.0\t\n", "a.txt").words == ("hello", "you", "there")
+
+
+def test_words_in_time_are_a_transcript(read):
+    found = read("0 2000000 sil\n2000000 5000000 Fire\n5200000 8000000 fox\n")
+    assert found.words == ("fire", "fox")
+    assert found.phones is None
+
+
+def test_plain_text(read):
+    for text, words in (
+        ("this is it\n", ("this", "is", "it")),
+        ("this\nis\nit\n", ("this", "is", "it")),
+        ("20 30 people\n", ("twenty", "thirty", "people")),
+        ("5 o'clock\n9 lives\n", ("five", "o'clock", "nine", "lives")),
+        ("  \n\n", None),
+        ("\x0c" * 100_000, None),
+    ):
+        assert (read(text).words, read(text).phones) == (words, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0 1300000 sil\nhello\n", "line 2 is 'hello'; required, as in line 1: start end label"),
+        ("0.0 0.5 sil\n\n0.5 x hh\n", "line 3 is '0.5 x hh'"),
+        ("0 sil\nhh\n2050000 iy\n", "line 2 is 'hh'; required, as in line 1: start label"),
+        (
+            "0 1300000 hh\n1300000 2000000 iy\n2000000 3000000 t\n3000000 4000000 s\n4000000 5000000 qx\n",
+            "line 5 is 'qx'",
+        ),
+        ("0 1300000 hh\n1200000 2000000 iy\n", "line 2 starts at 0.12 s, before the one ahead of it ends"),
+        (
+            "0 1300000 hh\n1400000 2000000 iy\n",
+            "line 2 starts at 0.14 s, the one before it ends at 0.13 s; phones must",
+        ),
+        ("1300000 20000 Hello\n", "line 1 ends at 0.002 s, before its start at 0.13 s"),
+        ("hh\niy\nsil\n", "a list of phones without times"),
+        ("0 20000000 ...\n", "holds no word"),
+    ],
+)
+def test_what_cannot_be_used_is_named_with_its_line(read, text, message):
+    with pytest.raises(InputError) as error:
+        read(text)
+    assert "a.lab" in str(error.value)
+    assert message in str(error.value)
+
+
+@settings(max_examples=25)
+@given(st.lists(st.tuples(st.sampled_from(SPOKEN), st.integers(1, 40)), min_size=1, max_size=30))
+def test_what_is_written_is_read(tmp_path_factory, phones):
+    """Every phone of the inventory, in HTK's and Audacity's form."""
+    path = tmp_path_factory.mktemp("labels") / "a.lab"
+    edges = [0]
+    for _, length in phones:
+        edges.append(edges[-1] + length)
+    names = [name for name, _ in phones]
+    spans = list(zip(edges, edges[1:], names, strict=False))
+    path.write_text("".join(f"{a * 100_000} {b * 100_000} {name}\n" for a, b, name in spans))
+    htk = rows(read_labels(path))
+    path.write_text("".join(f"{a / 100:.6f}\t{b / 100:.6f}\t{name.upper()}\n" for a, b, name in spans))
+    audacity = rows(read_labels(path))
+    for found in (htk, audacity):
+        assert [name for *_, name in found] == names
+        assert [round(100 * start_s) for start_s, *_ in found] == edges[:-1]
+        assert [round(100 * end_s) for _, end_s, _ in found] == edges[1:]
+
+
+def test_stress_decides_which_vowels_are_reduced(read):
+    found = read("0 1000000 AH0\n1000000 2000000 B\n2000000 3000000 AH1\n3000000 4000000 T\n4000000 5000000 ER0\n")
+    assert [phone for *_, phone in rows(found)] == ["ax", "b", "ah", "t", "axr"]
+
+
+def test_without_stress_the_word_decides(tmp_path):
+    phones = [("B", 0.0, 0.1), ("AH", 0.1, 0.2), ("T", 0.2, 0.3), ("ER", 0.3, 0.4)]
+    lines = ['"ooTextFile"', '"TextGrid"', "0 0.4 <exists> 2", '"IntervalTier" "words" 0 0.4 1', '0 0.4 "Butter"']
+    lines += ['"IntervalTier" "phones" 0 0.4 4', *(f'{a} {b} "{name}"' for name, a, b in phones)]
+    path = tmp_path / "a.TextGrid"
+    path.write_text("\n".join(lines))
+    assert [phone for *_, phone in rows(read_labels(path))] == ["b", "ah", "t", "axr"]
+    path.write_text("\n".join(lines).replace('"Butter"', '"butter it"'))  # a sentence: no word to be had
+    assert [phone for *_, phone in rows(read_labels(path))] == ["b", "ah", "t", "er"]
+
+
+def test_other_names_of_silence(read):
+    names = ["SIL", "sp", "nsn", "pau", "h#", "#", "<p:>", "[laughs]"]
+    lines = [
+        f"{2 * i}000000 {2 * i + 1}000000 {n}\n{2 * i + 1}000000 {2 * i + 2}000000 aa" for i, n in enumerate(names)
+    ]
+    assert {phone for *_, phone in rows(read("\n".join(lines)))} == {"sil", "sp", "aa"}
+
+
+def test_names_of_phones():
+    for phone in SPOKEN:
+        for stress in ("", "1", "2"):
+            assert phone_named(phone + stress) == phone_named(phone.upper() + stress) == phone
+        assert phone_named(phone + "!9") is None
+
+
+def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):
+    def refused(_path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    (tmp_path / "a.lab").touch()
+    monkeypatch.setattr(Path, "read_bytes", refused)
+    with pytest.raises(InputError, match=r"a\.lab: not a readable label \(Permission denied"):
+        labels_beside(tmp_path / "a.mp4")
+
+
+def test_files_beside_a_recording(tmp_path):
+    recording = tmp_path / "a.mp4"
+    assert labels_beside(recording).words is None
+    (tmp_path / "a.lab").write_text("0 1000000 t\n1000000 2000000 uw\n")
+    assert labels_beside(recording).words is None
+    (tmp_path / "a.txt").write_text("Two.")
+    found = labels_beside(recording)
+    assert found.words == ("two",)
+    assert [phone for *_, phone in rows(found)] == ["t", "uw"]
+    (tmp_path / "a.TextGrid").write_text('"ooTextFile" "TextGrid" 0 1 <exists> 1 "IntervalTier" "w" 0 1 1 0 1 "too"')
+    assert labels_beside(recording).words == ("two",)  # plain text before labels
+    assert labels_beside(recording, ignored=frozenset({tmp_path / "a.txt"})).words == ("too",)
+
+
+@pytest.mark.recordings
+def test_real_ones(recordings: Path):
+    folder = recordings / "speech-open"
+    phones = rows(read_labels(folder / "arctic_a0009_phone.lab"))
+    assert phones == rows(read_labels(folder / "arctic_a0009_state.lab"))
+    assert len(phones) == 40
+    assert [phone for *_, phone in phones][:8] == ["sil", "hh", "iy", "t", "er", "n", "d", "sh"]
+    assert phones[0][:2] == (0, 0.13)
+    found = labels_beside(folder / "sense_and_sensibility_01_austen_64kb-0880.wav")
+    assert found.words == ("he", "was", "not", "an", "ill", "disposed", "young", "man")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"0 {'9' * 5000} p\n", "line 1 has the time '9{79}\\.\\.\\., required a finite one"),
+        (f"0 sil\n1000000 p\n{'9' * 5000} aa\n", "line 3 has the time '9"),
+        (f"0.0\t{'9' * 400}.0\tp\n", "line 1 has the time '9"),
+        ("0 1000000 p\n" * (MOST_LABELS + 1), "more than 250000 labels; give those of one recording"),
+        ("a" * (LARGEST_TRANSCRIPT_BYTES + 1), "4194305 characters, required at most 4194304: is it a transcript"),
+        (" " * (LARGEST_LABELS + 1), "16777217 bytes, required at most 16777216"),
+    ],
+)
+def test_what_no_file_of_labels_holds(read, text, message):
+    with pytest.raises(InputError, match=message):
+        read(text)
+
+
+def test_states_without_neighbours_are_phones(read):
+    found = read("0 1000000 p[2]\n1000000 2000000 p[3]\n2000000 3000000 aa[2]\n3000000 4000000 aa[3]\n")
+    assert rows(found) == [(0, 0.2, "p"), (0.2, 0.4, "aa")]
+    with pytest.raises(InputError, match="which is no phone"):
+        read(f"0 1000000 p\n1000000 2000000 p\n2000000 3000000 p\n3000000 4000000 p[{'9' * 5000}]\n")

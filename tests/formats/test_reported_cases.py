@@ -1,0 +1,472 @@
+"""Labels that users of other tools have reported, and their siblings: words and phones as they are said."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.formats.label_files import read_labels, read_phones, read_transcript, speakers_in
+from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.types import TimedTranscript
+from lipmotion.units import UNKNOWN_PHONES
+
+CASES = Path(__file__).parents[1] / "data" / "cases" / "labels"
+MOTHER = "my mother moved the baby boat"
+W = [("hello", 0.4, 0.8), ("big", 0.85, 1.1), ("moon", 1.2, 1.6)]
+
+
+def words(path: Path, **choice: str) -> str:
+    found = read_transcript(path, **choice)
+    assert isinstance(found, TimedTranscript)
+    return " ".join(found.words)
+
+
+def phones(path: Path, **choice: str) -> list[str]:
+    units = read_phones(path, **choice)
+    return [span.label.phone or span.label.unit for span in units]
+
+
+def times(path: Path) -> list[tuple[float | None, float | None]]:
+    found = read_transcript(path)
+    assert isinstance(found, TimedTranscript)
+    return [(word.start_s, word.end_s) for line in found.lines for word in line.words]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Any:
+    """Return the path of a file with some content: bytes, a text, or a value for JSON."""
+
+    def writer(content: Any, name: str = "a.json") -> Path:
+        path = tmp_path / name
+        if not isinstance(content, str | bytes):
+            content = json.dumps(content, ensure_ascii=False)
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return writer
+
+
+def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
+    rows = (
+        f'"IntervalTier"\n"{name.replace("__", " - ").replace("_", "-")}"\n0\n{end}\n{len(labels)}\n'
+        + "".join(f'{start}\n{stop}\n"{text}"\n' for start, stop, text in labels)
+        for name, labels in tiers.items()
+    )
+    return f'File type = "ooTextFile"\n"TextGrid"\n0\n{end}\n<exists>\n{len(tiers)}\n{"".join(rows)}'
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("two-tiers-mau.TextGrid", MOTHER),
+        ("three-tiers-mau.TextGrid", MOTHER),
+        ("sampa-three-tiers.TextGrid", "she thought"),
+        ("spoken-noise-phone.TextGrid", MOTHER),
+        ("unknown-word-label.TextGrid", "my mother moved the baby"),
+        ("elan-utterances.TextGrid", "mama went home"),
+        ("noise-words.txt", "mama"),
+        ("said-not-in-transcript.json", "hi mama moon"),
+        ("word-time-nan.json", "hello big moon"),
+        ("words-in-ms.json", MOTHER),
+        ("two-speakers.TextGrid", "mama papa"),
+        ("u16le-nobom.TextGrid", "mama"),
+        ("fragments.json", "hello big moon"),
+        ("stt-utterances.json", "hello big moon"),
+        ("stt-nested-alternatives.json", "hello big moon"),
+        ("list-text-start_time.json", "hello big moon"),
+    ],
+)
+def test_the_words_that_are_said(name: str, said: str) -> None:
+    assert words(CASES / name) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("sampa-three-tiers.TextGrid", "sil sh iy th ao t sil"),
+        ("city-flap-ipa.TextGrid", "sil s ih d iy s ih d iy s ih d iy sil"),
+        ("said-not-in-transcript.json", "hh ay m aa m ah m uw n"),
+        ("two-speakers.TextGrid", "m aa m ax p aa p ax"),
+        ("u16le-nobom.TextGrid", "sil m aa m ax sil"),
+    ],
+)
+def test_the_phones_that_are_said(name: str, wanted: str) -> None:
+    assert phones(CASES / name) == wanted.split()
+
+
+def test_tiers_of_webmaus_have_their_roles(write: Any) -> None:
+    for name in ("two-tiers-mau.TextGrid", "three-tiers-mau.TextGrid"):
+        units = read_phones(CASES / name)
+        assert [span.label.phone for span in units][1:3] == ["m", "ay"]
+        assert {span.label.word for span in units} == {"", *MOTHER.split()}
+    rows = {"KAN": [(0, 0.5, "m a")], "KAS": [(0, 0.5, "m.a")], "MAS": [(0, 0.5, "m a")], "TRN": [(0, 2.0, "ma")]}
+    mau = [(0, 0.2, "<p:>"), (0.2, 0.3, "m"), (0.3, 0.5, "a:"), (0.5, 0.6, "?"), (0.6, 0.8, "<usb>"), (0.8, 2, "<p:>")]
+    path = write(grid(ORT=[(0.2, 0.6, "ma")], **rows, MAU=mau), "a.TextGrid")
+    assert (words(path), phones(path)) == ("ma", ["sil", "m", "aa", UNKNOWN_PHONES, "sil"])
+    assert phones(write(grid(MAU=mau), "b.TextGrid")) == ["sil", "m", "aa", UNKNOWN_PHONES, "sil"]
+
+
+def test_speech_of_unknown_phones_keeps_its_word_and_its_time(caplog: pytest.LogCaptureFixture) -> None:
+    (span,) = [s for s in read_phones(CASES / "spoken-noise-phone.TextGrid") if s.label.unit == UNKNOWN_PHONES]
+    assert (span.label.phone, span.label.word) == ("", "boat")
+    assert (span.start_s, span.end_s) == pytest.approx((1.445, 1.855))
+    (span,) = [s for s in read_phones(CASES / "unknown-word-label.TextGrid") if s.label.unit == UNKNOWN_PHONES]
+    assert span.label.word == ""
+    found = read_labels(CASES / "spoken-noise-phone.TextGrid")
+    assert (found.phones, found.words) == (None, tuple(MOTHER.split()))
+    assert "1.4" in caplog.text
+
+
+def test_a_part_of_a_word_that_is_unknown_has_no_word(write: Any) -> None:
+    path = write(grid(words=[(0, 1, "boat")], phones=[(0, 0.5, "b"), (0.5, 1, "spn"), (1, 2, "")]), "a.TextGrid")
+    assert [span.label.word for span in read_phones(path)] == ["boat", "", ""]
+
+
+@pytest.mark.parametrize("per_s", [1000, 10_000_000])
+def test_units_of_time_follow_from_how_long_words_last(write: Any, per_s: int) -> None:
+    edges = ((0, 0), (25, 21), (85, 11), (135, 0), (185, 21))
+    whole = [{"audioOffset": ms * per_s // 1000, "visemeId": number} for ms, number in edges]
+    seconds = [{"audioOffset": ms / 1000, "visemeId": number} for ms, number in edges]
+    for events in (whole, seconds):
+        starts_s = [span.start_s for span in read_phones(write(events))]
+        assert starts_s == pytest.approx([0, 0.025, 0.085, 0.135, 0.185])
+    assert times(write({"words": [{"text": w, "start": round(a * per_s), "end": round(b * per_s)} for w, a, b in W]}))[
+        2
+    ] == pytest.approx((1.2, 1.6))
+    labels = [(round(a * per_s), round(b * per_s), w) for w, a, b in W]
+    for path in (
+        write(grid(2 * per_s, words=labels), "a.TextGrid"),
+        write("".join(f"{a}\t{b}\t{w}\n" for a, b, w in labels), "a.txt"),
+    ):
+        assert times(path)[2] == pytest.approx((1.2, 1.6))
+
+
+def test_samples_are_read_where_their_rate_is_known(write: Any) -> None:
+    rows = "0 3050 h#\n3050 4559 sh\n4559 5723 ix\n5723 6642 hv\n6642 8772 eh\n8772 9190 dcl\n9190 10337 jh\n"
+    rows += "10337 11517 dx\n11517 12500 ax-h\n12500 13000 q\n13000 14000 pcl\n14000 15000 p\n15000 16000 nx\n"
+    path = write(rows, "a.phn")
+    assert phones(path) == "sil sh ix hh eh jh d ax hh p n".split()
+    assert read_phones(path)[1].start_s == pytest.approx(3050 / 16_000)
+    with pytest.raises(InputError, match=r"samples .*required seconds"):
+        read_labels(write("3000 8140 my\n8180 15520 mother\n15520 29920 moved\n", "a.txt"))
+
+
+TWO = {"ann__words": [(0.3, 0.7, "mama")], "ann__phones": [(0.3, 0.5, "M"), (0.5, 0.7, "AA1")]}
+TWO |= {"bob__words": [(0.5, 1.0, "papa")], "bob__phones": [(0.5, 0.8, "P"), (0.8, 1.0, "AA1")]}
+ELAN = """<?xml version="1.0" encoding="UTF-8"?>
+<ANNOTATION_DOCUMENT><TIME_ORDER>
+<TIME_SLOT TIME_SLOT_ID="s1" TIME_VALUE="300"/><TIME_SLOT TIME_SLOT_ID="s2" TIME_VALUE="1200"/>
+<TIME_SLOT TIME_SLOT_ID="s3" TIME_VALUE="1000"/><TIME_SLOT TIME_SLOT_ID="s4" TIME_VALUE="1900"/></TIME_ORDER>
+<TIER TIER_ID="said" PARTICIPANT="ann"><ANNOTATION>
+<ALIGNABLE_ANNOTATION ANNOTATION_ID="a1" TIME_SLOT_REF1="s1" TIME_SLOT_REF2="s2">
+<ANNOTATION_VALUE>mama [laughs]</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER>
+<TIER TIER_ID="meaning" PARENT_REF="said"><ANNOTATION><REF_ANNOTATION ANNOTATION_ID="a2" ANNOTATION_REF="a1">
+<ANNOTATION_VALUE>Mutter</ANNOTATION_VALUE></REF_ANNOTATION></ANNOTATION></TIER>
+<TIER TIER_ID="other" PARTICIPANT="bob"><ANNOTATION>
+<ALIGNABLE_ANNOTATION ANNOTATION_ID="a3" TIME_SLOT_REF1="s3" TIME_SLOT_REF2="s4">
+<ANNOTATION_VALUE>papa</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION></TIER></ANNOTATION_DOCUMENT>
+"""
+MFA = {name.replace("__", " - "): {"entries": [list(row) for row in rows]} for name, rows in TWO.items()}
+SPEAKERS = {
+    "a.TextGrid": grid(**TWO),
+    "b.TextGrid": grid(ann=[(0.3, 0.7, "mama")], bob=[(0.7, 1.0, "papa")]),
+    "mfa.json": {"start": 0, "end": 2, "tiers": MFA},
+    "a.eaf": ELAN,
+    "a.csv": "Begin,End,Label,Type,Speaker\n0.3,0.7,mama,words,ann\n0.5,1.0,papa,words,bob\n",
+    "rev.json": {
+        "monologues": [
+            {"speaker": who, "elements": [{"type": "text", "value": said, "ts": start, "end_ts": start + 0.4}]}
+            for who, said, start in (("ann", "mama", 0.3), ("bob", "papa", 0.7))
+        ]
+    },
+    "a.stm": "take 1 ann 0.3 0.7 <o,f0> mama\ntake 1 bob 0.5 1.0 <o,f0> papa\n",
+    "a.ctm": "take ann 0.3 0.4 mama\ntake bob 0.5 0.5 papa\n",
+}
+
+
+@pytest.mark.parametrize("name", SPEAKERS)
+def test_a_speaker_is_chosen_and_several_are_named(write: Any, caplog: pytest.LogCaptureFixture, name: str) -> None:
+    path = write(SPEAKERS[name], name)
+    assert words(path, speaker="ann") == words(path, tier="ANN") == "mama"
+    assert not caplog.messages
+    assert words(path) == "mama papa"
+    assert "ann, bob" in caplog.text
+    with pytest.raises(InputError, match=r"no speaker 'eve'; it has: 'ann', 'bob'"):
+        read_transcript(path, speaker="eve")
+
+
+def test_phones_of_a_speaker_are_chosen_by_the_request_too(write: Any, tmp_path: Path) -> None:
+    for path in (write(grid(**TWO), "a.TextGrid"), write(SPEAKERS["mfa.json"], "mfa.json")):
+        assert phones(path, speaker="bob") == phones(path, tier="bob - phones") == ["p", "aa"]
+        assert phones(path) == ["m", "aa", "p", "aa"]  # who began goes on
+        assert speakers_in(path) == ("ann", "bob")
+        request = Request(tmp_path / "a.wav", units=path, speaker="bob")
+        units = read_request(request).units
+        assert units is not None
+        assert [span.label.word for span in units] == ["papa", "papa"]
+        assert read_request(request).speaker == ""
+    assert read_request(Request(tmp_path / "a.wav", units=path, tier="ann", speaker="s1")).speaker == "s1"
+
+
+def test_of_versions_of_a_text_the_first_is_read(write: Any, caplog: pytest.LogCaptureFixture) -> None:
+    path = write(grid(w=[(0, 1, "mama")], deutsch=[(0, 1, "mutter")]), "a.TextGrid")
+    assert words(path) == "mama"
+    assert "deutsch" in caplog.text
+    assert words(path, tier="deutsch") == "mutter"
+    assert words(write(grid(Mots=[(0, 1, " mama ")], syllables=[(0, 1, "ma")]), "b.TextGrid")) == "mama"
+
+
+NOISE = ["<breath>", "[laughs]", "(coughs)", "{sl}", "<eps>", "sil", "***", "=", "♪", "<SIL>", "&=laughs", "xxx", "spn"]
+NOISE += ["<unk>", "[unintelligible]", "+NOISE+"]
+
+
+def test_no_form_of_words_speaks_what_is_no_word(write: Any) -> None:
+    rows = [(i / 4, (i + 1) / 4, text) for i, text in enumerate([*NOISE, "mama", "%uh"])]
+    whisper = [{"word": text, "start": a, "end": b} for a, b, text in rows]
+    mfa = {"words": {"entries": [list(row) for row in rows]}}
+    clock = "00:00:{:06.3f} --> 00:00:{:06.3f}\n{}\n\n"
+    forms = {
+        "a.TextGrid": grid(9, words=rows),
+        "b.json": {"segments": [{"start": 0, "end": 9, "text": "", "words": whisper}]},
+        "c.json": {"tiers": mfa},
+        "d.csv": "Begin,End,Label,Type\n" + "".join(f'{a},{b},"{text}",words\n' for a, b, text in rows),
+        "e.txt": "".join(f"{a:.2f}\t{b:.2f}\t{text}\n" for a, b, text in rows),
+        "f.ctm": "".join(f"take 1 {a:.2f} {b - a:.2f} {text}\n" for a, b, text in rows),
+        "g.vtt": "WEBVTT\n\n" + "".join(clock.format(*row) for row in rows if row[2] not in ("sil", "spn")),
+    }
+    for name, content in forms.items():
+        assert words(write(content, name)) == "mama uh", name
+
+
+SERVICES: dict[str, Any] = {
+    "AWS": {
+        "results": {
+            "transcripts": [{"transcript": "no"}],
+            "items": [
+                *(
+                    {
+                        "start_time": str(a),
+                        "end_time": str(b),
+                        "type": "pronunciation",
+                        "alternatives": [{"content": w}],
+                    }
+                    for w, a, b in W
+                ),
+                {"type": "punctuation", "alternatives": [{"content": "."}]},
+            ],
+        }
+    },
+    "AssemblyAI": {
+        "audio_duration": 2,
+        "words": [{"text": w, "start": round(1000 * a), "end": round(1000 * b), "speaker": None} for w, a, b in W],
+        "utterances": None,
+        "chapters": [{"summary": "no", "start": 0, "end": 2000}],
+    },
+    "Google": {
+        "results": [
+            {
+                "alternatives": [
+                    {"words": [{"word": w, "startTime": f"{a:.3f}s", "endTime": f"{b:.3f}s"} for w, a, b in W]},
+                    {"transcript": "jello"},
+                ]
+            }
+        ]
+    },
+    "Google in Python": {
+        "results": [
+            {
+                "alternatives": [
+                    {
+                        "words": [
+                            {
+                                "word": w,
+                                "start_time": {"seconds": int(a), "nanos": round(a % 1 * 1e9)},
+                                "end_time": {"seconds": str(int(b)), "nanos": round(b % 1 * 1e9)},
+                            }
+                            for w, a, b in W
+                        ]
+                    }
+                ]
+            }
+        ]
+    },
+    "Speechmatics": {
+        "format": "2.9",
+        "results": [
+            *({"type": "word", "start_time": a, "end_time": b, "alternatives": [{"content": w}]} for w, a, b in W),
+            {"type": "punctuation", "start_time": 1.6, "end_time": 1.6, "alternatives": [{"content": "."}]},
+        ],
+    },
+    "Watson": {"results": [{"alternatives": [{"transcript": "no", "timestamps": [list(row) for row in W]}]}]},
+    "Azure": {
+        "Offset": 4_000_000,
+        "Duration": 12_000_000,
+        "NBest": [
+            {
+                "Display": "No.",
+                "Words": [{"Word": w, "Offset": round(a * 1e7), "Duration": round((b - a) * 1e7)} for w, a, b in W],
+            }
+        ],
+    },
+    "ElevenLabs Scribe": {
+        "text": "no",
+        "words": [
+            *({"text": w, "start": a, "end": b, "type": "word"} for w, a, b in W),
+            {"text": " ", "start": 1.6, "end": 1.7, "type": "spacing"},
+            {"text": "(laughter)", "start": 1.7, "end": 2, "type": "audio_event"},
+        ],
+    },
+    "words under another name": {"answer": {"list": [{"word": w, "start": a, "duration": b - a} for w, a, b in W]}},
+    "a table": "start;end;word\n" + "".join(f"{a}".replace(".", ",") + f";{b};{w}\n" for w, a, b in W),
+    "JSON lines": "".join(json.dumps({"word": w, "start": a, "end": b}) + "\n" for w, a, b in W),
+    "JSON with a mark": b"\xef\xbb\xbf" + json.dumps([{"text": w, "from": a, "to": b} for w, a, b in W]).encode(),
+    "TTML of words": '<tt xmlns="http://www.w3.org/ns/ttml"><body begin="0.1s"><p begin="0.1s" end="2s">'
+    + " ".join(f'<span begin="{a - 0.2:.2f}s" end="{b - 0.2:.2f}s">{w}</span>' for w, a, b in W)
+    + "</p></body></tt>",
+}
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_word_times_of_services(write: Any, name: str) -> None:
+    path = write(SERVICES[name])
+    assert words(path) == "hello big moon"
+    assert [time for pair in times(path) for time in pair] == pytest.approx([t for _, *pair in W for t in pair])
+
+
+TTML = '<tt xmlns="http://www.w3.org/ns/ttml" xmlns:p="http://www.w3.org/ns/ttml#parameter" {}>{}</tt>'
+BODY = '<body><p begin="{}" {}="{}">hello<br/>big <span>moon</span></p></body>'
+RATES = 'p:frameRate="25" p:tickRate="10000000"'
+LINES = {
+    "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
+    "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),
+    "TTML in ticks": TTML.format(RATES, BODY.format("4000000t", "dur", "12000000t")),
+    "TTML in frames": TTML.format(RATES, BODY.format("00:00:00:10", "end", "40f")),
+    "YouTube": '<transcript><text start="0.4" dur="1.2">hello big moon</text></transcript>',
+    "YouTube's JSON": {
+        "events": [{"tStartMs": 400, "dDurationMs": 1200, "segs": [{"utf8": "hello big"}, {"utf8": " moon"}]}]
+    },
+    "whisper.cpp": {
+        "transcription": [{"offsets": {"from": 400, "to": 1600}, "text": "hello big moon", "tokens": [{"text": "h"}]}]
+    },
+    "Azure in batch": {
+        "recognizedPhrases": [
+            {
+                "offset": "PT0.4S",
+                "offsetInTicks": 4e6,
+                "durationInTicks": 1.2e7,
+                "nBest": [{"display": "hello big moon"}],
+            }
+        ]
+    },
+}
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_lines_in_time(write: Any, name: str) -> None:
+    found = read_transcript(write(LINES[name]))
+    assert isinstance(found, TimedTranscript)
+    (line,) = found.lines
+    assert " ".join(word.word for word in line.words) == "hello big moon"
+    assert (line.start_s, line.end_s) == pytest.approx((0.4, 1.6))
+
+
+def test_times_that_are_none_are_missing(write: Any) -> None:
+    for start, end in ((math.nan, math.nan), (None, None), (math.inf, -math.inf), ("NaN", ""), (-5, None)):
+        word = {"word": "big", "start": start, "end": end}
+        found = times(write({"segments": [{"start": 0, "end": 2, "text": "", "words": [word]}]}))
+        assert found == [(None, None)]
+    assert times(CASES / "word-time-nan.json")[1] == (None, None)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-16", "utf-32", "utf-8-sig"])
+def test_every_form_may_be_wide_text(write: Any, encoding: str) -> None:
+    for content in (
+        grid(words=[(0, 1, "mama")]),
+        "00:01,000 --> 00:02,000\r\nmama\r\n",
+        '[{"word": "mama", "start": 1}]',
+    ):
+        assert words(write(content.encode(encoding), "a.txt")) == "mama"
+    assert read_transcript(write("mama went home".encode(encoding), "a.txt")) == "mama went home"
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ({"FrameIndex": 0, "BlendShapes": [[0.0] * 55]}, "55.*motion"),
+        ({"metadata": {}, "mouthCues": [{"start": 0, "end": 1, "value": "X"}]}, "mouth cues"),
+        ({"foo": [{"bar": 1}]}, "it has foo; known are segments"),
+        ("SPEAKER take 1 0.30 0.40 <NA> <NA> ann <NA> <NA>\n", "RTTM"),
+        (b"\x1f\x8b\x08\x00", "archive|gzip"),
+        ("<tt><body><p begin='soon'>a</p></body></tt>", "a time is 'soon'"),
+        ("<tt><body>", "damaged XML"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><tt>&b;</tt>', "entities|begins with"),
+    ],
+)
+def test_what_is_none_is_named(write: Any, content: Any, named: str) -> None:
+    with pytest.raises(InputError, match=named):
+        read_labels(write(content))
+
+
+XSAMPA = {"4": "d", "{": "ae", "3`": "er", "@U": "ow", "t_h": "t", '"i:': "iy", "r\\": "r", "n=": "en", "tS": "ch"}
+
+
+def test_xsampa_is_read_where_it_makes_sense(write: Any) -> None:
+    rows = [(i / 10, (i + 1) / 10, label.replace('"', '""')) for i, label in enumerate(XSAMPA)]
+    assert phones(write(grid(phones=rows), "a.TextGrid")) == list(XSAMPA.values())
+
+
+MS = [(w, 1000 * a, 1000 * b) for w, a, b in W]
+OTHERS: dict[str, Any] = {
+    "Speechify": [
+        {"type": "word", "start": 6 * i, "end": 6 * i + 5, "start_time": a, "end_time": b, "value": w}
+        for i, (w, a, b) in enumerate(MS)
+    ],
+    "Soniox": {
+        "tokens": [
+            {"text": text, "start_ms": a, "end_ms": b}
+            for text, a, b in (("hel", 400, 600), ("lo", 600, 800), (" big", 850, 1100), (" moon", 1200, 1600))
+        ]
+    },
+    "Hume": [{"text": w, "time": {"begin": a, "end": b}} for w, a, b in MS],
+    "PlayHT": [{"type": "word", "word": w, "time": {"start": a, "end": b}} for w, a, b in W],
+    "MiniMax": [{"timestamped_words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in MS]}],
+    "Inworld": {
+        "timestampInfo": {
+            "wordAlignment": {
+                "words": [w for w, *_ in W],
+                "wordStartTimeSeconds": [a for _, a, _ in W],
+                "wordEndTimeSeconds": [b for *_, b in W],
+            }
+        }
+    },
+    "milliseconds with decimals": [{"word": w, "start": a + 0.01, "end": b + 0.01} for w, a, b in MS],
+    "milliseconds as lines": "".join(f"{a:.1f}\t{b:.1f}\t{w}\n" for w, a, b in MS),
+    "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_word_times_of_voices_and_other_units(write: Any, name: str) -> None:
+    path = write(OTHERS[name])
+    assert words(path) == "hello big moon"
+    assert [t for pair in times(path) for t in pair] == pytest.approx([t for _, *pair in W for t in pair], abs=1e-3)
+
+
+@pytest.mark.parametrize(("start", "end"), [("start_offset", "end_offset"), ("start", "end")])
+def test_frames_are_refused(write: Any, start: str, end: str) -> None:
+    with pytest.raises(InputError, match="frames"):
+        read_transcript(write([{"word": w, start: round(25 * a), end: round(25 * b)} for w, a, b in W]))
+
+
+def test_minus_one_is_no_time_and_marked_sounds_are_not_said(write: Any) -> None:
+    rows = [{"word": w, "start": a, "end": b} for w, a, b in (*W, ("mama", -1, -1), ("~SIL", 2, 3), ("%noise", 3, 4))]
+    path = write(rows)
+    assert words(path) == "hello big moon mama"
+    assert times(path)[-1] == (None, None)
