@@ -19,8 +19,7 @@ from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.storage.files import LARGEST_TEXT_BYTES, check_source, read_text_file, sha256_of, whole_file
-from lipmotion.storage.json_text import as_json_rows, from_json
-from lipmotion.storage.toml_text import read_toml
+from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
 from lipmotion.types.values import described, items, number, optional, require, text, tupled, value_of
 

@@ -16,8 +16,7 @@ from lipmotion.studio.studio import Studio
 from lipmotion.types import values
 from lipmotion.types.values import items
 from lipmotion.units import PHONES
-from lipmotion.web.bodies import write_body
-from lipmotion.web.replies import FRESH, JSONResponse
+from lipmotion.web.replies import FRESH, JSONResponse, write_body
 
 LARGEST_UPLOAD_BYTES = 1 << 29
 UPLOAD_S = 600.0

@@ -31,8 +31,7 @@ from lipmotion.study.questions import ASKED, POINTS, SCALES
 from lipmotion.study.store import StudyStore, rater_name
 from lipmotion.study.submission import submitted_sheet
 from lipmotion.study.trials import questions_of, trials_of
-from lipmotion.web.bodies import json_of
-from lipmotion.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal
+from lipmotion.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal, json_of
 
 PAGE = {
     "": ("study.html", "text/html; charset=utf-8"),
