@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
@@ -28,7 +30,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
     """
     document = as_json({**header(generation), **units_and_origin(generation, source, model)}, ensure_ascii=False)
     values = generation.motion.values
-    rows = {
+    rows: dict[str, Callable[[slice], NDArray[np.floating[Any]]]] = {
         "values": lambda frames: values[frames],
         "standard_deviations": lambda frames: np.sqrt(np.maximum(generation.variance_of(frames), 0)).astype(np.float32),
     }
