@@ -12,7 +12,7 @@ from starlette.requests import Request
 from lipmotion.errors import InputError
 from lipmotion.types import values
 from lipmotion.types.values import Schema, any_members, items, number_of, require, stated, whole_of
-from lipmotion_studio.web.bodies import json_of
+from lipmotion_studio.web.replies import json_of
 
 LARGEST_JSON_BYTES = 1 << 20
 LATEST_S = 1e6

@@ -16,8 +16,7 @@ from lipmotion_studio.asked import content_of, member, text, texts, whole
 from lipmotion_studio.presets import preset_of
 from lipmotion_studio.project import APPROVED
 from lipmotion_studio.studio import Studio
-from lipmotion_studio.web.bodies import write_body
-from lipmotion_studio.web.replies import FRESH, JSONResponse
+from lipmotion_studio.web.replies import FRESH, JSONResponse, write_body
 
 LARGEST_UPLOAD_BYTES = 1 << 29
 UPLOAD_S = 600.0

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import tracemalloc
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from lipmotion.speech.sound.voice_activity import (
     Stretch,
     fill_gaps,
     find_passages,
+    find_tones,
     level_passage,
     stretches_of_sound,
 )
@@ -321,3 +323,14 @@ def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:
     drop = (loud - log_energy(filled)[104:122]) / DECIBEL
     assert drop.min() > 30
     assert drop.max() < 36
+
+
+def test_hours_of_silence_are_searched_for_tones_block_by_block() -> None:
+    samples = np.zeros(4 * 60 * 16_000, np.float32)
+    energy = log_energy(samples)
+    tracemalloc.start()
+    try:
+        assert find_tones(samples, energy) == []
+        assert tracemalloc.get_traced_memory()[1] < 6 * samples.nbytes
+    finally:
+        tracemalloc.stop()

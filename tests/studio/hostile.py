@@ -13,67 +13,26 @@ FOREIGN = "nobody may read this"
 LINES = ("1", "2", "0", "-1", "01", "1.0", "9" * 500, "../1", "%2e%2e", "1/../../foreign", "é", "1%00", "true")
 LINE_PARTS = (
     "",
-    "/edits",
-    "/undo",
-    "/redo",
-    "/settle",
-    "/transcript",
-    "/mark",
-    "/export",
-    "/video",
-    "/sound.wav",
-    "/recorded",
-    "/votes",
-    "/versions",
-    "/versions/back",
-    "/versions/forget",
-    "/motion",
-    "/weights",
-    "/picture",
-    "/why",
-    "/doubts",
-    "/../../project.json",
-    "/edits/../../../foreign.txt",
-    "/remove/x",
+    *(
+        "/edits /undo /redo /settle /transcript /mark /export /video /sound.wav /recorded /votes /versions "
+        "/versions/back /versions/forget /motion /weights /picture /why /doubts /../../project.json "
+        "/edits/../../../foreign.txt /remove/x"
+    ).split(),
 )
 PATHS = (
-    "/",
-    "/../project.json",
-    "/project.json",
-    "/studio.html",
-    "/vendor/../../project.json",
-    "//etc/passwd",
-    "/%2e%2e/%2e%2e/etc/passwd",
-    "/page/studio.html",
-    "/edits/line.edits.json",
-    "/sounds/line.wav",
-    "/lexicon.txt",
-    "/foreign.txt",
-    "/api",
-    "/api/",
-    "/api/project",
-    "/api/progress",
-    "/api/lexicon",
-    "/api/export",
-    "/api/understand",
-    "/api/training",
-    "/api/training/again",
-    "/api/training/restore",
-    "/api/training/../../foreign.txt",
-    "/api/voice",
-    "/voices/../../foreign.txt",
-    "/api/faces/../../foreign.txt.glb",
-    "/api/faces/head.glb/..",
-    "/api/faces/%2e%2e%2fforeign.glb",
-    "/api/faces/portrait.glb",
-    "/api/lines?name=../../foreign.txt",
-    "/api/lines?name=%00.wav",
+    *(
+        "/ /../project.json /project.json /studio.html /vendor/../../project.json //etc/passwd "
+        "/%2e%2e/%2e%2e/etc/passwd /page/studio.html /edits/line.edits.json /sounds/line.wav /lexicon.txt "
+        "/foreign.txt /api /api/ /api/project /api/progress /api/lexicon /api/export /api/understand "
+        "/api/training /api/training/again /api/training/restore /api/training/../../foreign.txt /api/voice "
+        "/voices/../../foreign.txt /api/faces/../../foreign.txt.glb /api/faces/head.glb/.. "
+        "/api/faces/%2e%2e%2fforeign.glb /api/faces/portrait.glb /api/lines?name=../../foreign.txt "
+        "/api/lines?name=%00.wav"
+    ).split(),
     "/api/lines?name=" + "a" * 600 + ".wav",
-    "/static",
+    *("/static").split(),
     "/" + "a/" * 500,
-    "/%ff%fe",
-    "/api/lines/1/sound.wav?key=0",
-    "/application.py",
+    *("/%ff%fe /api/lines/1/sound.wav?key=0 /application.py").split(),
 )
 QUERIES = (
     "",

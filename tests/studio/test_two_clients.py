@@ -70,10 +70,8 @@ def test_every_change_names_the_revision_that_it_saw(studio: OpenStudio, change:
 
 
 def test_the_voice_and_the_lexicon_name_the_revision_that_they_saw(studio: OpenStudio) -> None:
-    for path, content in (
-        ("/api/voice", {"voice": ""}),
-        ("/api/lexicon", {"word": "tear", "phones": ["t", "eh", "r"]}),
-    ):
+    tear = {"word": "tear", "phones": ["t", "eh", "r"]}
+    for path, content in (("/api/voice", {"voice": ""}), ("/api/lexicon", tear)):
         seen = studio.ask("/api/training" if path == "/api/voice" else f"{path}?word=tear").content["revision"]
         assert studio.ask(path, content).status == 422
         late = studio.ask(path, content | {"revision": seen + 1})

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.formats.base import MotionFormat, read_members, write_json
@@ -168,7 +169,7 @@ def write_npz(path: Path, generation: Generation, source: Mapping[str, str], mod
     before, after = _document(generation, source, model)
     document = as_json(before | after, ensure_ascii=False)
     values = generation.motion.values
-    rows = {
+    rows: dict[str, Callable[[slice], NDArray[np.floating[Any]]]] = {
         "values": lambda frames: values[frames],
         "standard_deviations": lambda frames: np.sqrt(np.maximum(generation.variance_of(frames), 0)).astype(np.float32),
     }

@@ -25,8 +25,7 @@ from lipmotion.storage.files import (
     sound_reference,
     whole_file,
 )
-from lipmotion.storage.json_text import as_json_rows, from_json
-from lipmotion.storage.toml_text import read_toml
+from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
 from lipmotion.types.values import described, items, number, optional, require, text, tupled, value_of
 

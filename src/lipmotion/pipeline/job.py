@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from lipmotion.errors import InputError
 from lipmotion.extensions import provided
+from lipmotion.storage.json_text import read_toml
 from lipmotion.storage.sources import is_file
-from lipmotion.storage.toml_text import read_toml
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES

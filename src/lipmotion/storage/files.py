@@ -18,7 +18,7 @@ import sys
 import tempfile
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -561,12 +561,17 @@ def temporary_folder() -> Iterator[Path]:
                     if path != left:
                         remove(path)
             left.parent.rmdir()
-    folder = Path(tempfile.mkdtemp(prefix=BRIEF))
-    try:
-        with locked(folder):
-            yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    with ExitStack() as kept:
+        for is_last in (False, False, True):
+            folder = Path(tempfile.mkdtemp(prefix=BRIEF))
+            kept.callback(shutil.rmtree, folder, ignore_errors=True)
+            try:
+                kept.enter_context(locked(folder))
+                break
+            except ExportError:  # another process took it for one that was left, before it was locked
+                if is_last:
+                    raise
+        yield folder
 
 
 @contextmanager

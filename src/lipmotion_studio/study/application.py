@@ -31,8 +31,7 @@ from lipmotion_studio.study.questions import ASKED, POINTS, SCALES
 from lipmotion_studio.study.store import StudyStore, rater_name
 from lipmotion_studio.study.submission import submitted_sheet
 from lipmotion_studio.study.trials import questions_of, trials_of
-from lipmotion_studio.web.bodies import json_of
-from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal
+from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal, json_of
 
 PAGE = {
     "": ("study.html", "text/html; charset=utf-8"),

@@ -1,21 +1,23 @@
-"""Replies of pages that lipmotion serves: the headers of all of them, and those to errors."""
+"""Requests to pages that lipmotion serves, whose bodies are bounded in size and in time, and replies to them."""
 
 from __future__ import annotations
 
+import asyncio
+import io
 import logging
 import sqlite3
 from collections.abc import Callable, Container, Mapping
 from functools import partial
-from typing import Any
+from typing import IO, Any
 
 from starlette import responses
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from lipmotion.errors import ExportError, LipMotionError
-from lipmotion.storage.json_text import as_json, nan_as_null
+from lipmotion.storage.json_text import as_json, from_json, nan_as_null
 
 LOG = logging.getLogger("lipmotion")
 HEADERS = {
@@ -124,3 +126,44 @@ ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
 def json_reply(content: Any, status: int = 200) -> Response:
     """Return content as a reply of JSON."""
     return JSONResponse(content, status, FRESH)
+
+
+LARGEST_JSON_BYTES = 1 << 14
+BODY_S = 10.0
+"""How long the body of a request may take to arrive."""
+
+
+async def json_of(request: Request, largest: int = LARGEST_JSON_BYTES) -> Any:
+    """Return the JSON that a request brings. Raises HTTPException: something else, too much, or too slowly."""
+    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
+        raise HTTPException(415, "required application/json")  # which no other site's page can send unasked
+    try:
+        return from_json((await body_of(request, largest, BODY_S)).decode("utf-8"))
+    except ValueError as error:
+        raise HTTPException(400, "not JSON in UTF-8") from error
+
+
+async def body_of(request: Request, largest: int, within_s: float) -> bytes:
+    """Return the body of a request. Raises HTTPException: more than ``largest`` bytes, too slow, or broken off."""
+    file = io.BytesIO()
+    await write_body(request, file, largest, within_s)
+    return file.getvalue()
+
+
+async def write_body(request: Request, file: IO[bytes], largest: int, within_s: float) -> None:
+    """Write the body of a request into a file. Raises as ``body_of``."""
+    try:
+        await asyncio.wait_for(_write(request, file, largest), within_s)
+    except (TimeoutError, asyncio.TimeoutError) as error:
+        raise HTTPException(408, "the request came too slowly") from error
+    except ClientDisconnect as error:
+        raise HTTPException(400, "the request broke off") from error
+
+
+async def _write(request: Request, file: IO[bytes], largest: int) -> None:
+    size = 0
+    async for part in request.stream():
+        size += len(part)
+        if size > largest:
+            raise HTTPException(413, f"required at most {largest} bytes", {"connection": "close"})
+        file.write(part)
