@@ -185,7 +185,7 @@ STAYED, BEGAN, SKIPPED = range(3)
 """How it came to say anything there: it did before; it begins; a word more is left out."""
 
 
-def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float]) -> _Path:
+def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float] = WORD_COSTS) -> _Path:
     """Return the best path that says words, leaves some of them out, and says anything between them."""
     word_cost, phone_cost = costs
     columns = np.concatenate([np.zeros(0, np.intp), *words])
