@@ -4,7 +4,7 @@ import pytest
 from lipmotion.faces.base import Staging
 from lipmotion.faces.portrait.planar import PlanarRasteriser
 from lipmotion.faces.registry import face_named
-from lipmotion.kernels.choice import numba_works
+from lipmotion.kernels.compiler import numba_works
 from lipmotion.pipeline.outputs.drawn_video import load_drawing, write_drawn_face
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, silent_monitor
 

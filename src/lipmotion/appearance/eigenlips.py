@@ -96,9 +96,9 @@ def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
     to_source = np.array([[1 / scale, 0, middle], [0, 1 / scale, middle]])
 
     def larger(rows: NDArray[np.float32]) -> NDArray[np.float32]:
-        size = scale * height, scale * width
-        pictures = affine.resample(rows.reshape(-1, height, width, 1), to_source, size, "cubic")
-        return pictures.reshape(*rows.shape[:-1], -1)
+        pictures = np.moveaxis(rows, 0, -1).reshape(-1, height, width, len(COLOURS))
+        pictures = affine.resample(pictures, to_source, (scale * height, scale * width))
+        return np.ascontiguousarray(np.moveaxis(pictures, -1, 0)).reshape(*rows.shape[:-1], -1)
 
     return Eigenlips(
         np.clip(larger(eigenlips.mean), 0, 255),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.export.cues.cue_shapes import PhoneShapes, shapes_of_phone
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet, drawn_shapes
-from lipmotion.kernels.sequences.segments import best_segments
+from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE, VISEMES, closing_phones, is_silent, words_in_time
 from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, drawn_shape

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.base import TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion.faces.portrait.design import Design
-from lipmotion.kernels.choice import numba_works
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ class DrawnFace(Face):
         from lipmotion.faces.portrait.planar import PlanarRasteriser
 
         chosen = self.staging
-        if chosen.background == TRANSPARENT or not numba_works():
+        if chosen.background == TRANSPARENT:
             return None
         poses = face_poses(motion, units, fps, chosen, self.prosody)
         background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE

@@ -21,7 +21,7 @@ from lipmotion.faces.portrait.mouth_textures import MouthTextures, mouth_texture
 from lipmotion.faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
 from lipmotion.faces.portrait.portrait_rasteriser import SCENE, FacePose, moving_parts, still_layers
 from lipmotion.faces.portrait.view import View, Window
-from lipmotion.kernels.compiled.planes import (
+from lipmotion.kernels.pixels.planes import (
     Box,
     EyeLayers,
     StillLayers,

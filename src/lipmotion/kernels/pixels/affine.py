@@ -1,54 +1,45 @@
-"""Resampling of pictures by affine maps: cubic convolution or bilinear, and blending of a patch into a frame."""
+"""Resampling of pictures of three colours by affine maps, by cubic convolution, and blending of a patch into a frame.
+
+Source: Keys 1981 (cubic convolution with a = -½, which reproduces second-degree polynomials).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.choice import compiled_pays
+from lipmotion.kernels.compiler import compiled
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Pictures = NDArray[Any]
-Kind = Literal["linear", "cubic"]
-"""Interpolation between pixels: bilinear from 2 × 2, or bicubic from 4 × 4 of them."""
-Taps = list[tuple[NDArray[np.intp], Floats]]
-"""Index and weight of the pixels along one side that each new pixel is made of, in ascending order [shapes=(N,)]."""
-PIXEL_S = 0.15e-6
-"""Time that NumPy takes for a new pixel of three colours (docs/results/video.md)."""
+Index = NDArray[np.int32]
+Number = np.float32
+HALF, ONE, ONE_AND_HALF, TWO, TWO_AND_HALF = Number(0.5), Number(1), Number(1.5), Number(2), Number(2.5)
+BLACK, WHITE = Number(0), Number(255)
 COLOURS = 3
+NEXT = np.uint64(COLOURS)  # indices that may be negative are not vectorised
 
 
-def resample(pictures: Pictures, to_source: Array, size: tuple[int, int], kind: Kind) -> Floats:
-    """Return new pictures: float32 array [shape=(T, h, w, C)].
+def resample(pictures: Pictures, to_source: Array, size: tuple[int, int]) -> Floats:
+    """Return new pictures: float32 array [shape=(T, h, w, 3)].
 
-    pictures  : uint8 or floats [shape=(T, H, W, C)]; outside them their outermost pixels repeat
+    pictures  : uint8 or floats [shape=(T, H, W, 3)]; outside them their outermost pixels repeat
     to_source : affine map [shape=(2, 3)] from the centre of a new pixel (column, row) to its position in the given ones
     size      : h and w
-    Source: Keys 1981 (cubic convolution with a = -½, which reproduces second-degree polynomials).
     """
-    if pictures.dtype != np.uint8:
-        pictures = pictures.astype(np.float32, copy=False)
-    new = np.empty((len(pictures), *size, pictures.shape[3]), np.float32)
-    if _is_compiled(new[..., 0].size, pictures.shape[3], kind):
-        from lipmotion.kernels.compiled import affine
-
-        to_source = _plain(to_source, np.float64)
-        for picture, made in zip(_plain(pictures), new, strict=True):
-            affine.resample(picture, to_source, made)
-        return new
-    rows, columns = _taps(to_source, pictures.shape[1:3], size, kind)
-    for picture, made in zip(pictures, new, strict=True):
-        made[...] = _mixed(picture, rows, columns).reshape(made.shape)
+    new = np.empty((len(pictures), *size, COLOURS), np.float32)
+    to_source = _plain(to_source, np.float64)
+    for picture, made in zip(_plain(pictures), new, strict=True):
+        _resample(picture, to_source, made)
     return new
 
 
 def blend(
     frame: NDArray[np.uint8], corner: tuple[int, int], size: tuple[int, int], patch: Pictures, weight: Floats,
-    to_patch: Array, kind: Kind,
+    to_patch: Array,
 ) -> None:  # fmt: skip
     """Blend a patch into a part of a frame, which is changed: frame + weight · (patch − frame), rounded, 0 to 255.
 
@@ -58,73 +49,139 @@ def blend(
     patch    : uint8 or floats [shape=(h, w, 3)]
     weight   : [shape=(h, w)], interpolated bilinearly
     to_patch : affine map [shape=(2, 3)] from the centre of a pixel of the part to its position in the patch
-    kind     : how to interpolate the patch
     """
-    if patch.dtype != np.uint8:
-        patch = patch.astype(np.float32, copy=False)
-    weight = _plain(weight, np.float32)
-    if _is_compiled(size[0] * size[1], patch.shape[2], kind):
-        from lipmotion.kernels.compiled import affine
-
-        affine.blend(frame, *corner, size, _plain(patch), weight, _plain(to_patch, np.float64))
-        return
-    new = _mixed(patch, *_taps(to_patch, patch.shape[:2], size, kind)).reshape(*size, -1)
-    share = _mixed(weight[..., None], *_taps(to_patch, weight.shape, size, "linear")).reshape(*size, 1)
-    part = frame[corner[0] : corner[0] + size[0], corner[1] : corner[1] + size[1]]
-    part[...] = np.clip(np.rint(part + share * (new - part)), 0, 255)
-
-
-def _is_compiled(pixels: int, colours: int, kind: Kind) -> bool:
-    return kind == "cubic" and colours == COLOURS and compiled_pays(pixels * PIXEL_S)
+    _blend(frame, *corner, size, _plain(patch), _plain(weight, np.float32), _plain(to_patch, np.float64))
 
 
 def _plain(values: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
     """Return an array that is contiguous and may be written to: for other ones numba would compile everything again."""
-    return np.require(values, dtype, ["C", "W"])
+    return np.require(values, dtype or (None if values.dtype == np.uint8 else np.float32), ["C", "W"])
 
 
-def _taps(to_source: Array, source_size: tuple[int, ...], size: tuple[int, int], kind: Kind) -> tuple[Taps, Taps]:
-    """Return the taps of the rows and of the columns, for the new pixels counted row by row."""
-    r, c = np.arange(size[0], dtype=float)[:, None], np.arange(size[1], dtype=float)
-    found = []
-    for (by_column, by_row, start), length in zip(to_source, source_size[::-1], strict=True):
-        position = np.clip(by_column * c + (by_row * r + start), -3, length + 2).ravel()
-        first = np.floor(position)
-        weights = _weights((position - first).astype(np.float32), kind)
-        offsets = range(2) if kind == "linear" else range(-1, 3)
-        found.append(
-            [
-                (np.clip(first.astype(np.intp) + offset, 0, length - 1), weight)
-                for offset, weight in zip(offsets, weights, strict=True)
-            ]
-        )
-    return found[1], found[0]
+@compiled
+def _resample(picture: Pictures, to_source: Array, new: Floats) -> None:
+    width = new.shape[1]
+    whole, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
+    needed = np.ones(width, Number)
+    for r in range(len(new)):
+        _locate(to_source, r, picture.shape, whole, fractions)
+        _weigh(fractions, taps)
+        _fill(picture, whole, taps, needed, new[r])
 
 
-def _weights(t: Floats, kind: Kind) -> Iterator[Floats]:
-    if kind == "linear":
-        yield 1 - t
-        yield t
-        return
-    yield ((1 - 0.5 * t) * t - 0.5) * t
-    yield (1.5 * t - 2.5) * t * t + 1
-    yield ((2 - 1.5 * t) * t + 0.5) * t
-    yield (0.5 * t - 0.5) * t * t
+@compiled
+def _blend(
+    frame: NDArray[np.uint8],
+    top: int,
+    left: int,
+    size: tuple[int, int],
+    patch: Pictures,
+    weight: Floats,
+    to_patch: Array,
+) -> None:
+    width = size[1]
+    whole, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
+    share, new = np.empty(width, Number), np.empty((width, COLOURS), Number)
+    for r in range(size[0]):
+        _locate(to_patch, r, patch.shape, whole, fractions)
+        _share(weight, whole, fractions, share)
+        _weigh(fractions, taps)
+        _fill(patch, whole, taps, share, new)
+        _mix(frame[top + r, left : left + width], new, share)
 
 
-def _mixed(picture: Pictures, rows: Taps, columns: Taps) -> Floats:
-    """Return the new pixels [shape=(N, C)]."""
-    top, bottom = rows[0][0].min(), rows[-1][0].max() + 1
-    left, right = columns[0][0].min(), columns[-1][0].max() + 1
-    part = np.asarray(picture[top:bottom, left:right], np.float32)
-    flat, width = part.reshape(-1, part.shape[2]), part.shape[1]
-    result: Floats = np.zeros(0, np.float32)
-    for column, across in columns:
-        mixed: Floats = np.zeros(0, np.float32)
-        for row, down in rows:
-            taken = flat.take((row - top) * width + (column - left), axis=0)
-            taken *= down[:, None]
-            mixed = taken if not mixed.size else np.add(mixed, taken, out=mixed)
-        mixed *= across[:, None]
-        result = mixed if not result.size else np.add(result, mixed, out=result)
-    return result
+@compiled
+def _locate(to_source: Array, r: int, shape: tuple[int, int, int], whole: Index, fractions: Floats) -> None:
+    """Fill in where the pixels of row ``r`` lie in a picture of ``shape``: columns and rows, fractions of both."""
+    from_x, from_y = to_source[0, 1] * r + to_source[0, 2], to_source[1, 1] * r + to_source[1, 2]
+    for c in range(whole.shape[1]):
+        x = min(max(to_source[0, 0] * c + from_x, -3.0), shape[1] + 2.0)
+        y = min(max(to_source[1, 0] * c + from_y, -3.0), shape[0] + 2.0)
+        column, row = np.floor(x), np.floor(y)
+        whole[0, c], whole[1, c] = np.int32(column), np.int32(row)
+        fractions[0, c], fractions[1, c] = Number(x - column), Number(y - row)
+
+
+@compiled
+def _weigh(fractions: Floats, taps: Floats) -> None:
+    """Fill in the weights of the four columns and of the four rows around each position [shape=(8, w)]."""
+    for side in range(2):
+        for c in range(fractions.shape[1]):
+            t = fractions[side, c]
+            taps[4 * side, c] = ((ONE - HALF * t) * t - HALF) * t
+            taps[4 * side + 1, c] = (ONE_AND_HALF * t - TWO_AND_HALF) * t * t + ONE
+            taps[4 * side + 2, c] = ((TWO - ONE_AND_HALF * t) * t + HALF) * t
+            taps[4 * side + 3, c] = (HALF * t - HALF) * t * t
+
+
+@compiled
+def _fill(picture: Pictures, whole: Index, taps: Floats, needed: Floats, new: Floats) -> None:
+    """Fill in a row: vertical sums of four columns, and their weighted sum; not where ``needed`` is 0."""
+    height, width, _ = picture.shape
+    flat, below = picture.reshape(-1), np.uint64(width * COLOURS)
+    for c in range(len(new)):
+        if needed[c] == BLACK:
+            continue
+        column, row = whole[0, c], whole[1, c]
+        e, f, g, h = taps[4, c], taps[5, c], taps[6, c], taps[7, c]
+        if 1 <= column < width - 2 and 1 <= row < height - 2:
+            first = np.uint64((np.int64(row) - 1) * width + column - 1) * NEXT
+            for k in range(COLOURS):
+                at = first + np.uint64(k)
+                new[c, k] = (
+                    taps[0, c] * _sum(flat, at, below, e, f, g, h)
+                    + taps[1, c] * _sum(flat, at + NEXT, below, e, f, g, h)
+                    + taps[2, c] * _sum(flat, at + NEXT + NEXT, below, e, f, g, h)
+                    + taps[3, c] * _sum(flat, at + NEXT + NEXT + NEXT, below, e, f, g, h)
+                )
+        else:
+            for k in range(COLOURS):
+                new[c, k] = BLACK
+                for i in range(4):
+                    new[c, k] += taps[i, c] * _sum_at_edge(picture, row, column - 1 + i, k, e, f, g, h)
+
+
+@compiled
+def _sum(
+    flat: Pictures, at: np.uint64, below: np.uint64, e: np.float32, f: np.float32, g: np.float32, h: np.float32
+) -> np.float32:
+    """Return the weighted sum of four pixels that lie below one another, the first of which is at ``at``."""
+    upper = e * Number(flat[at]) + f * Number(flat[at + below])
+    return upper + g * Number(flat[at + below + below]) + h * Number(flat[at + below + below + below])
+
+
+@compiled
+def _sum_at_edge(
+    picture: Pictures, row: int, column: int, k: int, e: np.float32, f: np.float32, g: np.float32, h: np.float32
+) -> np.float32:
+    """Return the weighted sum of four pixels of a column around ``row``; outermost pixels repeat."""
+    height, column = len(picture), _near(column, picture.shape[1])
+    upper = e * Number(picture[_near(row - 1, height), column, k]) + f * Number(picture[_near(row, height), column, k])
+    lower = g * Number(picture[_near(row + 1, height), column, k])
+    return upper + lower + h * Number(picture[_near(row + 2, height), column, k])
+
+
+@compiled
+def _share(weight: Floats, whole: Index, fractions: Floats, share: Floats) -> None:
+    """Fill in the weight at each position, interpolated between 2 × 2 pixels."""
+    height, width = weight.shape
+    for c in range(len(share)):
+        x, y = fractions[0, c], fractions[1, c]
+        above, below = _near(whole[1, c], height), _near(whole[1, c] + 1, height)
+        left, right = _near(whole[0, c], width), _near(whole[0, c] + 1, width)
+        before = (ONE - y) * weight[above, left] + y * weight[below, left]
+        share[c] = (ONE - x) * before + x * ((ONE - y) * weight[above, right] + y * weight[below, right])
+
+
+@compiled
+def _mix(row: NDArray[np.uint8], new: Floats, share: Floats) -> None:
+    for c in range(len(row)):
+        if share[c] != BLACK:
+            for k in range(COLOURS):
+                old = Number(row[c, k])
+                row[c, k] = np.uint8(min(max(np.rint(old + share[c] * (new[c, k] - old)), BLACK), WHITE))
+
+
+@compiled
+def _near(index: int, length: int) -> int:
+    return min(max(index, 0), length - 1)

@@ -9,17 +9,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.choice import compiled_pays
+from lipmotion.kernels.compiler import compiled
 
 Layer = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Canvas = NDArray[np.uint16]
 """Values 0..255 in 16 bits, so that pixels can be mixed as whole numbers."""
 Floats = NDArray[np.float64]
-PIXEL_S = 6e-8
-"""Time that NumPy takes for a pixel of a band; a warp takes about as long."""
+Packed = NDArray[np.uint64]
+ONE = 1 << 16
+"""A pixel, in whole numbers."""
 
 
+@compiled
 def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, texture: Floats) -> None:
     """Paint a texture from ``top`` down to ``bottom`` on a layer, in place; nothing where they meet.
 
@@ -29,18 +31,45 @@ def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, textur
     texture     : colour 0..255 and opacity 0..1 [shape=(D, U, 4)]; the first row lies at the top of the band, the last
                   one at its bottom; values between are interpolated
     """
-    first = max(int(np.floor(top.min())), 0)
-    last = min(int(np.ceil(bottom.max())), len(layer))
-    if first >= last:
-        return
-    if compiled_pays((last - first) * layer.shape[1] * PIXEL_S):
-        from lipmotion.kernels.compiled import painting
+    places, columns = top.shape
+    deep, wide = texture.shape[0], texture.shape[1]
+    for column in range(columns):
+        start, end = top[0, column], bottom[0, column]
+        highest, lowest = start, end
+        for place in range(1, places):
+            start += top[place, column]
+            end += bottom[place, column]
+            highest, lowest = min(highest, top[place, column]), max(lowest, bottom[place, column])
+        start, end = start / places, end / places
+        length = max(end - start, 1e-3)
+        beside = across[column] * (wide - 1)
+        u0 = min(int(beside), max(wide - 2, 0))
+        u1 = min(u0 + 1, wide - 1)
+        fu = beside - u0
+        for row in range(max(0, int(np.floor(highest))), min(len(layer), int(np.ceil(lowest)))):
+            cover = 0.0
+            for place in range(places):
+                upper, lower = max(top[place, column], float(row)), min(bottom[place, column], row + 1.0)
+                cover += max(lower - upper, 0.0)
+            cover = cover / places
+            if cover > 0:
+                depth = min(max((row + 0.5 - start) / length, 0.0), 1.0)
+                down = depth * (deep - 1)
+                d0 = min(int(down), max(deep - 2, 0))
+                d1 = min(d0 + 1, deep - 1)
+                fd = down - d0
+                above = texture[d0, u0, 3] + fu * (texture[d0, u1, 3] - texture[d0, u0, 3])
+                below = texture[d1, u0, 3] + fu * (texture[d1, u1, 3] - texture[d1, u0, 3])
+                opacity = cover * (above + fd * (below - above))
+                for channel in range(3):
+                    above = texture[d0, u0, channel] + fu * (texture[d0, u1, channel] - texture[d0, u0, channel])
+                    below = texture[d1, u0, channel] + fu * (texture[d1, u1, channel] - texture[d1, u0, channel])
+                    texel = above + fd * (below - above)
+                    layer[row, column, channel] += np.float32(opacity * (texel - layer[row, column, channel]))
+                layer[row, column, 3] += np.float32(opacity * (1.0 - layer[row, column, 3]))
 
-        painting.paint_band(layer, first, last, top, bottom, across, texture)
-    else:
-        _paint_band(layer[first:last], first, top, bottom, across, texture)
 
-
+@compiled
 def warp(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
     """Fill a picture with another one that is shifted, by a different distance everywhere.
 
@@ -48,16 +77,26 @@ def warp(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Lay
     shift_x, shift_y : how far the source is from each target pixel, at every ``step``-th pixel from the first one on
                        [shape=(ceil(H / step) + 1, ceil(W / step) + 1)]; interpolated between them
     """
-    if compiled_pays(target.shape[0] * target.shape[1] * PIXEL_S):
-        from lipmotion.kernels.compiled import painting
-
-        painting.warp_floats(source, shift_x, shift_y, step, target)
-        return
-    y0, x0, y, x = _sources(source.shape, shift_x, shift_y, step, target.shape)
-    fx, fy = (x - x0).astype(np.float32)[..., None], (y - y0).astype(np.float32)[..., None]
-    above = source[y0, x0] + fx * (source[y0, x0 + 1] - source[y0, x0])
-    below = source[y0 + 1, x0] + fx * (source[y0 + 1, x0 + 1] - source[y0 + 1, x0])
-    target[...] = above + fy * (below - above)
+    height, width, channels = target.shape
+    last_x, last_y = source.shape[1] - 1.0, source.shape[0] - 1.0
+    row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
+    for row in range(height):
+        row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        for cell in range((width + step - 1) // step):
+            cell_x, more_x = row_x[cell], row_x[cell + 1] - row_x[cell]
+            cell_y, more_y = row_y[cell], row_y[cell + 1] - row_y[cell]
+            for column in range(cell * step, min(cell * step + step, width)):
+                share = column / step - cell
+                x = min(max(column + (cell_x + share * more_x), 0.0), last_x)
+                y = min(max(row + (cell_y + share * more_y), 0.0), last_y)
+                x0, y0 = min(np.uint64(x), np.uint64(last_x - 1)), min(np.uint64(y), np.uint64(last_y - 1))
+                x1, y1 = x0 + np.uint64(1), y0 + np.uint64(1)
+                fx, fy = np.float32(x - x0), np.float32(y - y0)
+                for channel in range(channels):
+                    left, right = source[y0, x0, channel], source[y0, x1, channel]
+                    above = left + fx * (right - left)
+                    left, right = source[y1, x0, channel], source[y1, x1, channel]
+                    target[row, column, channel] = above + fy * (left + fx * (right - left) - above)
 
 
 def warp_bytes(source: Canvas, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
@@ -66,23 +105,10 @@ def warp_bytes(source: Canvas, shift_x: Floats, shift_y: Floats, step: int, targ
     source : values 0..255 [shape=(H, W, 4)], the last two axes contiguous
     target : [shape=(H, W, C)], of the first C channels, 3 or 4
     """
-    if compiled_pays(target.shape[0] * target.shape[1] * PIXEL_S):
-        from lipmotion.kernels.compiled import painting
-
-        painting.warp_packed(source.view(np.uint64)[..., 0], shift_x, shift_y, step, target)
-        return
-    height, width = target.shape[:2]
-    x = _whole_shifts(shift_x, step, height, width) + (np.arange(width) << 16)
-    y = _whole_shifts(shift_y, step, height, width) + (np.arange(height)[:, None] << 16)
-    x, y = (np.clip(at, 0, ((size - 1) << 16) - 1) for at, size in ((x, source.shape[1]), (y, source.shape[0])))
-    x0, y0, fx, fy = x >> 16, y >> 16, (x >> 8 & 255)[..., None], (y >> 8 & 255)[..., None]
-    both = fx * fy >> 8
-    pixels = source[..., : target.shape[2]].astype(np.int32)
-    mixed = pixels[y0, x0] * (256 - fx - fy + both) + pixels[y0, x0 + 1] * (fx - both)
-    mixed += pixels[y0 + 1, x0] * (fy - both) + pixels[y0 + 1, x0 + 1] * both + 128
-    target[...] = mixed >> 8
+    _warp_packed(source.view(np.uint64)[..., 0], shift_x, shift_y, step, target)
 
 
+@compiled
 def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas) -> None:
     """Fill in the values 0..255 of four layers over one another [shape=(H, W, 4)], premultiplied.
 
@@ -91,77 +117,51 @@ def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas)
     skin  : a layer with the strength of its shadow on what is behind it, 0..1, in one more channel [shape=(H, W, 5)]
     above : a layer over the skin
     """
-    if compiled_pays(below.shape[0] * below.shape[1] * PIXEL_S):
-        from lipmotion.kernels.compiled import painting
-
-        painting.stack(below, shade, skin, above, target)
-    else:
-        _stack(below, shade, skin, above, target)
-
-
-_WHOLE = np.array([1, 1, 1, 255], np.float64)
-
-
-def _stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas) -> None:
-    skins = skin.astype(np.float64)
-    mixed = below + skins[..., 4:] * shade
-    mixed = skins[..., :4] + (1 - skins[..., 3:4]) * mixed
-    mixed = above + (1 - above[..., 3:4].astype(np.float64)) * mixed
-    target[...] = (mixed * _WHOLE + 0.5).astype(np.uint16)
+    for row in range(target.shape[0]):
+        for column in range(target.shape[1]):
+            shadow = np.float64(skin[row, column, 4])
+            behind_skin, behind_above = 1 - np.float64(skin[row, column, 3]), 1 - np.float64(above[row, column, 3])
+            for channel in range(4):
+                mixed = below[row, column, channel] + shadow * shade[row, column, channel]
+                mixed = skin[row, column, channel] + behind_skin * mixed
+                mixed = above[row, column, channel] + behind_above * mixed
+                target[row, column, channel] = np.uint16(mixed * (255.0 if channel == 3 else 1.0) + 0.5)
 
 
-def _paint_band(layer: Layer, first: int, top: Floats, bottom: Floats, across: Floats, texture: Floats) -> None:
-    row = np.arange(first, first + len(layer))[:, None].astype(np.float64)
-    cover = np.zeros(layer.shape[:2])
-    for upper, lower in zip(top, bottom, strict=True):
-        cover += np.maximum(np.minimum(lower, row + 1) - np.maximum(upper, row), 0)
-    cover = cover / len(top)
-    start, end = top[0].copy(), bottom[0].copy()
-    for upper, lower in zip(top[1:], bottom[1:], strict=True):
-        start += upper
-        end += lower
-    start, end = start / len(top), end / len(top)
-    depth = np.minimum(np.maximum((row + 0.5 - start) / np.maximum(end - start, 1e-3), 0), 1)
-    down, beside = depth * (texture.shape[0] - 1), across * (texture.shape[1] - 1)
-    d0 = np.minimum(down.astype(np.int64), max(texture.shape[0] - 2, 0))
-    u0 = np.minimum(beside.astype(np.int64), max(texture.shape[1] - 2, 0))
-    d1, u1 = np.minimum(d0 + 1, texture.shape[0] - 1), np.minimum(u0 + 1, texture.shape[1] - 1)
-    fd, fu = (down - d0)[..., None], (beside - u0)[:, None]
-    upper_row = texture[d0, u0] + fu * (texture[d0, u1] - texture[d0, u0])
-    lower_row = texture[d1, u0] + fu * (texture[d1, u1] - texture[d1, u0])
-    texel = upper_row + fd * (lower_row - upper_row)
-    opacity = cover * texel[..., 3]
-    texel[..., 3] = 1
-    layer += (opacity[..., None] * (texel - layer)).astype(np.float32)
+@compiled
+def _warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+    """Mix all four channels of ``warp_bytes`` at once, in the parts of a number; no sum needs more than 16 bits."""
+    height, width, channels = target.shape
+    end_x, end_y = (source.shape[1] - 1 << 16) - 1, (source.shape[0] - 1 << 16) - 1
+    row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
+    one, two, half = np.uint64(1), np.uint64(8), np.uint64(0x0080008000800080)
+    share, byte = np.uint64(256), np.uint64(255)
+    for row in range(height):
+        row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        for cell in range((width + step - 1) // step):
+            x, more_x = int(np.floor(row_x[cell] * ONE)), int(np.floor((row_x[cell + 1] - row_x[cell]) * ONE / step))
+            y, more_y = int(np.floor(row_y[cell] * ONE)), int(np.floor((row_y[cell + 1] - row_y[cell]) * ONE / step))
+            x, y = x + (cell * step << 16), y + (row << 16)
+            for column in range(cell * step, min(cell * step + step, width)):
+                at_x, at_y = np.uint64(min(max(x, 0), end_x)), np.uint64(min(max(y, 0), end_y))
+                x, y = x + more_x + ONE, y + more_y
+                x0, y0 = at_x >> np.uint64(16), at_y >> np.uint64(16)
+                fx, fy = at_x >> two & byte, at_y >> two & byte
+                both = fx * fy >> two
+                mixed = source[y0, x0] * (share - fx - fy + both) + source[y0, x0 + one] * (fx - both)
+                mixed += source[y0 + one, x0] * (fy - both) + source[y0 + one, x0 + one] * both + half
+                target[row, column, 0] = np.uint8(mixed >> np.uint64(8) & byte)
+                target[row, column, 1] = np.uint8(mixed >> np.uint64(24) & byte)
+                target[row, column, 2] = np.uint8(mixed >> np.uint64(40) & byte)
+                if channels == 4:
+                    target[row, column, 3] = np.uint8(mixed >> np.uint64(56))
 
 
-def _sources(
-    source: tuple[int, ...], shift_x: Floats, shift_y: Floats, step: int, target: tuple[int, ...]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats, Floats]:
-    """Return the source pixels before each target pixel's, rows and columns, and the exact places."""
-    height, width = target[:2]
-    x = np.arange(width) + _between(shift_x, step, height, width)
-    y = np.arange(height)[:, None] + _between(shift_y, step, height, width)
-    x, y = np.minimum(np.maximum(x, 0), source[1] - 1), np.minimum(np.maximum(y, 0), source[0] - 1)
-    return np.minimum(y.astype(np.int64), source[0] - 2), np.minimum(x.astype(np.int64), source[1] - 2), y, x
-
-
-def _whole_shifts(grid: Floats, step: int, height: int, width: int) -> NDArray[np.int64]:
-    """Return a grid's values at every pixel in 1/65536 [shape=(height, width)], rounded as in the compiled form."""
-    row = np.arange(height) / step
-    r = np.minimum(row.astype(int), len(grid) - 2)
-    rows = grid[r] + (row - r)[:, None] * (grid[r + 1] - grid[r])
-    start = np.floor(rows[:, :-1] * 65536).astype(np.int64)
-    more = np.floor((rows[:, 1:] - rows[:, :-1]) * 65536 / step).astype(np.int64)
-    column = np.arange(width)
-    return start[:, column // step] + column % step * more[:, column // step]
-
-
-def _between(grid: Floats, step: int, height: int, width: int) -> Floats:
-    """Return the values of a grid at every pixel [shape=(height, width)]."""
-    row, column = np.arange(height) / step, np.arange(width) / step
-    r, c = np.minimum(row.astype(int), len(grid) - 2), np.minimum(column.astype(int), grid.shape[1] - 2)
-    fr, fc = (row - r)[:, None], column - c
-    first = grid[r][:, c] + fr * (grid[r + 1][:, c] - grid[r][:, c])
-    second = grid[r][:, c + 1] + fr * (grid[r + 1][:, c + 1] - grid[r][:, c + 1])
-    return np.asarray(first + fc * (second - first))
+@compiled
+def row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, row_y: Floats) -> None:
+    """Fill in the values of two grids in one row of pixels."""
+    r = min(int(down), shift_x.shape[0] - 2)
+    share = down - r
+    for column in range(shift_x.shape[1]):
+        row_x[column] = shift_x[r, column] + share * (shift_x[r + 1, column] - shift_x[r, column])
+        row_y[column] = shift_y[r, column] + share * (shift_y[r + 1, column] - shift_y[r, column])

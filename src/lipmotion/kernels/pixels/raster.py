@@ -5,21 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.compiler import compiled
+
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
+FAR = np.float32(np.inf)
+BAND = 16
+"""Rows of pixels that are drawn at once: their samples fit the processor's cache."""
 GRID = 256.0
 """Corners are rounded to this part of a sample, so that neighbouring triangles leave no gap between them."""
 
 
+@compiled
 def draw(
-    points: Real,
-    colours: Colours,
-    triangles: NDArray[np.int32],
-    area: tuple[int, int, int, int],
-    background: Colours,
-    tone: NDArray[np.uint8],
-    picture: NDArray[np.uint8],
-) -> None:
+    points: Real, colours: Colours, triangles: NDArray[np.int32], area: tuple[int, int, int, int],
+    background: Colours, tone: NDArray[np.uint8], picture: NDArray[np.uint8],
+) -> None:  # fmt: skip
     """Draw triangles over the background into an area of a picture, in place.
 
     points     : column and row in pixels, and depth (smaller is nearer) of every vertex [shape=(V, 3)]
@@ -29,10 +30,120 @@ def draw(
     background : light in every pixel [shape=(H, W, 3)]
     tone       : the grey level of light from 0 to 1, in even steps [shape=(L,)]
     picture    : is changed in the area alone [shape=(H, W, 3)]
-    It runs without the interpreter's lock where numba is there.
     """
-    x, y = (np.rint(2 * GRID * points[:, axis]) / GRID for axis in range(2))
-    z = np.ascontiguousarray(points[:, 2])
-    from lipmotion.kernels.compiled import raster
+    x, y, z = np.rint(2 * GRID * points[:, 0]) / GRID, np.rint(2 * GRID * points[:, 1]) / GRID, points[:, 2].copy()
+    left, top, right, bottom = area
+    bands = (bottom - top + BAND - 1) // BAND
+    faces, starts = by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
+    width = right - left
+    depth = np.empty((2 * BAND, 2 * width), np.float32)
+    colour = np.empty((2 * BAND, 2 * width, 3), np.float32)
+    for band in range(bands):
+        first = top + band * BAND
+        last = min(first + BAND, bottom)
+        depth[:] = FAR
+        for n in range(starts[band], starts[band + 1]):
+            a, b, c = triangles[faces[n]]
+            _triangle(x, y, z, colours, a, b, c, 2 * left, 2 * right, 2 * first, 2 * last, depth, colour)
+        _resolve(depth, colour, background, tone, picture, left, right, first, last)
 
-    raster.draw(x, y, z, colours, triangles, np.array(area), background, tone, picture)
+
+@compiled
+def by_band(
+    x: Real, y: Real, triangles: NDArray[np.int32], left: int, right: int, top: int, bands: int
+) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
+    """Return the triangles that face the viewer, band after band, and where the triangles of each band begin."""
+    spans = np.empty((len(triangles), 2), np.int32)
+    starts = np.zeros(bands + 1, np.intp)
+    for f in range(len(triangles)):
+        a, b, c = triangles[f]
+        spans[f, 0], spans[f, 1] = 1, 0
+        faces_viewer = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a]) < 0
+        if faces_viewer and min(x[a], x[b], x[c]) < right and max(x[a], x[b], x[c]) > left:
+            low, high = min(y[a], y[b], y[c]), max(y[a], y[b], y[c])
+            spans[f, 0] = max(int(np.floor((low - top) / (2 * BAND))), 0)
+            spans[f, 1] = min(int(np.floor((high - top) / (2 * BAND))), bands - 1)
+            for band in range(spans[f, 0], spans[f, 1] + 1):
+                starts[band + 1] += 1
+    for band in range(bands):
+        starts[band + 1] += starts[band]
+    faces = np.empty(starts[bands], np.int32)
+    filled = starts.copy()
+    for f in range(len(triangles)):
+        for band in range(spans[f, 0], spans[f, 1] + 1):
+            faces[filled[band]] = f
+            filled[band] += 1
+    return faces, starts
+
+
+@compiled
+def _triangle(
+    x: Real, y: Real, z: Real, colours: Colours, a: int, b: int, c: int, left: int, right: int, top: int, bottom: int,
+    depth: Colours, colour: Colours,
+) -> None:  # fmt: skip
+    # The corners are in whole 1/256 of a sample, so that the edge functions are exact.
+    xa, ya, xb, yb, xc, yc = x[a], y[a], x[c], y[c], x[b], y[b]  # clockwise on the screen, whose rows go down
+    b, c = c, b
+    x0, x1 = max(left, int(np.ceil(min(xa, xb, xc) - 0.5))), min(right, int(np.floor(max(xa, xb, xc) + 0.5)))
+    y0, y1 = max(top, int(np.ceil(min(ya, yb, yc) - 0.5))), min(bottom, int(np.floor(max(ya, yb, yc) + 0.5)))
+    if x0 >= x1 or y0 >= y1:
+        return  # between the middles of samples
+    inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
+    bias_a, bias_b, bias_c = bias(xb, yb, xc, yc), bias(xc, yc, xa, ya), bias(xa, ya, xb, yb)
+    za, zb, zc = np.float32(z[a]), np.float32(z[b] - z[a]), np.float32(z[c] - z[a])
+    red, green, blue = colours[a]
+    red_b, green_b, blue_b = colours[b, 0] - red, colours[b, 1] - green, colours[b, 2] - blue
+    red_c, green_c, blue_c = colours[c, 0] - red, colours[c, 1] - green, colours[c, 2] - blue
+    step_a, step_b, step_c = yc - yb, ya - yc, yb - ya
+    for row in range(y0, y1):
+        px, py = x0 + 0.5, row + 0.5
+        of_a = (xc - xb) * (py - yb) - step_a * (px - xb)
+        of_b = (xa - xc) * (py - yc) - step_b * (px - xc)
+        of_c = (xb - xa) * (py - ya) - step_c * (px - xa)
+        within = False
+        i = row - top
+        for j in range(x0 - left, x1 - left):
+            if of_a >= bias_a and of_b >= bias_b and of_c >= bias_c:
+                within = True
+                share_b, share_c = np.float32(of_b * inverse), np.float32(of_c * inverse)
+                away = za + (share_b * zb + share_c * zc)
+                if away < depth[i, j]:
+                    depth[i, j] = away
+                    colour[i, j, 0] = red + (share_b * red_b + share_c * red_c)
+                    colour[i, j, 1] = green + (share_b * green_b + share_c * green_c)
+                    colour[i, j, 2] = blue + (share_b * blue_b + share_c * blue_c)
+            elif within:
+                break
+            of_a -= step_a  # exact, as the corners are
+            of_b -= step_b
+            of_c -= step_c
+
+
+@compiled
+def bias(xa: float, ya: float, xb: float, yb: float) -> float:
+    """Return the least edge function of samples inside: samples on an edge belong to the triangle on one side of it."""
+    owned = ya > yb or (ya == yb and xa < xb)
+    return 0.0 if owned else 1e-6
+
+
+@compiled
+def _resolve(
+    depth: Colours, colour: Colours, background: Colours, tone: NDArray[np.uint8], picture: NDArray[np.uint8],
+    left: int, right: int, first: int, last: int,
+) -> None:  # fmt: skip
+    most, quarter = np.float32(len(tone) - 1), np.float32(0.25)
+    zero, one = np.float32(0), np.float32(1)
+    for row in range(first, last):
+        i = 2 * (row - first)
+        for column in range(left, right):
+            j = 2 * (column - left)
+            empty_a, empty_b = depth[i, j] == FAR, depth[i, j + 1] == FAR
+            empty_c, empty_d = depth[i + 1, j] == FAR, depth[i + 1, j + 1] == FAR
+            for k in range(3):
+                behind = background[row, column, k]
+                total = behind if empty_a else colour[i, j, k]
+                total += behind if empty_b else colour[i, j + 1, k]
+                total += behind if empty_c else colour[i + 1, j, k]
+                total += behind if empty_d else colour[i + 1, j + 1, k]
+                level = min(max(quarter * total, zero), one) * most
+                picture[row, column, k] = tone[int(level)]

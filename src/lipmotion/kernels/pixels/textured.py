@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.raster import GRID
+from lipmotion.kernels.compiler import compiled
+from lipmotion.kernels.pixels.raster import BAND, FAR, GRID, bias, by_band
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
@@ -21,6 +22,11 @@ SEEN_OPACITY = 1 / 512
 """Below this opacity, it is not seen."""
 NO_TRIANGLE = -1
 SCALE = 1 / 65535
+WIDE_SAMPLES = 8
+"""In triangles wider than this, in samples, the columns of a row are worked out before they are tried."""
+PLANES = 27
+"""Numbers of a triangle that are linear on the screen: three of each of light, highlights, depth, and place in the
+texture times depth."""
 
 
 class TexturedTriangles(NamedTuple):
@@ -43,17 +49,11 @@ class TexturedTriangles(NamedTuple):
     levels: NDArray[np.int64]
 
 
+@compiled
 def draw_textured(
-    points: Real,
-    light: Light,
-    shine: Light,
-    surface: TexturedTriangles,
-    area: tuple[int, int, int, int],
-    background: Light,
-    tone: NDArray[np.uint8],
-    picture: NDArray[np.uint8],
-    opacity: NDArray[np.uint8],
-) -> None:
+    points: Real, light: Light, shine: Light, surface: TexturedTriangles, area: tuple[int, int, int, int],
+    background: Light, tone: NDArray[np.uint8], picture: NDArray[np.uint8], opacity: NDArray[np.uint8],
+) -> None:  # fmt: skip
     """Draw triangles over the background into an area of a picture, in place.
 
     points  : column and row in pixels, and depth: -1 divided by the distance [shape=(V, 3)]
@@ -65,10 +65,289 @@ def draw_textured(
     picture : is changed in the area alone [shape=(H, W, 3)]
     opacity : becomes the part of each pixel that triangles hide, 0 to 255, in the area alone [shape=(H, W)]
     Of surfaces that are blended, the nearest one is seen before what is solid. A texture is sampled once a pixel and
-    triangle, bilinearly. It runs without the interpreter's lock where numba is there.
+    triangle, bilinearly.
     """
-    x, y = (np.rint(2 * GRID * points[:, axis]) / GRID for axis in range(2))
-    z = np.ascontiguousarray(points[:, 2])
-    from lipmotion.kernels.compiled import textured
+    x, y, z = np.rint(2 * GRID * points[:, 0]) / GRID, np.rint(2 * GRID * points[:, 1]) / GRID, points[:, 2].copy()
+    triangles, uv, looks, alphas, texels, levels = surface
+    left, top, right, bottom = area
+    bands = (bottom - top + BAND - 1) // BAND
+    faces, starts = by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
+    planes = np.empty((len(triangles), PLANES))
+    _fill_planes(faces, x, y, z, light, shine, triangles, uv, planes)
+    size = (2 * BAND, 2 * (right - left))
+    depth, near = np.empty(size, np.float32), np.empty(size, np.float32)
+    shown, before = np.empty(size, np.int32), np.empty(size, np.int32)
+    for band in range(bands):
+        first = top + band * BAND
+        last = min(first + BAND, bottom)
+        depth[:], near[:], shown[:], before[:] = FAR, FAR, NO_TRIANGLE, NO_TRIANGLE
+        layered = False
+        for n in range(starts[band], starts[band + 1]):
+            t = faces[n]
+            a, c, b = triangles[t]
+            layered = layered or looks[t, 1] == CLEAR
+            least = alphas[t, 0] if looks[t, 1] == CUT else HIDING_OPACITY
+            _mark(
+                t, x[a], y[a], z[a], x[b], y[b], z[b], x[c], y[c], z[c], 2 * left, 2 * right, 2 * first, 2 * last,
+                looks[t, 1] != 0, least / max(alphas[t, 1], 1e-9), planes, looks[t, 0], texels, levels, depth, shown,
+                depth,
+            )  # fmt: skip
+        if layered:
+            for n in range(starts[band], starts[band + 1]):
+                t = faces[n]
+                a, c, b = triangles[t]
+                if looks[t, 1] == CLEAR:
+                    _mark(
+                        t, x[a], y[a], z[a], x[b], y[b], z[b], x[c], y[c], z[c],
+                        2 * left, 2 * right, 2 * first, 2 * last,
+                        True, SEEN_OPACITY / max(alphas[t, 1], 1e-9), planes, looks[t, 0], texels, levels, near, before,
+                        depth,
+                    )  # fmt: skip
+        _resolve(
+            shown, before, layered, planes, looks, alphas, texels, levels, background, tone, picture, opacity,
+            left, right, first, last,
+        )  # fmt: skip
 
-    textured.draw(x, y, z, light, shine, *surface, np.array(area), background, tone, picture, opacity)
+
+@compiled
+def _fill_planes(
+    faces: Whole, x: Real, y: Real, z: Real, light: Light, shine: Light, triangles: Whole, uv: Real, planes: Real
+) -> None:
+    for n in range(len(faces)):
+        t = faces[n]
+        a, c, b = triangles[t]
+        xa, ya, xb, yb, xc, yc = x[a], y[a], x[b], y[b], x[c], y[c]
+        inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
+        bx, by, cx, cy = (yc - ya) * inverse, (xa - xc) * inverse, (ya - yb) * inverse, (xb - xa) * inverse
+        b0, c0 = -(bx * xc + by * yc), -(cx * xa + cy * ya)
+        for channel in range(3):
+            for kind, values in ((0, light), (9, shine)):
+                first = np.float64(values[a, channel])
+                to_b, to_c = np.float64(values[b, channel]) - first, np.float64(values[c, channel]) - first
+                at = kind + 3 * channel
+                planes[t, at] = first + (b0 * to_b + c0 * to_c)
+                planes[t, at + 1], planes[t, at + 2] = bx * to_b + cx * to_c, by * to_b + cy * to_c
+        for number in range(3):
+            first, second, third = z[a], z[b], z[c]
+            if number > 0:
+                first, second, third = (
+                    first * uv[t, 0, number - 1], second * uv[t, 2, number - 1], third * uv[t, 1, number - 1]
+                )  # fmt: skip
+            to_b, to_c = second - first, third - first
+            at = 18 + 3 * number
+            planes[t, at] = first + (b0 * to_b + c0 * to_c)
+            planes[t, at + 1], planes[t, at + 2] = bx * to_b + cx * to_c, by * to_b + cy * to_c
+
+
+@compiled
+def _mark(
+    t: int, xa: float, ya: float, za: float, xb: float, yb: float, zb: float, xc: float, yc: float, zc: float,
+    left: int, right: int, top: int, bottom: int, holes: bool, least: float, planes: Real, level: int,
+    texels: NDArray[np.uint16], levels: NDArray[np.int64], depth: Light, marks: Whole, solid: Light,
+) -> None:  # fmt: skip
+    x0, x1 = max(left, int(np.ceil(min(xa, xb, xc) - 0.5))), min(right, int(np.floor(max(xa, xb, xc) + 0.5)))
+    y0, y1 = max(top, int(np.ceil(min(ya, yb, yc) - 0.5))), min(bottom, int(np.floor(max(ya, yb, yc) + 0.5)))
+    if x0 >= x1 or y0 >= y1:
+        return  # between the middles of samples
+    inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
+    bias_a, bias_b, bias_c = bias(xb, yb, xc, yc), bias(xc, yc, xa, ya), bias(xa, ya, xb, yb)
+    to_b, to_c = zb - za, zc - za
+    step_a, step_b, step_c = yc - yb, ya - yc, yb - ya
+    for row in range(y0, y1):
+        px, py = x0 + 0.5, row + 0.5
+        of_a = (xc - xb) * (py - yb) - step_a * (px - xb)
+        of_b = (xa - xc) * (py - yc) - step_b * (px - xc)
+        of_c = (xb - xa) * (py - ya) - step_c * (px - xa)
+        within = False
+        i = row - top
+        start, stop = x0, x1
+        if x1 - x0 > WIDE_SAMPLES:
+            start, stop = _narrowed(start, stop, px, of_a - bias_a, step_a)
+            start, stop = _narrowed(start, stop, px, of_b - bias_b, step_b)
+            start, stop = _narrowed(start, stop, px, of_c - bias_c, step_c)
+            of_a -= step_a * (start - x0)
+            of_b -= step_b * (start - x0)
+            of_c -= step_c * (start - x0)
+        for j in range(start - left, stop - left):
+            if of_a >= bias_a and of_b >= bias_b and of_c >= bias_c:
+                within = True
+                away = np.float32(za + (of_b * inverse * to_b + of_c * inverse * to_c))
+                if (
+                    away < depth[i, j]
+                    and away <= solid[i, j]
+                    and (not holes or _alpha(t, j + left + 0.5, py, planes, level, texels, levels) >= least)
+                ):
+                    depth[i, j] = away
+                    marks[i, j] = t
+            elif within:
+                break
+            of_a -= step_a  # exact, as the corners are
+            of_b -= step_b
+            of_c -= step_c
+
+
+@compiled
+def _narrowed(start: int, stop: int, px: float, inside: float, step: float) -> tuple[int, int]:
+    """Return the columns that may be on the inner side of an edge, and one more at either end."""
+    if step > 0:
+        stop = min(stop, int(np.floor(px + inside / step - 0.5)) + 2)
+    elif step < 0:
+        start = max(start, int(np.ceil(px + inside / step - 0.5)) - 1)
+    return start, stop
+
+
+@compiled
+def _alpha(
+    t: int, px: float, py: float, planes: Real, level: int, texels: NDArray[np.uint16], levels: NDArray[np.int64]
+) -> float:
+    if level < 0:
+        return 1.0
+    one, two, three, four, right, low = _texels_at(t, px, py, planes, level, levels)
+    return _between(texels, one, two, three, four, 3, right, low)
+
+
+@compiled
+def _texels_at(
+    t: int, px: float, py: float, planes: Real, level: int, levels: NDArray[np.int64]
+) -> tuple[int, int, int, int, float, float]:
+    """Return the four texels around a place of a triangle, and how far it is to the right and down between them."""
+    near = 1.0 / _on_plane(planes, t, 18, px, py)
+    x = _on_plane(planes, t, 21, px, py) * near * levels[level, 1] - 0.5
+    y = _on_plane(planes, t, 24, px, py) * near * levels[level, 2] - 0.5
+    first, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
+    left, top = np.floor(x), np.floor(y)
+    column, line = int(left) % width, int(top) % height
+    next_column = column + 1 if column + 1 < width else 0
+    next_line = line + 1 if line + 1 < height else 0
+    upper, lower = first + line * width, first + next_line * width
+    return upper + column, upper + next_column, lower + column, lower + next_column, x - left, y - top
+
+
+@compiled
+def _on_plane(planes: Real, t: int, at: int, px: float, py: float) -> float:
+    return planes[t, at] + (planes[t, at + 1] * px + planes[t, at + 2] * py)
+
+
+@compiled
+def _between(
+    texels: NDArray[np.uint16], one: int, two: int, three: int, four: int, channel: int, right: float, low: float
+) -> float:
+    a, b = np.float64(texels[one, channel]), np.float64(texels[two, channel])
+    c, d = np.float64(texels[three, channel]), np.float64(texels[four, channel])
+    upper = a + right * (b - a)
+    lower = c + right * (d - c)
+    return (upper + low * (lower - upper)) * SCALE
+
+
+@compiled
+def _shaded(
+    t: int, px: float, py: float, planes: Real, level: int, texels: NDArray[np.uint16], levels: NDArray[np.int64]
+) -> tuple[float, float, float, float]:
+    """Return the light of a triangle at a place on the screen, and the opacity of its texture."""
+    red, green, blue, alpha = 1.0, 1.0, 1.0, 1.0
+    if level >= 0:
+        one, two, three, four, right, low = _texels_at(t, px, py, planes, level, levels)
+        red = _between(texels, one, two, three, four, 0, right, low)
+        green = _between(texels, one, two, three, four, 1, right, low)
+        blue = _between(texels, one, two, three, four, 2, right, low)
+        alpha = _between(texels, one, two, three, four, 3, right, low)
+    red = red * _on_plane(planes, t, 0, px, py) + _on_plane(planes, t, 9, px, py)
+    green = green * _on_plane(planes, t, 3, px, py) + _on_plane(planes, t, 12, px, py)
+    blue = blue * _on_plane(planes, t, 6, px, py) + _on_plane(planes, t, 15, px, py)
+    return red, green, blue, alpha
+
+
+@compiled
+def _resolve(
+    shown: Whole, before: Whole, layered: bool, planes: Real, looks: Whole, alphas: Real,
+    texels: NDArray[np.uint16], levels: NDArray[np.int64],
+    background: Light, tone: NDArray[np.uint8], picture: NDArray[np.uint8], opacity: NDArray[np.uint8],
+    left: int, right: int, first: int, last: int,
+) -> None:  # fmt: skip
+    most = float(len(tone) - 1)
+    colours, covered, ids = np.empty((4, 3)), np.empty(4), np.empty(4, np.int32)
+    for row in range(first, last):
+        i = 2 * (row - first)
+        for column in range(left, right):
+            j = 2 * (column - left)
+            t = shown[i, j]
+            whole = t == shown[i, j + 1] and t == shown[i + 1, j] and t == shown[i + 1, j + 1]
+            if whole and layered:
+                whole = before[i, j] == NO_TRIANGLE and before[i, j + 1] == NO_TRIANGLE
+                whole = whole and before[i + 1, j] == NO_TRIANGLE and before[i + 1, j + 1] == NO_TRIANGLE
+            if whole and t == NO_TRIANGLE:
+                for channel in range(3):
+                    picture[row, column, channel] = tone[_level(np.float64(background[row, column, channel]), most)]
+                opacity[row, column] = 0
+                continue
+            if whole:
+                red, green, blue, _ = _shaded(t, 2 * column + 1.0, 2 * row + 1.0, planes, looks[t, 0], texels, levels)
+                picture[row, column, 0] = tone[_level(red, most)]
+                picture[row, column, 1] = tone[_level(green, most)]
+                picture[row, column, 2] = tone[_level(blue, most)]
+                opacity[row, column] = 255
+                continue
+            _mix(shown, before, layered, i, j, row, column, planes, looks, alphas, texels, levels, background, colours,
+                 covered, ids)  # fmt: skip
+            for channel in range(3):
+                total = (colours[0, channel] + colours[1, channel]) + (colours[2, channel] + colours[3, channel])
+                picture[row, column, channel] = tone[_level(0.25 * total, most)]
+            hidden = (covered[0] + covered[1]) + (covered[2] + covered[3])
+            opacity[row, column] = np.uint8(63.75 * hidden + 0.5)
+
+
+@compiled
+def _mix(
+    shown: Whole, before: Whole, layered: bool, i: int, j: int, row: int, column: int, planes: Real, looks: Whole,
+    alphas: Real, texels: NDArray[np.uint16], levels: NDArray[np.int64], background: Light,
+    colours: Real, covered: Real, ids: Whole,
+) -> None:  # fmt: skip
+    """Fill in the colours of the four samples of a pixel [shape=(4, 3)], and how far each is covered [shape=(4,)]."""
+    for k in range(4):
+        covered[k] = 0.0
+        for channel in range(3):
+            colours[k, channel] = background[row, column, channel]
+    for marks, layer in ((shown, False), (before, True)):
+        if layer and not layered:
+            continue
+        for k in range(4):
+            ids[k] = marks[i + k // 2, j + k % 2]
+        for k in range(4):
+            t = ids[k]
+            if t == NO_TRIANGLE or _earlier(ids, k) != k:
+                continue
+            px, py = _middle(ids, k, row, column)
+            red, green, blue, alpha = _shaded(t, px, py, planes, looks[t, 0], texels, levels)
+            alpha = alpha * alphas[t, 1] if layer else 1.0
+            for other in range(k, 4):
+                if ids[other] == t:
+                    colours[other, 0] = alpha * red + (1.0 - alpha) * colours[other, 0]
+                    colours[other, 1] = alpha * green + (1.0 - alpha) * colours[other, 1]
+                    colours[other, 2] = alpha * blue + (1.0 - alpha) * colours[other, 2]
+                    covered[other] = alpha + (1.0 - alpha) * covered[other]
+
+
+@compiled
+def _level(light: float, most: float) -> int:
+    return int(min(max(light, 0.0), 1.0) * most)
+
+
+@compiled
+def _earlier(ids: Whole, k: int) -> int:
+    """Return the first of the samples that show the same triangle as sample k."""
+    for other in range(k):
+        if ids[other] == ids[k]:
+            return other
+    return k
+
+
+@compiled
+def _middle(ids: Whole, k: int, row: int, column: int) -> tuple[float, float]:
+    """Return the middle of the samples of a pixel that show the same triangle as sample k."""
+    px, py, count = 0.0, 0.0, 0.0
+    for other in range(4):
+        if ids[other] == ids[k]:
+            px += 2 * column + other % 2 + 0.5
+            py += 2 * row + other // 2 + 0.5
+            count += 1.0
+    return px / count, py / count

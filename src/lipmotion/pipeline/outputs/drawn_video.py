@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion.faces.registry import staged_face
-from lipmotion.kernels.choice import numba_works
+from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
 from lipmotion.pipeline.film.filmed_video import RENDERING
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
