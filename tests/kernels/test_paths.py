@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from kernels.networks import phone_loop, random_network
 from lipmotion.kernels import paths
-from lipmotion.kernels.arcs import NetworkArrays
-from lipmotion.kernels.paths import Windows
+from lipmotion.kernels.paths import NetworkArrays, Windows
 from oracles import paths as oracle
 
 

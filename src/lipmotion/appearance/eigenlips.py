@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.pixels import affine
 from lipmotion.stats.pca import check_orthonormal, fit_pca
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import GREY, Channel
@@ -89,6 +88,8 @@ def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
     scale : pixels of the new pictures for each of the old ones, along each side; 1: the same eigenlips
     Their basis is no longer orthonormal: ``project`` pictures of the old size, with the old eigenlips.
     """
+    from lipmotion.kernels.pixels import affine
+
     if scale == 1:
         return eigenlips
     height, width = eigenlips.size

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
-from lipmotion.kernels.arcs import NetworkArrays
-from lipmotion.kernels.paths import Windows, best_path
+from lipmotion.kernels.paths import NetworkArrays, Windows, best_path
 
 KEPT_FRAMES = 12_000
 """Up to so many frames (two minutes), log densities are computed once and kept; those of longer recordings twice."""

@@ -32,9 +32,9 @@ Array = NDArray[Any]
 Index = NDArray[np.intp]
 Double = NDArray[np.float64]
 SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
-OFF = {SINGLE: 1e-4, DOUBLE: 1e-10}
+OFF: dict[np.dtype[Any], float] = {SINGLE: 1e-4, DOUBLE: 1e-10}
 """By precision: the largest share of the likelihood that may come of probabilities that were raised."""
-WHOLE = {SINGLE: 1e16, DOUBLE: 1e70}
+WHOLE: dict[np.dtype[Any], float] = {SINGLE: 1e16, DOUBLE: 1e70}
 """By precision: the sum of the probabilities of a frame. They are raised to 1 divided by this where they are less."""
 LEAST_PRODUCT = {SINGLE: 1e-37, DOUBLE: 1e-300}
 """By precision: smaller products of probabilities and densities are set to 0."""
@@ -91,7 +91,7 @@ def factorial_posteriors(
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
     if min(_least_probability(loop) for loop in (audio, visual)) >= LEAST_PROBABILITY:
-        ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in {DOUBLE, logs.audio.dtype}]
+        ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     found = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in found if each is not None), None) or _zero_posteriors(audio, visual, logs)
     return result._replace(pair=result.pair[:, np.argsort(order)])
@@ -161,7 +161,8 @@ def _forward_backward(
     counts = [_counted(*parts) for parts in zip(loops, posteriors[:2], entered, strict=True)]
     for part in (*posteriors, *counts[0], *counts[1]):
         part[part < LEAST_POSTERIOR] = 0
-    return FactorialPosteriors(*posteriors, *counts, log_likelihood)
+    of_audio, of_visual, of_pairs = posteriors
+    return FactorialPosteriors(of_audio, of_visual, of_pairs, counts[0], counts[1], log_likelihood)
 
 
 class _Scaled:
@@ -170,13 +171,7 @@ class _Scaled:
     def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, kind: np.dtype[Any]) -> None:
         self.logs, self.kind, self.whole = logs, kind, WHOLE[kind]
         self.initial, self.final = log_ends(audio, visual)
-        self.audio, self.visual = (
-            tuple(
-                np.ascontiguousarray(part, kind)
-                for part in (loop.stay.ravel(), loop.onward.ravel(), loop.leave[:, None] * loop.enter)
-            )
-            for loop in (audio, visual)
-        )
+        self.audio, self.visual = _moves(audio, kind), _moves(visual, kind)
         self.start, self.densities = 0, list[FrameDensity]()
         # In a frame, what was raised is 1 / whole² at most for each joint state, forward and backward, times the sum of
         # all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
@@ -202,7 +197,8 @@ class _Scaled:
             entering, after = self.audio[2].T @ before[-units:], np.empty_like(before)
             moved = _moved_to_last(before, *self.audio[:2], entering, count)
             total = _forward(
-                before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2], *density[:5],
+                before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2], density.audio, density.visual, density.pair,
+                density.pair_audio, density.pair_visual,
                 LEAST_PRODUCT[self.kind], self.whole, after,
             )  # fmt: skip
             if not total > LEAST_TOTAL[self.kind]:
@@ -229,7 +225,8 @@ class _Scaled:
         moved = _moved_back(backward, *self.visual[:2], first @ self.visual[2].T)
         after, sums = np.empty_like(before), [np.empty(len(part)) for part in density[:3]]
         total = _backward(
-            before, moved, *self.audio[:2], self.audio[2] @ moved[:units], *density[:5],
+            before, moved, *self.audio[:2], self.audio[2] @ moved[:units], density.audio, density.visual, density.pair,
+            density.pair_audio, density.pair_visual,
             LEAST_PRODUCT[self.kind], self.whole, after, *sums,
         )  # fmt: skip
         met = float(sums[0].sum())
@@ -248,6 +245,13 @@ class _Scaled:
         total = float(joint.sum())
         shares = np.maximum(joint * (self.whole / total), 1 / self.whole).astype(self.kind)
         return shares, math.log(total) + best
+
+
+def _moves(loop: Loop, kind: np.dtype[Any]) -> tuple[Array, Array, Array]:
+    """Return probabilities of staying, of going on, and from each unit's last state to each unit's first."""
+    parts = loop.stay.ravel(), loop.onward.ravel(), loop.leave[:, None] * loop.enter
+    stay, onward, leaving = (np.ascontiguousarray(part, kind) for part in parts)
+    return stay, onward, leaving
 
 
 class _InLogs:

@@ -102,7 +102,7 @@ class Chunks(NamedTuple):
 class ForwardBackwardNetwork(NamedTuple):
     """A network prepared for forward–backward.
 
-    arc_from, arc_log, arc_start, log_initial, log_final : as in ``kernels.arcs.NetworkArrays``
+    arc_from, arc_log, arc_start, log_initial, log_final : as in ``kernels.paths.NetworkArrays``
     layout     : of the arcs
     best_arc   : logarithm of the greatest probability of an arc
     weights    : the probabilities of arcs relative to that, in the layout
@@ -130,7 +130,7 @@ class ForwardBackwardNetwork(NamedTuple):
         log_initial: NDArray[np.floating[Any]],
         log_final: NDArray[np.floating[Any]],
     ) -> ForwardBackwardNetwork:
-        """Return a network prepared for forward–backward; parameters as in ``kernels.arcs.NetworkArrays``."""
+        """Return a network prepared for forward–backward; parameters as in ``kernels.paths.NetworkArrays``."""
         layout = arc_layout(arc_from, arc_start)
         logs, initial, final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         return cls(arc_from, logs, arc_start, initial, final, layout, *_weighted(layout, logs))

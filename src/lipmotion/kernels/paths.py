@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import NetworkArrays
 from lipmotion.kernels.compiler import compiled, pays
 
 Index = NDArray[np.intp]
@@ -29,6 +28,24 @@ again from checkpoints."""
 MANY_ARCS = 1000
 """So many arcs take NumPy as long in a frame as the calls of its functions."""
 IMPOSSIBLE = np.float32(-np.inf)
+
+
+class NetworkArrays(NamedTuple):
+    """A network of S states and E arcs; logarithms are of probabilities.
+
+    emission    : [shape=(S,)], the density of each state
+    arc_from    : [shape=(E,)], the source states of all arcs, sorted by target
+    arc_log     : [shape=(E,)], of the arcs
+    arc_start   : [shape=(S,)], the first arc of each target; every state has at least one
+    log_initial, log_final : [shape=(S,)], of beginning and ending in each state
+    """
+
+    emission: Index
+    arc_from: Index
+    arc_log: NDArray[np.floating[Any]]
+    arc_start: Index
+    log_initial: NDArray[np.floating[Any]]
+    log_final: NDArray[np.floating[Any]]
 
 
 class Windows(NamedTuple):
@@ -169,9 +186,10 @@ def _scores(
     delta = np.empty((len(log_emission), len(emission)), np.float32)
     delta[0] = first
     if is_compiled:
-        unsigned = (part.astype(np.uintp) for part in (emission, arc_from))  # others are not vectorised
-        single = (np.ascontiguousarray(part, np.float32) for part in (log_emission, arc_log))
-        return delta, float(_fill(delta, *unsigned, *single, np.append(arc_start[1:], len(arc_from)), least))
+        arc_log, log_emission = (np.ascontiguousarray(part, np.float32) for part in (arc_log, log_emission))
+        columns, sources = emission.astype(np.uintp), arc_from.astype(np.uintp)  # others are not vectorised
+        stops = np.append(arc_start[1:], len(arc_from))
+        return delta, float(_fill(delta, columns, sources, log_emission, arc_log, stops, least))
     arrivals = np.empty(len(arc_from), np.float32)
     shift = 0.0
     for frame in range(1, len(delta)):

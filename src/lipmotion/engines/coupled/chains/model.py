@@ -19,9 +19,8 @@ from lipmotion.engines.coupled.chains.factorial_lattice import FactorialTransiti
 from lipmotion.engines.coupled.chains.lattice import Index, JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.kernels.arcs import NetworkArrays
 from lipmotion.kernels.network import ForwardBackwardNetwork
-from lipmotion.kernels.paths import best_path
+from lipmotion.kernels.paths import NetworkArrays, best_path
 
 
 @dataclass(frozen=True, eq=False)
