@@ -197,8 +197,8 @@ class _Scaled:
             entering, after = self.audio[2].T @ before[-units:], np.empty_like(before)
             moved = _moved_to_last(before, *self.audio[:2], entering, count)
             total = _forward(
-                before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2], density.audio, density.visual, density.pair,
-                density.pair_audio, density.pair_visual,
+                before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
+                density.audio, density.visual, density.pair, density.pair_audio, density.pair_visual,
                 LEAST_PRODUCT[self.kind], self.whole, after,
             )  # fmt: skip
             if not total > LEAST_TOTAL[self.kind]:
