@@ -37,7 +37,7 @@ RUNS = {
 
 def constrained(options: Any, kind: type = np.float32) -> Work:
     """Return the work: posteriors and counts of the constrained product, from log densities of both chains."""
-    from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
+    from lipmotion.kernels.network import ForwardBackwardNetwork
 
     harness: Any = sys.modules["__main__"]
     transition, initial, audio, visual = harness.flat()
@@ -67,8 +67,8 @@ def factorial(options: Any, visual_units: int = 13) -> Work:
     """Return the work: posteriors and counts of two loops."""
     import numba  # noqa: F401
 
-    from lipmotion.kernels.sequences.factorial import factorial_posteriors
-    from lipmotion.kernels.sequences.loops import FactorialLogLikelihoods, Loop
+    from lipmotion.kernels.factorial import factorial_posteriors
+    from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop
 
     draw = np.random.default_rng(0)
 

@@ -1,6 +1,6 @@
 """Recursions over state paths against the enumeration of all paths, where densities and probabilities are extreme.
 
-    python benchmarks/enumeration.py [--cases 1000] [--only NAME ...] [--numpy]
+    python benchmarks/enumeration.py [--cases 1000] [--only NAME ...]
 
 For every recursion and spread of log densities (nats): how many of the random cases were wrong, and in brackets how
 many were computed in logarithms. Cases are normal, have ties or states that take turns, and -inf; every other case has
@@ -19,7 +19,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from kernels.enumeration import RECURSIONS, SPREADS, is_right
-from lipmotion.kernels.sequences import factorial, forward_backward, network, viterbi, windowed_viterbi
+from lipmotion.kernels import factorial, network
 
 in_logs = [0]
 
@@ -39,14 +39,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=1000)
     parser.add_argument("--only", nargs="*", default=list(RECURSIONS), choices=list(RECURSIONS))
-    parser.add_argument("--numpy", action="store_true", help="the NumPy forms")
     options = parser.parse_args()
-    for module in (network, factorial):
-        module.numba_works = lambda: not options.numpy  # type: ignore[attr-defined]
-    for module in (viterbi, windowed_viterbi, forward_backward):
-        module.compiled_pays = lambda _: not options.numpy  # type: ignore[attr-defined]
     network.ForwardBackwardNetwork._in_logs = counted(network.ForwardBackwardNetwork._in_logs)  # type: ignore[method-assign]
-    factorial._posteriors_in_logs = counted(factorial._posteriors_in_logs)
+    factorial._InLogs = counted(factorial._InLogs)  # type: ignore[misc]
     print("| recursion | " + " | ".join(f"{spread:g}" for spread in SPREADS) + " |")
     print("|---" * (1 + len(SPREADS)) + "|")
     for name in options.only:

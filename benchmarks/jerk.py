@@ -39,7 +39,7 @@ from scipy.linalg import LinAlgError, solveh_banded
 from scipy.ndimage import gaussian_filter1d
 
 from lipmotion import Corpus, load_model
-from lipmotion.kernels.sequences.banded import normal_equations
+from lipmotion.kernels.banded import normal_equations
 from lipmotion.measures import closures, curves
 from lipmotion.measures.curves import modulation_distance_db
 from lipmotion.motion import generation

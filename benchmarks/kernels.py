@@ -55,7 +55,7 @@ def mlpg(options: Any) -> Work:
     """Return the work: trajectory and variance of every frame (the peers compute no variance)."""
     import numba  # noqa: F401  (loaded: so the compiled form is taken at once)
 
-    from lipmotion.kernels.sequences.banded import generate
+    from lipmotion.kernels.banded import generate
 
     mean, precision = (np.ascontiguousarray(a.transpose(1, 0, 2)) for a in _harness("get")(options))
     return lambda: generate(mean, precision)[0]
@@ -78,7 +78,7 @@ def viterbi(options: Any, beam: float | None = None) -> Work:
     """Return the work: densities and best path of every recording."""
     import numba  # noqa: F401
 
-    from lipmotion.kernels.sequences.viterbi import best_path
+    from lipmotion.kernels.paths import best_path
 
     mixtures, network, data = _loop(options)
 
@@ -86,9 +86,7 @@ def viterbi(options: Any, beam: float | None = None) -> Work:
         total = 0.0
         for x in data:
             density = mixtures.log_likelihood(x)
-            total += best_path(
-                lambda a, b, density=density: density[a:b], len(x), network.arrays, beam, lambda: network.layout
-            )[1]
+            total += best_path(lambda a, b, density=density: density[a:b], len(x), network.arrays, beam)[1]
         return (total,)
 
     return decode
@@ -168,7 +166,7 @@ import time, numpy as np
 start = time.perf_counter()
 import numba
 imported = time.perf_counter()
-from lipmotion.kernels.sequences.banded import generate
+from lipmotion.kernels.banded import generate
 generate(np.ones((3, 3, 2)), np.ones((3, 3, 2)))
 print(imported - start, time.perf_counter() - imported)
 """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.network import Network
-from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
+from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.stats.mixture import Mixtures, QuadraticForm, normalised_components, with_squares
 from lipmotion.types import ParallelMap
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import get_args
 
 import cv2
 import numpy as np
@@ -22,10 +21,10 @@ from numpy.typing import NDArray
 from poisson import DirectSolver, error
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
-from lipmotion.kernels.pixels.affine import resample
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
-from lipmotion_faces.appearance.placing import Kind, feather, inverse_map, place
+from lipmotion_faces.appearance.placing import feather, inverse_map, place
 from lipmotion_faces.appearance.poisson import cloning_system
+from lipmotion_faces.kernels.affine import resample
 from lipmotion_faces.tracking.face_follower import FaceFollower
 from lipmotion_faces.tracking.frames import open_video
 from lipmotion_faces.tracking.mouth_pictures import face_to_image, region_to_image
@@ -57,33 +56,32 @@ def main() -> None:
         seam = (distance_transform_edt(~inside) <= 1.5) & (distance_transform_edt(inside) <= 1.5)
         core = binary_erosion(system.mask, iterations=8)
         row = [crop(frame_a, map_a), crop(frame_b, map_b)]
-        for kind in get_args(Kind):
-            source, background = aligned(frame_a, map_a, kind), aligned(frame_b, map_b, kind)
-            clone = system.clone(source[None], background[None])[0]
-            errors.append(error(system, direct, source[None], background[None]))
-            ways = {
-                "cloned, blended": (clone, soft),
-                "correction added": (clone.astype(np.float32) - background, soft),
-                "cloned, hard edge": (clone, hard),
-                "pasted, blended": (source, soft),
-                "pasted, hard edge": (source, hard),
-            }
-            for way, (patch, weight) in ways.items():
-                placed = frame_b.copy()
-                if way == "correction added":
-                    add(placed, patch, weight, map_b, kind)
-                else:
-                    place(placed, patch, weight, map_b, kind)
-                again = aligned(placed, map_b, kind).astype(float) - clone
-                results.setdefault(f"{kind}: {way}", []).append(
-                    (
-                        slope(placed)[seam].mean() / slope(frame_b)[seam].mean(),
-                        np.square(slope(placed)[binary_erosion(inside, iterations=6)]).mean()
-                        / np.square(slope(frame_a)[binary_erosion(own, iterations=6)]).mean(),
-                        np.sqrt(np.square(again[core]).mean()),
-                    )
+        source, background = aligned(frame_a, map_a), aligned(frame_b, map_b)
+        clone = system.clone(source[None], background[None])[0]
+        errors.append(error(system, direct, source[None], background[None]))
+        ways = {
+            "cloned, blended": (clone, soft),
+            "correction added": (clone.astype(np.float32) - background, soft),
+            "cloned, hard edge": (clone, hard),
+            "pasted, blended": (source, soft),
+            "pasted, hard edge": (source, hard),
+        }
+        for way, (patch, weight) in ways.items():
+            placed = frame_b.copy()
+            if way == "correction added":
+                add(placed, patch, weight, map_b)
+            else:
+                place(placed, patch, weight, map_b)
+            again = aligned(placed, map_b).astype(float) - clone
+            results.setdefault(way, []).append(
+                (
+                    slope(placed)[seam].mean() / slope(frame_b)[seam].mean(),
+                    np.square(slope(placed)[binary_erosion(inside, iterations=6)]).mean()
+                    / np.square(slope(frame_a)[binary_erosion(own, iterations=6)]).mean(),
+                    np.sqrt(np.square(again[core]).mean()),
                 )
-                row.append(crop(placed, map_b))
+            )
+            row.append(crop(placed, map_b))
         rows.append(np.hstack(row))
     for way, values in results.items():
         means = np.mean(values, axis=0)
@@ -112,26 +110,31 @@ def one(
     return clip[int(draw.integers(len(clip)))]
 
 
-def aligned(frame: Picture, to_frame: NDArray[np.float64], kind: Kind) -> Picture:
+def aligned(frame: Picture, to_frame: NDArray[np.float64]) -> Picture:
     """Return the mouth region of a frame."""
-    region = resample(frame[None], to_frame, (HEIGHT, WIDTH), kind)[0]
+    region = resample(frame[None], to_frame, (HEIGHT, WIDTH))[0]
     rounded: Picture = np.clip(np.rint(region), 0, 255).astype(np.uint8)
     return rounded
 
 
 def add(
-    frame: Picture, change: NDArray[np.float32], weight: NDArray[np.float32], to_frame: NDArray[np.float64], kind: Kind
+    frame: Picture, change: NDArray[np.float32], weight: NDArray[np.float32], to_frame: NDArray[np.float64]
 ) -> None:
     """Add an aligned change to a frame, instead of blending a patch into it."""
-    rows = resample(change[None], inverse_map(to_frame), frame.shape[:2], kind)[0]
-    share = resample(weight[None, ..., None], inverse_map(to_frame), frame.shape[:2], "linear")
-    frame[...] = np.clip(np.rint(frame + share[0] * rows), 0, 255)
+    rows = resample(change[None], inverse_map(to_frame), frame.shape[:2])[0]
+    frame[...] = np.clip(np.rint(frame + in_frame(weight, to_frame, frame)[..., None] * rows), 0, 255)
+
+
+def in_frame(values: NDArray[np.float32], to_frame: NDArray[np.float64], frame: Picture) -> NDArray[np.float32]:
+    """Return aligned values at the pixels of the frame, interpolated linearly."""
+    size, flags = frame.shape[1::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    new: NDArray[np.float32] = cv2.warpAffine(values, inverse_map(to_frame), size, flags=flags)
+    return new
 
 
 def outline(mask: NDArray[np.bool_], to_frame: NDArray[np.float64], frame: Picture) -> NDArray[np.bool_]:
     """Return the mask in the frame."""
-    given = mask[None, ..., None].astype(np.float32)
-    return resample(given, inverse_map(to_frame), frame.shape[:2], "linear")[0, :, :, 0] > 0.5
+    return in_frame(mask.astype(np.float32), to_frame, frame) > 0.5
 
 
 def slope(frame: Picture) -> NDArray[np.float64]:

@@ -3,8 +3,8 @@
     python benchmarks/resampling.py [--rounds 31]
 
 One thread. Each round times every way once, so that a busy machine slows all of them; processor time is counted. Prints
-a JSON object a size: ms (the least of the rounds) of ``cut`` and ``place``, compiled and in NumPy, and of OpenCV; and
-the ratios OpenCV / compiled (the median of the rounds' ratios). OpenCV's ``place`` is a cubic warp of the patch, a
+a JSON object a size: ms (the least of the rounds) of ``cut`` and ``place``, and of OpenCV; and
+the ratios OpenCV / ours (the median of the rounds' ratios). OpenCV's ``place`` is a cubic warp of the patch, a
 linear one of the weight, and the blending in NumPy, in the part of the frame where the patch lies. OpenCV rounds
 positions to 1/32 px and its cut to whole grey levels.
 """
@@ -22,7 +22,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels import affine
 from lipmotion_faces.appearance.placing import cut, feather, inverse_map, place
 
 SIZES = (((288, 360), (112, 128)), ((720, 1280), (280, 320)), ((720, 1280), (336, 384)), ((2160, 3840), (336, 384)))
@@ -53,10 +52,8 @@ def figures(frame_size: tuple[int, int], size: tuple[int, int], rounds: int) -> 
     ellipse = ((x + 0.5) / size[1] - 0.5) ** 2 + ((y + 0.5) / size[0] - 0.5) ** 2 < 0.24
     weight = feather(ellipse, size[0] / 16)
     ways: dict[str, Callable[[], Any]] = {
-        "cut": form(True, lambda: cut(frame, to_frame, size)),
-        "place": form(True, lambda: place(frame, patch, weight, to_frame)),
-        "numpy_cut": form(False, lambda: cut(frame, to_frame, size)),
-        "numpy_place": form(False, lambda: place(frame, patch, weight, to_frame)),
+        "cut": lambda: cut(frame, to_frame, size),
+        "place": lambda: place(frame, patch, weight, to_frame),
         "opencv_cut": lambda: warped(frame, to_frame, size, cv2.INTER_CUBIC),
         "opencv_place": lambda: opencv_place(frame, patch, weight, to_frame),
     }
@@ -80,16 +77,6 @@ def figures(frame_size: tuple[int, int], size: tuple[int, int], rounds: int) -> 
         **{f"{name}_ms": round(min(values) * 1e3, 3) for name, values in times.items()},
         **ratios,
     }
-
-
-def form(compiled: bool, work: Callable[[], Any]) -> Callable[[], Any]:
-    """Return the work, done by the compiled form or by NumPy."""
-
-    def chosen() -> None:
-        affine.compiled_pays = lambda _: compiled
-        work()
-
-    return chosen
 
 
 def warped(picture: NDArray[Any], to_source: Array, size: tuple[int, int], kind: int) -> NDArray[Any]:

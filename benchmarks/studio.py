@@ -40,7 +40,7 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 
 
 from lipmotion.formats.sound import write_sound  # noqa: E402
-from lipmotion.kernels.choice import expect_more  # noqa: E402
+from lipmotion.kernels.compiler import numba_works  # noqa: E402
 from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import step_of  # noqa: E402
@@ -98,7 +98,7 @@ def times(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
 def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     """Return milliseconds of the processor from an edit to what the page shows of it, and to a first picture."""
     part, each_s = lasting(sound, seconds)
-    expect_more()
+    numba_works()
     found: dict[str, Any] = {}
     if seconds <= RECOGNISED_S:
         started_s = time.process_time()

@@ -70,9 +70,8 @@ def serve_studio(  # noqa: PLR0913
 
 def _prepare() -> None:
     """Load what the first edit will need, while the page is opened."""
-    from lipmotion.kernels.choice import expect_more, numba_works
+    from lipmotion.kernels.compiler import numba_works
     from lipmotion_faces.head.stage import mesh_of_figure
 
-    expect_more()
     numba_works()
     mesh_of_figure()

@@ -76,7 +76,7 @@ def test_voices(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_folders_that_cannot_be_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     monkeypatch.setattr("os.access", lambda *_: False)
-    monkeypatch.setattr("lipmotion.kernels.compiled.compiler.cache_folder", lambda: None)
+    monkeypatch.setattr("lipmotion.kernels.compiler.cache_folder", lambda: None)
     parts = {name: doctor_module._looked(name, look) for name, look in doctor_module._PARTS.items() if "folder" in name}
     assert [parts[name].state for name in ("temporary folder", "current folder")] == ["broken", "absent"]
     assert "set TMPDIR" in parts["temporary folder"].told

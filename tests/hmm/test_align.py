@@ -11,7 +11,7 @@ from lipmotion.hmm.align import (
     unit_windows,
 )
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
-from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.kernels.paths import Windows
 from oracles import sequences
 
 

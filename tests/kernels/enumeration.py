@@ -12,13 +12,12 @@ from collections.abc import Callable
 import numpy as np
 
 from kernels import extremes
-from lipmotion.kernels.sequences import forward_backward, viterbi, windowed_viterbi
-from lipmotion.kernels.sequences.arcs import NetworkArrays
-from lipmotion.kernels.sequences.factorial import factorial_posteriors
-from lipmotion.kernels.sequences.factorial_path import factorial_best_path
-from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
-from lipmotion.kernels.sequences.sampling import sample_paths
-from lipmotion.kernels.sequences.trellis import cheapest_arrivals, trace_back
+from lipmotion.kernels import forward_backward
+from lipmotion.kernels.factorial import factorial_posteriors
+from lipmotion.kernels.factorial_loops import factorial_best_path
+from lipmotion.kernels.network import ForwardBackwardNetwork
+from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, sample_paths
+from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
 from oracles import chains, networks, paths, trellis
 from oracles import factorial as factorial_oracle
 
@@ -123,12 +122,12 @@ def of_path(draw, spread, extreme, windowed=False):
     of_states = log_emission[:, columns].astype(float)
     if windowed:
         first, end = np.sort(draw.integers(0, frames, states)), np.sort(draw.integers(1, frames + 1, states))
-        windows = windowed_viterbi.Windows(first, end)
-        path, score = windowed_viterbi.best_path_within(lambda a, b: log_emission[a:b], frames, given, windows)
+        windows = Windows(first, end)
+        path, score = best_path(lambda a, b: log_emission[a:b], frames, given, windows=windows)
         moments = np.arange(frames)[:, None]
         of_states[(moments < first) | (moments >= end)] = -np.inf
     else:
-        path, score = viterbi.best_path(lambda a, b: log_emission[a:b], frames, given)
+        path, score = best_path(lambda a, b: log_emission[a:b], frames, given)
     single = {arc: float(np.float32(log)) for arc, log in arcs.items()}
     ends = arrays["log_initial"].astype(float), arrays["log_final"].astype(float)
     _, best = paths.best_path(of_states, np.arange(states), single, *ends)

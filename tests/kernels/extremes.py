@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.networks import arrays_of
-from lipmotion.kernels.sequences.loops import FactorialLogLikelihoods, Loop
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop
 
 
 def log_densities(draw, frames, columns, spread):

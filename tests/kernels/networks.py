@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
+from lipmotion.kernels.network import ForwardBackwardNetwork
 
 
 def network_posteriors(log_emission, emission, arc_from, arc_log, arc_start, log_initial, log_final):
     """Return posteriors [shape=(T, S)], expected arc counts [shape=(E,)] and log likelihood of one recording.
 
-    log_emission : [shape=(T, G)];  the rest as in ``lipmotion.kernels.sequences.arcs.NetworkArrays``
+    log_emission : [shape=(T, G)];  the rest as in ``lipmotion.kernels.paths.NetworkArrays``
     """
     network = ForwardBackwardNetwork.of(arc_from, arc_log, arc_start, log_initial, log_final)
     order, place = network.layout.order, network.layout.place

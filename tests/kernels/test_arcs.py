@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import phone_loop, random_network
-from lipmotion.kernels.sequences.arcs import arc_layout
+from lipmotion.kernels.arcs import arc_layout
 
 
 def arcs_in(layout):

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.sequences import banded
-from lipmotion.kernels.sequences.banded import generate, normal_equations, pin, solve
+from lipmotion.kernels import banded
+from lipmotion.kernels.banded import generate, normal_equations, pin, solve
 from oracles import trajectories
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -96,7 +96,7 @@ def forms(monkeypatch, compute) -> list:
     """Return the results of NumPy and of the compiled form."""
     results = []
     for compiled in (False, True):
-        monkeypatch.setattr(banded, "compiled_pays", lambda _, compiled=compiled: compiled)
+        monkeypatch.setattr(banded, "pays", lambda _, compiled=compiled: compiled)
         results.append(compute())
     return results
 

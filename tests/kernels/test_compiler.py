@@ -1,18 +1,139 @@
-"""Compiled kernels are kept on disk; a cache that is damaged or takes nothing is not noticed."""
+"""Which form of a kernel runs; compiled ones are kept on disk, and a cache that is damaged is not noticed."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
-pytest.importorskip("numba")
+from children import environment, run_child
+from kernels.networks import network_posteriors, phone_loop
+from lipmotion.kernels import compiler
+from lipmotion.kernels.banded import generate
+from lipmotion.kernels.compiler import compiled
+from lipmotion.kernels.factorial import factorial_posteriors
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
+from lipmotion.kernels.forward_backward import chain_posteriors
+from lipmotion.kernels.normals import normal_sums
+from lipmotion_faces.kernels import affine, painting, planes
+from lipmotion_faces.kernels.raster import draw
+from lipmotion_faces.kernels.shading import shade
+from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
-import numba
-from numba.core.caching import IndexDataCacheFile
+TESTS = Path(__file__).parents[1]
 
-from lipmotion.kernels.compiled.compiler import compiled
+
+@pytest.fixture
+def unused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process in which numba can be imported but was not."""
+    monkeypatch.setattr(compiler, "numba_works", lambda: True)
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+
+
+@pytest.mark.usefixtures("unused")
+def test_long_recordings_are_compiled_and_short_ones_are_not() -> None:
+    assert not compiler.pays(compiler.LONG_FRAMES // 2)
+    assert compiler.pays(compiler.LONG_FRAMES * 2)
+
+
+@pytest.mark.usefixtures("unused")
+def test_all_is_compiled_where_numba_is_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "numba", cast("Any", None))
+    assert compiler.pays()
+
+
+def sequences() -> list[np.ndarray]:
+    """Return what the kernels of sequences make of small, random input."""
+    random = np.random.default_rng(0)
+    stay, ends = random.uniform(0.3, 0.9, (2, 3)), np.full((2, 3), 1 / 6)
+    loop = Loop(stay, 1 - stay[:1], 1 - stay[1], random.dirichlet(np.ones(3), 3), ends, ends)
+    logs = [random.normal(-20, 2, (4, 6)).astype(np.float32) for _ in range(2)]
+    found: list[Any] = []
+    for kind in (np.float32, np.float64):
+        given = FactorialLogLikelihoods.of(*(log.astype(kind) for log in logs))
+        posteriors = factorial_posteriors(loop, loop, given, 2)
+        found += [*posteriors[:2], *posteriors.audio_counts, posteriors.log_likelihood]
+        found += factorial_best_path(loop, loop, given)
+        arrays, _ = phone_loop(1, units=9, states=2)
+        found += network_posteriors(random.normal(-20, 4, (3, len(arrays["emission"]))).astype(kind), **arrays)
+    log_emission, moves = random.normal(0, 3, (5, 2, 3)), np.log(random.uniform(0.2, 0.8, (2, 2, 3)))
+    found += chain_posteriors(log_emission, *moves, np.array([5, 4]), np.array([3, 2]))
+    found += generate(*random.uniform(0.5, 1, (2, 4, 3, 2)))
+    return found
+
+
+def pictures() -> list[np.ndarray]:
+    """Return what the kernels of pixels draw of small, random input."""
+    random = np.random.default_rng(1)
+    points, finishes = random.uniform([0, 0, -2], [16, 12, -1], (9, 3)), random.uniform(0, 1, (2, 7))
+    vertices = [random.normal(size=shape) for shape in ((9, 3), (9, 3), 3, (9, 3), (9, 2), (9, 3))]
+    light = np.abs(shade(*vertices, random.integers(0, 2, 9), finishes, random.uniform(0, 1, (6, 6))))
+    triangles = random.integers(0, 9, (20, 3)).astype(np.int32)
+    plain, textured, frame, moved = (np.zeros((12, 16, 3), np.uint8) for _ in range(4))
+    opacity, behind, tone = np.zeros((12, 16), np.uint8), np.zeros((12, 16, 3), np.float32), np.arange(256).astype("u1")
+    draw(points, light, triangles, (0, 0, 16, 12), behind, tone, plain)
+    looks = np.array([[0, SOLID], [0, CLEAR]] * 10, np.int32)
+    texels = random.integers(0, 65536, (16, 4)).astype(np.uint16)
+    surface = TexturedTriangles(
+        triangles, random.uniform(0, 1, (20, 3, 2)), looks, np.full((20, 2), 0.7), texels, np.array([[0, 4, 4]])
+    )
+    draw_textured(points, light, light / 2, surface, (0, 0, 16, 12), behind, tone, textured, opacity)
+    to_source = np.array([[0.7, -0.1, 2.3], [0.12, 0.68, -3.6]])
+    affine.blend(frame, (1, 2), (9, 8), plain, random.uniform(0, 1, (12, 16)).astype(np.float32), to_source)
+    layer, target = np.zeros((12, 16, 4), np.float32), np.zeros((12, 16, 4), np.float32)
+    heights, shifts = random.uniform(0, 6, (3, 16)), random.normal(0, 2, (2, 4, 5))
+    painting.paint_band(layer, heights, heights + 4, np.linspace(0, 1, 16), random.uniform(0, 1, (3, 4, 4)))
+    painting.warp(layer, *shifts, 4, target)
+    painting.warp_bytes(random.integers(0, 256, (12, 16, 4), np.uint16), *shifts, 4, moved)
+    stacked, packed = np.zeros((12, 16, 4), np.uint16), np.zeros((3, 12, 16), np.uint32)
+    painting.stack(layer, layer, np.dstack([layer, layer[..., 0]]) / 255, target, stacked)
+    for number, plane in enumerate(packed):
+        planes.pack(plain[..., number], 0, 0, 12, 16, number > 0, plane)
+    luma, colours, grid = np.zeros((12, 16), np.uint8), np.zeros((2, 6, 8), np.uint8), random.normal(0, 2, (2, 3, 3))
+    planes.warp_planes(packed, 0, 0, 12, 16, *grid, luma, *colours)
+    drawn = [light, plain, textured, opacity, frame, layer, target, moved, stacked, packed, luma, colours]
+    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normal_sums(points, triangles)]
+
+
+@pytest.mark.long
+def test_without_numba_kernels_run_as_python_and_say_so_once(tmp_path: Path) -> None:
+    pytest.importorskip("numba")
+    code = """
+import sys
+sys.modules["numba"] = None  # importing it fails
+import numpy as np
+from kernels.test_compiler import pictures, sequences
+np.savez(sys.argv[1], *sequences(), *pictures())
+"""
+    told = run_child([sys.executable, "-c", code, tmp_path / "python.npz"], variables=environment(
+        PYTHONPATH=f"{Path(compiler.__file__).parents[2]}:{TESTS}"), check=True).stderr  # fmt: skip
+    assert [line for line in told.splitlines() if line] == [told.strip()]
+    assert "numba is not installed" in told
+    with np.load(tmp_path / "python.npz") as python:
+        wanted = [*sequences(), *pictures()]
+        assert len(wanted) == len(python.files)
+        for name, values in zip(python.files, wanted, strict=True):
+            assert np.any(values), name
+            close = 1e-3 if np.asarray(values).dtype == np.float32 else 1e-5
+            np.testing.assert_allclose(python[name], values, rtol=close, atol=close, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import lipmotion",
+        "from lipmotion.cli import command_line",
+        "from lipmotion.kernels import banded, factorial, network, paths; from lipmotion_faces.kernels import planes",
+        "import lipmotion; lipmotion.animate('examples/welcome.flac')",
+    ],
+)
+@pytest.mark.long
+def test_numba_stays_away_from_small_work(code: str, pytestconfig: pytest.Config) -> None:
+    code += "\nimport sys; sys.exit('numba' in sys.modules)"
+    run_child([sys.executable, "-c", code], folder=pytestconfig.rootpath, check=True)
 
 
 def halves(x: float) -> float:
@@ -20,17 +141,19 @@ def halves(x: float) -> float:
 
 
 def test_compiled_code_is_kept_on_disk():
-    function = compiled(halves)
+    pytest.importorskip("numba")
+    function = cast("Any", compiled(halves))
     assert function(3.0) == 1.5
-    assert function.stats.cache_path is not None
+    assert function.kernel.stats.cache_path is not None
 
 
 def test_what_cannot_be_kept_is_compiled_all_the_same():
     places: dict = {}
     exec(compile("def double(x):\n    return 2 * x\n", "nowhere", "exec"), places)  # noqa: S102  (no file, no cache)
+    pytest.importorskip("numba")
     function = compiled(places["double"])
     assert function(3.0) == 6.0
-    assert function.stats.cache_path is None
+    assert function.kernel.stats.cache_path is None
 
 
 def _sum(a: float, b: float) -> float:
@@ -39,6 +162,7 @@ def _sum(a: float, b: float) -> float:
 
 @pytest.mark.long
 def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    numba = pytest.importorskip("numba")
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     assert compiled(_sum)(1.0, 2.0) == 3.0
     files = sorted(path for path in tmp_path.rglob("*") if path.is_file())
@@ -49,17 +173,18 @@ def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.Mo
                 path.write_bytes(path.read_bytes()[:-1] if damage is None else damage)
             again, after = cast("Any", compiled(_sum)), cast("Any", compiled(_sum))
             assert again(1.0, 2.0) == after(1.0, 2.0) == 3.0
-            assert not again.stats.cache_hits, "it was damaged"
-            assert after.stats.cache_hits, "it is whole again"
+            assert not again.kernel.stats.cache_hits, "it was damaged"
+            assert after.kernel.stats.cache_hits, "it is whole again"
 
 
 @pytest.mark.long
 def test_a_cache_that_takes_nothing_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    numba = pytest.importorskip("numba")
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     kernel = compiled(_sum)
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(IndexDataCacheFile, "save", full)
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
     assert kernel(1.0, 2.0) == 3.0

@@ -1,7 +1,7 @@
 import pytest
 
 from kernels.enumeration import RECURSIONS, SPREADS, is_right
-from lipmotion.kernels.sequences import factorial, forward_backward, network, viterbi, windowed_viterbi
+from lipmotion.kernels import paths
 
 ONCE_WRONG = {
     "network, double": [(30, 1), (300, 261), (1e4, 291), (1e5, 113)],
@@ -16,18 +16,25 @@ ONCE_WRONG = {
 """Spreads and numbers of cases in which probabilities counted that compiled forms once set to 0, or raised."""
 
 
-@pytest.fixture(params=["numpy", "compiled"], autouse=True)
+@pytest.fixture(params=["numpy", "compiled"])
 def form(request, monkeypatch) -> None:
-    """Every test runs with both forms, NumPy and compiled."""
+    """What has two forms is tested in both."""
     if request.param == "compiled":
         pytest.importorskip("numba")
-    for module in (network, factorial):
-        monkeypatch.setattr(module, "numba_works", lambda: request.param == "compiled")
-    for module in (viterbi, windowed_viterbi, forward_backward):
-        monkeypatch.setattr(module, "compiled_pays", lambda _: request.param == "compiled")
+    monkeypatch.setattr(paths, "pays", lambda _: request.param == "compiled")
 
 
-@pytest.mark.parametrize("name", RECURSIONS)
-def test_no_recursion_loses_a_path_however_far_densities_and_probabilities_spread(name):
+def wrong_cases(name: str) -> list[tuple[float, int]]:
     cases = [(spread, number) for spread in SPREADS for number in range(4)] + ONCE_WRONG.get(name, [])
-    assert [case for case in cases if not is_right(name, *case)] == []
+    return [case for case in cases if not is_right(name, *case)]
+
+
+@pytest.mark.parametrize("name", [name for name in RECURSIONS if not name.startswith("best path")])
+def test_no_recursion_loses_a_path_however_far_densities_and_probabilities_spread(name):
+    assert wrong_cases(name) == []
+
+
+@pytest.mark.usefixtures("form")
+@pytest.mark.parametrize("name", ["best path", "best path in windows"])
+def test_no_search_loses_the_best_path_however_far_densities_and_probabilities_spread(name):
+    assert wrong_cases(name) == []

@@ -6,25 +6,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import network_posteriors
-from lipmotion.kernels.sequences import factorial, factorial_path
-from lipmotion.kernels.sequences.factorial import factorial_posteriors
-from lipmotion.kernels.sequences.factorial_path import factorial_best_path
-from lipmotion.kernels.sequences.loops import FactorialLogLikelihoods, Loop
+from lipmotion.kernels.factorial import factorial_posteriors
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
 from oracles import factorial as oracle
 from oracles.paths import path_score
 
 SEEDS = st.integers(0, 2**32 - 1)
 SHARED = settings(max_examples=12)
-
-
-@pytest.fixture(params=["numpy", "compiled"], autouse=True)
-def form(request, monkeypatch) -> str:
-    """Every test runs with both forms, NumPy and compiled."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    for module in (factorial, factorial_path):
-        monkeypatch.setattr(module, "numba_works", lambda: request.param == "compiled")
-    return request.param
 
 
 def random_loop(draw, states: int, units: int) -> Loop:

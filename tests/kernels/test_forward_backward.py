@@ -1,13 +1,9 @@
-import sys
-from functools import partial
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.sequences import forward_backward
-from lipmotion.kernels.sequences.forward_backward import LOG_ZERO, chain_posteriors, log_forward_backward
+from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors, log_forward_backward
 from oracles import chains, networks
 
 
@@ -126,19 +122,3 @@ def test_order_of_utterances_changes_nothing():
     for mixed, straight in zip(shuffled, chain_posteriors(*batch), strict=True):
         wanted = straight[:, back] if straight.ndim == 3 else straight[back]
         assert np.array_equal(mixed, wanted)
-
-
-@given(seed=st.integers(0, 2**32 - 1), sizes=SIZES, loudness=st.sampled_from([1e-3, 1.0, 30.0, 1e5]))
-@settings(max_examples=60)
-def test_both_forms_agree(seed, sizes, loudness):
-    pytest.importorskip("numba")
-    (log_emission, *rest), _ = padded(seed, [*sizes, (40, 9)])
-    batch = (log_emission * loudness, *rest)
-    found = []
-    for compiled in (False, True):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(forward_backward, "compiled_pays", lambda _, compiled=compiled: compiled)
-            found.append(chain_posteriors(*batch))
-    same = np.array_equal if sys.platform == "linux" else partial(np.allclose, rtol=1e-12, atol=1e-12)
-    for plain, fast in zip(*found, strict=True):
-        assert same(plain, fast)

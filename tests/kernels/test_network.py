@@ -4,20 +4,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import arrays_of, network_posteriors, phone_loop, random_network
-from lipmotion.kernels.sequences import network
-from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
+from lipmotion.kernels.network import ForwardBackwardNetwork
 from oracles import networks
 
 SEEDS = st.integers(0, 2**32 - 1)
 SHARED = settings(max_examples=30)
-
-
-@pytest.fixture(params=["numpy", "compiled"], autouse=True)
-def form(request, monkeypatch) -> None:
-    """Every test runs with both forms, NumPy and compiled."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    monkeypatch.setattr(network, "numba_works", lambda: request.param == "compiled")
 
 
 def random_emission(seed: int, frames: int, densities: int, spread: float = 4.0) -> np.ndarray:

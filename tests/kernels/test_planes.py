@@ -1,11 +1,7 @@
 import numpy as np
-import pytest
 
-pytest.importorskip("numba")
-
-from lipmotion.kernels.compiled import planes
-from lipmotion.kernels.compiled.planes import Box, EyeLayers, StillLayers
-from lipmotion.kernels.pixels import painting
+from lipmotion_faces.kernels import painting, planes
+from lipmotion_faces.kernels.planes import Box, EyeLayers, StillLayers
 
 HEIGHT, WIDTH = 60, 84
 

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.pixels import raster
+from lipmotion_faces.kernels import raster
 from oracles import raster as oracle
 
 TONE = np.arange(256).astype(np.uint8)

@@ -3,8 +3,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from lipmotion.kernels.sequences.arcs import NetworkArrays
-from lipmotion.kernels.sequences.sampling import sample_paths
+from lipmotion.kernels.paths import NetworkArrays, sample_paths
 from oracles.sampling import path_posterior
 
 EMISSION = np.array([0, 1, 0, 2])

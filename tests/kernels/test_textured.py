@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.pixels.textured import CLEAR, CUT, SOLID, TexturedTriangles, draw_textured
+from lipmotion_faces.kernels.textured import CLEAR, CUT, SOLID, TexturedTriangles, draw_textured
 from oracles import textured as oracle
 
 TONE = np.arange(256).astype(np.uint8)

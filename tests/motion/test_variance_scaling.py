@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.engines import engine_named
-from lipmotion.kernels.sequences.banded import generate
+from lipmotion.kernels.banded import generate
 from lipmotion.motion.variance_scaling import LARGEST_FACTOR, VarianceScaling
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.raster import GRID
+from lipmotion_faces.kernels.raster import GRID
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
@@ -20,7 +20,7 @@ def draw(
     tone: NDArray[np.uint8],
     picture: NDArray[np.uint8],
 ) -> None:
-    """Draw as ``kernels.pixels.raster.draw`` says."""
+    """Draw as ``lipmotion_faces.kernels.raster.draw`` says."""
     corners, z = np.rint(2 * GRID * points[:, :2]) / GRID, points[:, 2]
     left, top, right, bottom = area
     light = np.repeat(np.repeat(background[top:bottom, left:right], 2, axis=0), 2, axis=1)

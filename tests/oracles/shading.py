@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.shading import LEAST_FACING_COSINE
+from lipmotion_faces.kernels.shading import LEAST_FACING_COSINE
 
 Real = NDArray[np.float64]
 
@@ -14,7 +14,7 @@ def shade(
     normals: Real, places: Real, viewer: Real, colours: Real, reaches: Real, strands: Real,
     kinds: NDArray[np.intp], finishes: Real, lamps: Real,
 ) -> NDArray[np.float32]:  # fmt: skip
-    """Return what ``kernels.pixels.shading.shade`` says, for all vertices at once."""
+    """Return what ``lipmotion_faces.kernels.shading.shade`` says, for all vertices at once."""
     finish = finishes[kinds]
     eye = viewer - places
     eye = eye / np.sqrt(_dot(eye, eye))[:, None]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.raster import GRID
-from lipmotion.kernels.pixels.textured import (
+from lipmotion_faces.kernels.raster import GRID
+from lipmotion_faces.kernels.textured import (
     CLEAR,
     CUT,
     HIDING_OPACITY,
@@ -35,7 +35,7 @@ def draw_textured(
     picture: NDArray[np.uint8],
     opacity: NDArray[np.uint8],
 ) -> None:
-    """Draw as ``kernels.pixels.textured.draw_textured`` says."""
+    """Draw as ``lipmotion_faces.kernels.textured.draw_textured`` says."""
     points = np.column_stack([np.rint(2 * GRID * points[:, :2]) / GRID, points[:, 2]])
     left, top, right, bottom = area
     samples = (2 * left, 2 * top, 2 * right, 2 * bottom)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord
-from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.kernels.paths import Windows
 from lipmotion.speech.recognition import anchors as module
 from lipmotion.speech.recognition.anchors import (
     FREE_FRAMES,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.kernels.sequences.segments import best_segments
+from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import clock_seconds, number_of
 from lipmotion.units import SILENCE, VISEMES, closing_phones, is_silent, words_in_time

@@ -13,7 +13,7 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
-from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.kernels.paths import Windows
 
 FIT_BLOCK = 2048
 """Frames whose log densities are in memory at a time."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.hmm.align import StateSequence, state_sequence
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.states import StateTable
-from lipmotion.kernels.sequences.forward_backward import LOG_ZERO, chain_posteriors
+from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.em import EmResult, no_report, run_em
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.types import ParallelMap

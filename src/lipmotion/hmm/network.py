@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
-from lipmotion.kernels.sequences.arcs import ArcLayout, NetworkArrays, arc_layout
-from lipmotion.kernels.sequences.viterbi import best_path
-from lipmotion.kernels.sequences.windowed_viterbi import Windows, best_path_within
+from lipmotion.kernels.paths import NetworkArrays, Windows, best_path
 
 KEPT_FRAMES = 12_000
 """Up to so many frames (two minutes), log densities are computed once and kept; those of longer recordings twice."""
@@ -20,7 +17,7 @@ KEPT_FRAMES = 12_000
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """States joined by arcs, in the form that ``kernels.sequences.viterbi.best_path`` takes."""
+    """States joined by arcs, in the form that ``kernels.paths.best_path`` takes."""
 
     emission: NDArray[np.intp]
     arc_from: NDArray[np.intp]
@@ -36,11 +33,6 @@ class Network:
             self.emission, self.arc_from, self.arc_log, self.arc_start, self.log_initial, self.log_final
         )
 
-    @cached_property
-    def layout(self) -> ArcLayout:
-        """The layout of the arcs for compiled kernels."""
-        return arc_layout(self.arc_from, self.arc_start)
-
     def best_path(
         self,
         log_likelihoods: LogLikelihoods,
@@ -52,7 +44,7 @@ class Network:
 
         chosen  : the densities that ``emission`` numbers; None: all
         beam    : states with a score lower than the best of the frame by more than this are dropped; None: exact
-        windows : the frames that each state may have; the search is exact within them, without a beam; None: any
+        windows : the frames that each state may have; None: any
         Raises AlignmentError: no path reaches the end.
         """
         cached = (
@@ -64,11 +56,7 @@ class Network:
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
             return log_likelihoods.log_density(first, end, chosen) if cached is None else cached[first:end]
 
-        frames = log_likelihoods.frames
-        if windows is None:
-            path, score = best_path(log_emission, frames, self.arrays, beam, lambda: self.layout)
-        else:
-            path, score = best_path_within(log_emission, frames, self.arrays, windows)
+        path, score = best_path(log_emission, log_likelihoods.frames, self.arrays, beam, windows)
         if not np.isfinite(score):
             raise AlignmentError(
                 f"no path through {len(self.emission)} states in {log_likelihoods.frames} frames of 10 ms: "

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.pixels import affine
 from lipmotion.stats.pca import check_orthonormal, fit_pca
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import GREY, Channel
@@ -81,31 +80,6 @@ class Eigenlips:
         parts = np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)
         flat = np.stack([part @ self.basis[c] + self.mean[c] for c, part in enumerate(parts)], axis=-1)
         return flat.reshape(-1, *self.size, len(COLOURS))
-
-
-def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
-    """Return eigenlips that restore larger pictures from the same coefficients, by cubic interpolation.
-
-    scale : pixels of the new pictures for each of the old ones, along each side; 1: the same eigenlips
-    Their basis is no longer orthonormal: ``project`` pictures of the old size, with the old eigenlips.
-    """
-    if scale == 1:
-        return eigenlips
-    height, width = eigenlips.size
-    middle = (0.5 / scale) - 0.5
-    to_source = np.array([[1 / scale, 0, middle], [0, 1 / scale, middle]])
-
-    def larger(rows: NDArray[np.float32]) -> NDArray[np.float32]:
-        size = scale * height, scale * width
-        pictures = affine.resample(rows.reshape(-1, height, width, 1), to_source, size, "cubic")
-        return pictures.reshape(*rows.shape[:-1], -1)
-
-    return Eigenlips(
-        np.clip(larger(eigenlips.mean), 0, 255),
-        larger(eigenlips.basis),
-        eigenlips.explained,
-        (scale * height, scale * width),
-    )
 
 
 def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.kernels.sequences.banded import generate
+from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior, strangeness
 from lipmotion.motion.closure import REACH_S, Closure, closable_ranges, frames_to_close, is_never_negative
 from lipmotion.motion.limits import MotionLimits

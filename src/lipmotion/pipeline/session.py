@@ -33,7 +33,7 @@ from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import AlignmentError, InputError, shortened
-from lipmotion.kernels.choice import expect_more
+from lipmotion.kernels.compiler import numba_works
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.edits import (
@@ -458,7 +458,7 @@ class Session:
         understood = self._edited_speech(phone_steps)
         self._motions += 1
         if self._motions == INTERACTIVE:
-            expect_more()
+            numba_works()
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
         generation = generation_of(self.request, self.speaker, self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))

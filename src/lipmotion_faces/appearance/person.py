@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, enlarged, fit_eigenlips
+from lipmotion.motion.eigenlips import COLOURS, COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance.camera_noise import CameraNoise, estimate_noise
@@ -316,3 +316,30 @@ def _regression(inputs: Values, targets: Values) -> Floats:
     products[np.diag_indices(len(products))] += MOUTH_RIDGE * np.trace(products) / len(products) + 1e-9
     slopes = np.linalg.solve(products, x.T @ (targets - middle))
     return np.concatenate([(middle - centre @ slopes)[None], slopes]).astype(np.float32)
+
+
+def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
+    """Return eigenlips that restore larger pictures from the same coefficients, by cubic interpolation.
+
+    scale : pixels of the new pictures for each of the old ones, along each side; 1: the same eigenlips
+    Their basis is no longer orthonormal: ``project`` pictures of the old size, with the old eigenlips.
+    """
+    from lipmotion_faces.kernels import affine
+
+    if scale == 1:
+        return eigenlips
+    height, width = eigenlips.size
+    middle = (0.5 / scale) - 0.5
+    to_source = np.array([[1 / scale, 0, middle], [0, 1 / scale, middle]])
+
+    def larger(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        pictures = np.moveaxis(rows, 0, -1).reshape(-1, height, width, len(COLOURS))
+        pictures = affine.resample(pictures, to_source, (scale * height, scale * width))
+        return np.ascontiguousarray(np.moveaxis(pictures, -1, 0)).reshape(*rows.shape[:-1], -1)
+
+    return Eigenlips(
+        np.clip(larger(eigenlips.mean), 0, 255),
+        larger(eigenlips.basis),
+        eigenlips.explained,
+        (scale * height, scale * width),
+    )

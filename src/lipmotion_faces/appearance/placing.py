@@ -8,19 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.pixels import affine
+from lipmotion_faces.kernels import affine
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
-Kind = affine.Kind
-"""Interpolation between pixels: bilinear from 2 × 2, or bicubic from 4 × 4 of them."""
 MOST_SAMPLES = 16
 """Most samples along each side of a pixel that are averaged where the frame is larger than the patch."""
 
 
-def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int], kind: Kind = "cubic") -> Floats:
-    """Return an aligned patch of a frame: float32 array [shape=(h, w, 3)], grey levels; cubic ones may leave 0 to 255.
+def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int]) -> Floats:
+    """Return an aligned patch of a frame: float32 array [shape=(h, w, 3)], grey levels, which may leave 0 to 255.
 
     frame    : uint8 array [shape=(H, W, 3)]; pixels outside it repeat its outermost ones
     to_frame : affine map [shape=(2, 3)] from the centre of a pixel of the patch to its position in the frame
@@ -34,10 +32,10 @@ def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int], kind: 
     turn = to_frame[:, :2]
     samples = min(MOST_SAMPLES, max(1, round(np.sqrt(abs(np.linalg.det(turn))))))
     if samples == 1:
-        return affine.resample(frame[None], to_frame, size, kind)[0]
+        return affine.resample(frame[None], to_frame, size)[0]
     first = to_frame[:, 2] + turn.sum(axis=1) * (0.5 / samples - 0.5)
     finer = np.column_stack([turn / samples, first])
-    fine = affine.resample(frame[None], finer, (size[0] * samples, size[1] * samples), kind)[0]
+    fine = affine.resample(frame[None], finer, (size[0] * samples, size[1] * samples))[0]
     patch = np.zeros((*size, frame.shape[2]), np.float32)
     for row in range(samples):
         for column in range(samples):
@@ -69,7 +67,7 @@ def feather(mask: NDArray[np.bool_], width_px: float) -> Floats:
     return (share * share * (3 - 2 * share)).astype(np.float32)
 
 
-def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: Array, kind: Kind = "cubic") -> None:
+def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: Array) -> None:
     """Blend an aligned patch into a frame, which is changed: frame + weight · (patch − frame).
 
     frame    : uint8 array [shape=(H, W, 3)]
@@ -92,7 +90,7 @@ def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: A
     if left >= right or top >= bottom:
         return
     shifted = np.concatenate([to_patch[:, :2], to_patch[:, 2:] + to_patch[:, :2] @ [[left], [top]]], axis=1)
-    affine.blend(frame, (top, left), (bottom - top, right - left), patch, weight, shifted, kind)
+    affine.blend(frame, (top, left), (bottom - top, right - left), patch, weight, shifted)
 
 
 def _check_frame(frame: NDArray[np.uint8]) -> None:

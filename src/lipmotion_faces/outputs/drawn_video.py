@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.kernels.choice import numba_works
+from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.choice import numba_works
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.portrait.design import Design
@@ -78,7 +77,7 @@ class DrawnFace(Face):
         from lipmotion_faces.portrait.planar import PlanarRasteriser
 
         chosen = self.staging
-        if chosen.background == TRANSPARENT or not numba_works():
+        if chosen.background == TRANSPARENT:
             return None
         poses = face_poses(motion, units, fps, chosen, self.prosody)
         background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE

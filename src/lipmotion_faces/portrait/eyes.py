@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
-from lipmotion.kernels.pixels.painting import warp
+from lipmotion_faces.kernels.painting import warp
 from lipmotion_faces.portrait.design import WHITE, Design
 from lipmotion_faces.portrait.layer import Glow, Layer, Rim
 from lipmotion_faces.portrait.outlines import Points, ellipse, mirrored, open_curve, stroke

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.kernels.pixels.painting import warp_bytes
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
+from lipmotion_faces.kernels.painting import warp_bytes
 from lipmotion_faces.portrait.drawn_frames import face_poses
 from lipmotion_faces.portrait.movement import PIVOT_Y, HeadPlacement
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.painting import paint_band
+from lipmotion_faces.kernels.painting import paint_band
 from lipmotion_faces.portrait.design import Design
 from lipmotion_faces.portrait.geometry import (
     Heights,

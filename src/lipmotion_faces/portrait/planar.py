@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.planes import (
+from lipmotion_faces.kernels.planes import (
     Box,
     EyeLayers,
     StillLayers,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
-from lipmotion.kernels.pixels.painting import stack, warp, warp_bytes
+from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
 from lipmotion_faces.portrait import surroundings
 from lipmotion_faces.portrait.design import WHITE, Colour, Design
 from lipmotion_faces.portrait.eyes import EyePainter

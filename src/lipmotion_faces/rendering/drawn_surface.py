@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.textured import (
+from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh
+from lipmotion.meshes.model.textures import Texture, TextureTable, linear, texture_table
+from lipmotion_faces.kernels.textured import (
     CLEAR,
     CUT,
     HIDING_OPACITY,
@@ -16,8 +18,6 @@ from lipmotion.kernels.pixels.textured import (
     TexturedTriangles,
     draw_textured,
 )
-from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh
-from lipmotion.meshes.model.textures import Texture, TextureTable, linear, texture_table
 from lipmotion_faces.rendering.lighting import LEVELS, Finish, Lighting, tone_table
 from lipmotion_faces.rendering.rasteriser import Camera, Canvas, Colours, flat
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.shading import shade
+from lipmotion_faces.kernels.shading import shade
 
 Real = NDArray[np.float64]
 Triple = tuple[float, float, float]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.pixels.raster import draw
 from lipmotion.meshes.model.textures import linear
+from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.rendering.lighting import LEVELS, WHITE, tone_table
 
 Real = NDArray[np.float64]

@@ -234,12 +234,10 @@ def _model() -> str:
 
 
 def _compiled_kernels() -> str:
-    from lipmotion.kernels.choice import numba_works
+    from lipmotion.kernels.compiler import cache_folder, numba_works
 
     if not numba_works():
-        raise _AbsentError("no numba here: everything works, long work takes longer, drawing much longer")
-    from lipmotion.kernels.compiled.compiler import cache_folder
-
+        raise _AbsentError("no numba here: everything works, training and drawing take far longer")
     folder = cache_folder()
     if folder is None:
         raise _AbsentError("nowhere to keep machine code: every long command compiles again; set NUMBA_CACHE_DIR")

@@ -21,7 +21,7 @@ from lipmotion.engines.coupled.explanation import concatenated, describe, explai
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled
-from lipmotion.kernels.sequences.banded import generate
+from lipmotion.kernels.banded import generate
 from lipmotion.motion.generation import Statistics, generation_blocks
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (

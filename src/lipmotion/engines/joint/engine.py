@@ -23,7 +23,7 @@ from lipmotion.hmm.multistream.recognise import RecognisedUnit, joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
 from lipmotion.hmm.multistream.unit_states import Inventory
-from lipmotion.kernels.sequences.banded import generate
+from lipmotion.kernels.banded import generate
 from lipmotion.motion.arrays import (
     MOTION_ARRAYS,
     SCALING,

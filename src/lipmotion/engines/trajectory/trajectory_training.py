@@ -14,7 +14,7 @@ from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
-from lipmotion.kernels.sequences.banded import generate
+from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context

@@ -12,7 +12,7 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.model import JointHmm, StreamModel
 from lipmotion.hmm.multistream.streams import MOTION
-from lipmotion.kernels.sequences.banded import normal_equations, pin, solve
+from lipmotion.kernels.banded import normal_equations, pin, solve
 from lipmotion.stats.delta_windows import with_dynamics
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from lipmotion.hmm.multistream.densities import LEAST_POSTERIOR, GaussianStatist
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, triphone_states
-from lipmotion.kernels.sequences.forward_backward import LOG_ZERO, chain_posteriors
+from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 
 LEAST_STAY_PROBABILITY = 0.05
 """Least probability of staying in a state."""

@@ -18,7 +18,7 @@ from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import triphone_states
 from lipmotion.hmm.network import NetworkBuilder
-from lipmotion.kernels.sequences.sampling import sample_paths
+from lipmotion.kernels.paths import sample_paths
 
 Grid = NDArray[np.intp]
 

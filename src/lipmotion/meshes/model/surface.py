@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.shading import normal_sums
+from lipmotion.kernels.normals import normal_sums
 from lipmotion.meshes.model.mesh import Mesh
 
 if TYPE_CHECKING:

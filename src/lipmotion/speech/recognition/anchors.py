@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.align import PlacedWord
-from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.kernels.paths import Windows
 from lipmotion.types import FRAME_RATE_HZ, TimedTranscript
 
 LOG = logging.getLogger("lipmotion")

@@ -21,7 +21,7 @@ from lipmotion.hmm.log_likelihoods import (
 )
 from lipmotion.hmm.loudness import frames_above, quiet_frames
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.kernels.paths import Windows
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, speaker_similarity
 from lipmotion.speech.recognition.adaptation import Adaptation

@@ -14,9 +14,8 @@ from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.product import Grammar
 from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.kernels.sequences.factorial import factorial_posteriors
-from lipmotion.kernels.sequences.factorial_path import factorial_best_path
-from lipmotion.kernels.sequences.loops import FactorialLogLikelihoods, Loop, LoopCounts
+from lipmotion.kernels.factorial import factorial_posteriors
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, LoopCounts, factorial_best_path
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -19,9 +19,8 @@ from lipmotion.engines.coupled.chains.factorial_lattice import FactorialTransiti
 from lipmotion.engines.coupled.chains.lattice import Index, JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.kernels.sequences.arcs import NetworkArrays
-from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
-from lipmotion.kernels.sequences.viterbi import best_path
+from lipmotion.kernels.network import ForwardBackwardNetwork
+from lipmotion.kernels.paths import NetworkArrays, best_path
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,6 @@ class NetworkLattice(Lattice):
                 transitions.log_initial[self.states].astype(np.float32),
                 np.zeros(count, np.float32),
             ),
-            layout=lambda: self.network.layout,
         )
         return self.states[path], score
 

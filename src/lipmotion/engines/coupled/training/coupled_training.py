@@ -49,7 +49,7 @@ from lipmotion.engines.coupled.training.chain_training import (
 )
 from lipmotion.engines.coupled.training.em_steps import ChainStatistics, lattice_utterance, variance_floors
 from lipmotion.errors import CorpusError
-from lipmotion.kernels.sequences.banded import generate
+from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.modulation_filter import learned_filter

@@ -1,19 +1,27 @@
-"""Triangles with textures to pixels, compiled."""
-
-# Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
+"""Triangles with textures to pixels: what each sample shows is found first, and then shaded once a pixel."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.compiler import compiled
-from lipmotion.kernels.compiled.raster import BAND, FAR, _bias, _by_band
-from lipmotion.kernels.pixels.textured import CLEAR, CUT, HIDING_OPACITY, NO_TRIANGLE, SCALE, SEEN_OPACITY
+from lipmotion.kernels.compiler import compiled
+from lipmotion_faces.kernels.raster import BAND, FAR, GRID, bias, by_band
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
 Whole = NDArray[np.int32]
+
+SOLID, CUT, CLEAR = 0, 1, 2
+"""Kinds of triangles: without holes; with holes where the texture is clear; blended with what is behind."""
+HIDING_OPACITY = 0.95
+"""From this opacity on, a blended surface hides what is behind it."""
+SEEN_OPACITY = 1 / 512
+"""Below this opacity, it is not seen."""
+NO_TRIANGLE = -1
+SCALE = 1 / 65535
 WIDE_SAMPLES = 8
 """In triangles wider than this, in samples, the columns of a row are worked out before they are tried."""
 PLANES = 27
@@ -21,16 +29,49 @@ PLANES = 27
 texture times depth."""
 
 
+class TexturedTriangles(NamedTuple):
+    """Triangles, and how their textures lie on them.
+
+    triangles : counterclockwise from outside [shape=(F, 3)]
+    uv        : place of every corner in the texture, v downwards, repeated beyond 0 to 1 [shape=(F, 3, 2)]
+    looks     : the row of ``levels`` or -1 for no texture, and the kind: ``SOLID``, ``CUT``, ``CLEAR`` [shape=(F, 2)]
+    alphas    : the opacity below which there is a hole, and the opacity by which that of the texture is multiplied
+                [shape=(F, 2)]
+    texels    : light that is reflected, and opacity, 0 to 65535 [shape=(N, 4)]
+    levels    : first texel, width and height of each texture [shape=(L, 3)]
+    """
+
+    triangles: Whole
+    uv: Real
+    looks: Whole
+    alphas: Real
+    texels: NDArray[np.uint16]
+    levels: NDArray[np.int64]
+
+
 @compiled
-def draw(
-    x: Real, y: Real, z: Real, light: Light, shine: Light, triangles: Whole, uv: Real, looks: Whole, alphas: Real,
-    texels: NDArray[np.uint16], levels: NDArray[np.int64], area: NDArray[np.intp], background: Light,
-    tone: NDArray[np.uint8], picture: NDArray[np.uint8], opacity: NDArray[np.uint8],
+def draw_textured(
+    points: Real, light: Light, shine: Light, surface: TexturedTriangles, area: tuple[int, int, int, int],
+    background: Light, tone: NDArray[np.uint8], picture: NDArray[np.uint8], opacity: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Draw triangles over the background into an area of a picture, in place; arguments as of ``pixels.textured``."""
+    """Draw triangles over the background into an area of a picture, in place.
+
+    points  : column and row in pixels, and depth: -1 divided by the distance [shape=(V, 3)]
+    light   : of every vertex, what a white surface sends to the viewer [shape=(V, 3)];  shine : its highlights, which
+              have no colour of the surface [shape=(V, 3)]
+    area    : first column and row, and the column and row behind the last ones
+    background : light in every pixel [shape=(H, W, 3)]
+    tone    : the grey level of light from 0 to 1, in even steps [shape=(L,)]
+    picture : is changed in the area alone [shape=(H, W, 3)]
+    opacity : becomes the part of each pixel that triangles hide, 0 to 255, in the area alone [shape=(H, W)]
+    Of surfaces that are blended, the nearest one is seen before what is solid. A texture is sampled once a pixel and
+    triangle, bilinearly.
+    """
+    x, y, z = np.rint(2 * GRID * points[:, 0]) / GRID, np.rint(2 * GRID * points[:, 1]) / GRID, points[:, 2].copy()
+    triangles, uv, looks, alphas, texels, levels = surface
     left, top, right, bottom = area
     bands = (bottom - top + BAND - 1) // BAND
-    faces, starts = _by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
+    faces, starts = by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
     planes = np.empty((len(triangles), PLANES))
     _fill_planes(faces, x, y, z, light, shine, triangles, uv, planes)
     size = (2 * BAND, 2 * (right - left))
@@ -109,7 +150,7 @@ def _mark(
     if x0 >= x1 or y0 >= y1:
         return  # between the middles of samples
     inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
-    bias_a, bias_b, bias_c = _bias(xb, yb, xc, yc), _bias(xc, yc, xa, ya), _bias(xa, ya, xb, yb)
+    bias_a, bias_b, bias_c = bias(xb, yb, xc, yc), bias(xc, yc, xa, ya), bias(xa, ya, xb, yb)
     to_b, to_c = zb - za, zc - za
     step_a, step_b, step_c = yc - yb, ya - yc, yb - ya
     for row in range(y0, y1):

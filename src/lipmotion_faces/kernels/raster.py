@@ -1,30 +1,40 @@
-"""Triangles to pixels, compiled."""
-
-# Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
+"""Triangles to pixels: a depth buffer with four samples a pixel."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.compiler import compiled
+from lipmotion.kernels.compiler import compiled
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
 FAR = np.float32(np.inf)
 BAND = 16
 """Rows of pixels that are drawn at once: their samples fit the processor's cache."""
+GRID = 256.0
+"""Corners are rounded to this part of a sample, so that neighbouring triangles leave no gap between them."""
 
 
 @compiled
 def draw(
-    x: Real, y: Real, z: Real, colours: Colours, triangles: NDArray[np.int32], area: NDArray[np.intp],
+    points: Real, colours: Colours, triangles: NDArray[np.int32], area: tuple[int, int, int, int],
     background: Colours, tone: NDArray[np.uint8], picture: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Draw triangles over the background into an area of a picture, in place; arguments as of ``pixels.raster``."""
+    """Draw triangles over the background into an area of a picture, in place.
+
+    points     : column and row in pixels, and depth (smaller is nearer) of every vertex [shape=(V, 3)]
+    colours    : of every vertex, light as a physicist measures it, 0 to 1 [shape=(V, 3)]
+    triangles  : counterclockwise on the screen where they face the viewer; others are not drawn [shape=(F, 3)]
+    area       : first column and row, and the column and row behind the last ones
+    background : light in every pixel [shape=(H, W, 3)]
+    tone       : the grey level of light from 0 to 1, in even steps [shape=(L,)]
+    picture    : is changed in the area alone [shape=(H, W, 3)]
+    """
+    x, y, z = np.rint(2 * GRID * points[:, 0]) / GRID, np.rint(2 * GRID * points[:, 1]) / GRID, points[:, 2].copy()
     left, top, right, bottom = area
     bands = (bottom - top + BAND - 1) // BAND
-    faces, starts = _by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
+    faces, starts = by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
     width = right - left
     depth = np.empty((2 * BAND, 2 * width), np.float32)
     colour = np.empty((2 * BAND, 2 * width, 3), np.float32)
@@ -39,7 +49,7 @@ def draw(
 
 
 @compiled
-def _by_band(
+def by_band(
     x: Real, y: Real, triangles: NDArray[np.int32], left: int, right: int, top: int, bands: int
 ) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
     """Return the triangles that face the viewer, band after band, and where the triangles of each band begin."""
@@ -79,7 +89,7 @@ def _triangle(
     if x0 >= x1 or y0 >= y1:
         return  # between the middles of samples
     inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
-    bias_a, bias_b, bias_c = _bias(xb, yb, xc, yc), _bias(xc, yc, xa, ya), _bias(xa, ya, xb, yb)
+    bias_a, bias_b, bias_c = bias(xb, yb, xc, yc), bias(xc, yc, xa, ya), bias(xa, ya, xb, yb)
     za, zb, zc = np.float32(z[a]), np.float32(z[b] - z[a]), np.float32(z[c] - z[a])
     red, green, blue = colours[a]
     red_b, green_b, blue_b = colours[b, 0] - red, colours[b, 1] - green, colours[b, 2] - blue
@@ -110,7 +120,7 @@ def _triangle(
 
 
 @compiled
-def _bias(xa: float, ya: float, xb: float, yb: float) -> float:
+def bias(xa: float, ya: float, xb: float, yb: float) -> float:
     """Return the least edge function of samples inside: samples on an edge belong to the triangle on one side of it."""
     owned = ya > yb or (ya == yb and xa < xb)
     return 0.0 if owned else 1e-6

@@ -1,6 +1,6 @@
-"""Cubic resampling by affine maps, compiled for pictures of three colours.
+"""Resampling of pictures of three colours by affine maps, by cubic convolution, and blending of a patch into a frame.
 
-The operations and their order are those of ``kernels.pixels.affine``, and so the results are the same to the bit.
+Source: Keys 1981 (cubic convolution with a = -½, which reproduces second-degree polynomials).
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.compiler import compiled
+from lipmotion.kernels.compiler import compiled
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
-Picture = NDArray[Any]
+Pictures = NDArray[Any]
 Index = NDArray[np.int32]
 Number = np.float32
 HALF, ONE, ONE_AND_HALF, TWO, TWO_AND_HALF = Number(0.5), Number(1), Number(1.5), Number(2), Number(2.5)
@@ -23,14 +23,43 @@ COLOURS = 3
 NEXT = np.uint64(COLOURS)  # indices that may be negative are not vectorised
 
 
-@compiled
-def resample(picture: Picture, to_source: Array, new: Floats) -> None:
-    """Fill in the new picture.
+def resample(pictures: Pictures, to_source: Array, size: tuple[int, int]) -> Floats:
+    """Return new pictures: float32 array [shape=(T, h, w, 3)].
 
-    picture   : contiguous uint8 or float32 array [shape=(H, W, 3)]
-    to_source : as of ``kernels.pixels.affine.resample``
-    new       : [shape=(h, w, 3)]
+    pictures  : uint8 or floats [shape=(T, H, W, 3)]; outside them their outermost pixels repeat
+    to_source : affine map [shape=(2, 3)] from the centre of a new pixel (column, row) to its position in the given ones
+    size      : h and w
     """
+    new = np.empty((len(pictures), *size, COLOURS), np.float32)
+    to_source = _plain(to_source, np.float64)
+    for picture, made in zip(_plain(pictures), new, strict=True):
+        _resample(picture, to_source, made)
+    return new
+
+
+def blend(
+    frame: NDArray[np.uint8], corner: tuple[int, int], size: tuple[int, int], patch: Pictures, weight: Floats,
+    to_patch: Array,
+) -> None:  # fmt: skip
+    """Blend a patch into a part of a frame, which is changed: frame + weight · (patch − frame), rounded, 0 to 255.
+
+    frame    : uint8 array [shape=(H, W, 3)]
+    corner   : row and column at which the part begins
+    size     : its height and width; it lies in the frame
+    patch    : uint8 or floats [shape=(h, w, 3)]
+    weight   : [shape=(h, w)], interpolated bilinearly
+    to_patch : affine map [shape=(2, 3)] from the centre of a pixel of the part to its position in the patch
+    """
+    _blend(frame, *corner, size, _plain(patch), _plain(weight, np.float32), _plain(to_patch, np.float64))
+
+
+def _plain(values: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
+    """Return an array that is contiguous and may be written to: for other ones numba would compile everything again."""
+    return np.require(values, dtype or (None if values.dtype == np.uint8 else np.float32), ["C", "W"])
+
+
+@compiled
+def _resample(picture: Pictures, to_source: Array, new: Floats) -> None:
     width = new.shape[1]
     whole, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
     needed = np.ones(width, Number)
@@ -41,22 +70,15 @@ def resample(picture: Picture, to_source: Array, new: Floats) -> None:
 
 
 @compiled
-def blend(
+def _blend(
     frame: NDArray[np.uint8],
     top: int,
     left: int,
     size: tuple[int, int],
-    patch: Picture,
+    patch: Pictures,
     weight: Floats,
     to_patch: Array,
 ) -> None:
-    """Blend a patch into a part of a frame, which is changed.
-
-    frame    : uint8 array [shape=(H, W, 3)], of which the part begins at ``top`` and ``left`` and has ``size``
-    patch    : contiguous uint8 or float32 array [shape=(h, w, 3)]
-    weight   : [shape=(h, w)]
-    to_patch : affine map from the part to the patch
-    """
     width = size[1]
     whole, fractions, taps = np.empty((2, width), np.int32), np.empty((2, width), Number), np.empty((8, width), Number)
     share, new = np.empty(width, Number), np.empty((width, COLOURS), Number)
@@ -93,7 +115,7 @@ def _weigh(fractions: Floats, taps: Floats) -> None:
 
 
 @compiled
-def _fill(picture: Picture, whole: Index, taps: Floats, needed: Floats, new: Floats) -> None:
+def _fill(picture: Pictures, whole: Index, taps: Floats, needed: Floats, new: Floats) -> None:
     """Fill in a row: vertical sums of four columns, and their weighted sum; not where ``needed`` is 0."""
     height, width, _ = picture.shape
     flat, below = picture.reshape(-1), np.uint64(width * COLOURS)
@@ -121,7 +143,7 @@ def _fill(picture: Picture, whole: Index, taps: Floats, needed: Floats, new: Flo
 
 @compiled
 def _sum(
-    flat: Picture, at: np.uint64, below: np.uint64, e: np.float32, f: np.float32, g: np.float32, h: np.float32
+    flat: Pictures, at: np.uint64, below: np.uint64, e: np.float32, f: np.float32, g: np.float32, h: np.float32
 ) -> np.float32:
     """Return the weighted sum of four pixels that lie below one another, the first of which is at ``at``."""
     upper = e * Number(flat[at]) + f * Number(flat[at + below])
@@ -130,7 +152,7 @@ def _sum(
 
 @compiled
 def _sum_at_edge(
-    picture: Picture, row: int, column: int, k: int, e: np.float32, f: np.float32, g: np.float32, h: np.float32
+    picture: Pictures, row: int, column: int, k: int, e: np.float32, f: np.float32, g: np.float32, h: np.float32
 ) -> np.float32:
     """Return the weighted sum of four pixels of a column around ``row``; outermost pixels repeat."""
     height, column = len(picture), _near(column, picture.shape[1])

@@ -1,4 +1,4 @@
-"""The arrays that describe a network of states, and the layout of its arcs in memory for vectorised kernels.
+"""The layout of the arcs of a network in memory, for vectorised kernels.
 
 States are put into an order in which arcs come in **runs**: consecutive sources lead to consecutive targets, and a
 run is processed as one vector. Where many states share the same many sources, as the first states of all phones in a
@@ -19,24 +19,6 @@ LEAST_BLOCK = 8
 """Least number of sources, and of targets, of a block."""
 PADDING_ROWS = 16
 """Rows of a block are padded to a multiple of this."""
-
-
-class NetworkArrays(NamedTuple):
-    """A network of S states and E arcs; logarithms are of probabilities.
-
-    emission    : [shape=(S,)], the density of each state
-    arc_from    : [shape=(E,)], the source states of all arcs, sorted by target
-    arc_log     : [shape=(E,)], of the arcs
-    arc_start   : [shape=(S,)], the first arc of each target; every state has at least one
-    log_initial, log_final : [shape=(S,)], of beginning and ending in each state
-    """
-
-    emission: Index
-    arc_from: Index
-    arc_log: NDArray[np.floating[Any]]
-    arc_start: Index
-    log_initial: NDArray[np.floating[Any]]
-    log_final: NDArray[np.floating[Any]]
 
 
 class ArcLayout(NamedTuple):
@@ -70,7 +52,7 @@ class ArcWeights(NamedTuple):
 def arc_layout(arc_from: Index, arc_start: Index) -> ArcLayout:
     """Return the layout of a network whose arcs are sorted by target.
 
-    arc_from, arc_start : as in ``NetworkArrays``
+    arc_from, arc_start : as in ``kernels.paths.NetworkArrays``
     """
     states = len(arc_start)
     arc_to = np.repeat(np.arange(states), np.diff(arc_start, append=len(arc_from)))

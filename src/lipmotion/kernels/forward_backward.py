@@ -1,15 +1,17 @@
 """Forward–backward: first as it is defined, for any network of states, then for many left-to-right chains at a time.
 
 ``log_forward_backward`` is the definition. The other forms are faster, and tests compare them with it:
-``chain_posteriors``, here, and ``ForwardBackwardNetwork`` (``kernels.sequences.network``), which falls back on it.
+``chain_posteriors``, here, and ``ForwardBackwardNetwork`` (``kernels.network``), which falls back on it.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.choice import compiled_pays
+from lipmotion.kernels.compiler import compiled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -17,8 +19,7 @@ LOG_ZERO = -1e30
 """Stands for the log probability -inf: sums and differences of it are no NaN."""
 LEAST_LOG = -700.0
 """Probabilities with smaller logarithms are set to 0."""
-CELL_S = 60e-9
-"""Time that NumPy takes for one state of one utterance in one frame (docs/results/kernels.md)."""
+LOG_2 = math.log(2)
 
 
 def log_forward_backward(
@@ -73,13 +74,7 @@ def chain_posteriors(
     no path (fewer frames than states), and the other two are 0.
     Cost: O(T·U·S).
     """
-    arrays = (log_emission, log_stay, log_move, frames, states)
-    if compiled_pays(log_emission.size * CELL_S):
-        from lipmotion.kernels.compiled import forward_backward
-
-        log_posterior, log_kept, log_likelihood = forward_backward.chains(*arrays)
-    else:
-        log_posterior, log_kept, log_likelihood = _chains(*arrays)
+    log_posterior, log_kept, log_likelihood = _chains(log_emission, log_stay, log_move, frames, states)
     possible = log_likelihood > LOG_ZERO / 2
     within = frames > np.arange(len(log_emission))[:, None]
     posterior, kept = _probabilities(log_posterior), _probabilities(log_kept)
@@ -92,34 +87,62 @@ def _probabilities(log: Array) -> Array:
     return np.exp(np.minimum(log, 0, out=log), out=np.zeros_like(log), where=log > LEAST_LOG)
 
 
+@compiled
 def _chains(
-    log_emission: Array, log_stay: Array, log_move: Array, frames: NDArray[np.intp], states: NDArray[np.intp]
+    log_emission: Array, log_stay: Array, log_move: Array, frames: Index, states: Index
 ) -> tuple[Array, Array, Array]:
-    """Return log posteriors of each state, and of staying in it for the next frame [shapes=(T, U, S)], and log
-    likelihoods [shape=(U,)]. In the padding, posteriors have no meaning.
-    """
-    T, U, S = log_emission.shape
-    alpha = np.full((T, U, S), LOG_ZERO)
-    alpha[0, :, 0] = log_emission[0, :, 0]
-    for t in range(1, T):
-        arrive = alpha[t - 1] + log_stay
-        moved = (alpha[t - 1] + log_move)[:, :-1]
-        arrive[:, 1:] = np.logaddexp(arrive[:, 1:], moved)
-        np.maximum(arrive + log_emission[t], LOG_ZERO, out=alpha[t])
-    rows = np.arange(U)
-    leave = np.full((U, S), LOG_ZERO)
-    leave[rows, states - 1] = log_move[rows, states - 1]
-    log_likelihood = (alpha[frames - 1, rows] + leave).max(axis=1)
+    """Return log posteriors of states and of staying in them [shapes=(T, U, S)], and log likelihoods [shape=(U,)]."""
+    posterior, kept = np.full(log_emission.shape, LOG_ZERO), np.full(log_emission.shape, LOG_ZERO)
+    log_likelihood = np.empty(len(frames))
+    for u in range(len(frames)):
+        T, S = frames[u], states[u]
+        emission = log_emission[:T, u, :S]
+        alpha, log_kept = posterior[:T, u, :S], kept[:T, u, :S]
+        _forward(emission, log_stay[u], log_move[u], alpha)
+        log_likelihood[u] = alpha[T - 1, S - 1] + log_move[u, S - 1]
+        _backward(emission, log_stay[u], log_move[u], alpha, log_kept, log_likelihood[u])
+    return posterior, kept, log_likelihood
 
-    beta, log_kept = np.full((T, U, S), LOG_ZERO), np.full((T, U, S), LOG_ZERO)
+
+@compiled
+def _forward(log_emission: Array, log_stay: Array, log_move: Array, alpha: Array) -> None:
+    """Fill in the forward scores [shape=(T, S)]."""
+    alpha[0, 0] = log_emission[0, 0]
+    for t in range(1, len(alpha)):
+        alpha[t, 0] = max(alpha[t - 1, 0] + log_stay[0] + log_emission[t, 0], LOG_ZERO)
+        for s in range(1, alpha.shape[1]):
+            arrive = _log_sum(alpha[t - 1, s] + log_stay[s], alpha[t - 1, s - 1] + log_move[s - 1])
+            alpha[t, s] = max(arrive + log_emission[t, s], LOG_ZERO)
+
+
+@compiled
+def _backward(
+    log_emission: Array, log_stay: Array, log_move: Array, alpha: Array, kept: Array, log_likelihood: float
+) -> None:
+    """Replace the forward scores ``alpha`` by log posteriors, and fill in those of staying in a state."""
+    T, S = alpha.shape
+    beta = np.full(S, LOG_ZERO)
+    beta[S - 1] = log_move[S - 1]
+    onward = np.empty(S)
     for t in range(T - 1, -1, -1):
-        last = (frames == t + 1)[:, None]
         if t + 1 < T:
-            onward = log_emission[t + 1] + beta[t + 1]
-            kept = log_stay + onward
-            reach = kept.copy()
-            reach[:, :-1] = np.logaddexp(kept[:, :-1], log_move[:, :-1] + onward[:, 1:])
-            np.maximum(reach, LOG_ZERO, out=beta[t])
-            log_kept[t] = np.where((frames > t + 1)[:, None], alpha[t] + kept - log_likelihood[:, None], LOG_ZERO)
-        beta[t] = np.where(last, leave, beta[t])
-    return alpha + beta - log_likelihood[:, None], log_kept, log_likelihood
+            for s in range(S):
+                onward[s] = log_emission[t + 1, s] + beta[s]
+            for s in range(S):
+                keep = log_stay[s] + onward[s]
+                kept[t, s] = alpha[t, s] + keep - log_likelihood
+                reach = _log_sum(keep, log_move[s] + onward[s + 1]) if s + 1 < S else keep
+                beta[s] = max(reach, LOG_ZERO)
+        for s in range(S):
+            alpha[t, s] = alpha[t, s] + beta[s] - log_likelihood
+
+
+@compiled
+def _log_sum(x: float, y: float) -> float:
+    """Return log(exp(x) + exp(y))."""
+    if x == y:
+        return x + LOG_2
+    high, low = max(x, y), min(x, y)
+    if high - low > 40 and abs(high) > 1:
+        return high  # the lower one adds less than a quarter of the last bit
+    return high + math.log1p(math.exp(low - high))

@@ -1,25 +1,36 @@
-"""Painting of pictures, compiled: the same operations in the same order as in ``kernels.pixels.painting``."""
+"""Painting of pictures: textured bands with exact edges, smooth warps, and one layer over another.
+
+Pixels of layers are float32 [shape=(H, W, 4)]: colour 0..255, premultiplied by the cover 0..1 that comes last.
+Positions are in pixels; the centre of the first pixel is at 0.5.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.compiler import compiled
+from lipmotion.kernels.compiler import compiled
 
 Layer = NDArray[np.float32]
-Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
+Canvas = NDArray[np.uint16]
+"""Values 0..255 in 16 bits, so that pixels can be mixed as whole numbers."""
+Floats = NDArray[np.float64]
 Packed = NDArray[np.uint64]
 ONE = 1 << 16
 """A pixel, in whole numbers."""
 
 
 @compiled
-def paint_band(
-    layer: Layer, first: int, last: int, top: Floats, bottom: Floats, across: Floats, texture: Floats
-) -> None:
-    """Paint a texture between two heights on rows of a layer, as ``kernels.pixels.painting.paint_band``."""
+def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, texture: Floats) -> None:
+    """Paint a texture from ``top`` down to ``bottom`` on a layer, in place; nothing where they meet.
+
+    top, bottom : heights at C evenly spaced places in each column of pixels [shape=(C, W)]; along each the covered part
+                  of a pixel is exact
+    across      : 0 to 1, where each column lies in the texture [shape=(W,)]
+    texture     : colour 0..255 and opacity 0..1 [shape=(D, U, 4)]; the first row lies at the top of the band, the last
+                  one at its bottom; values between are interpolated
+    """
     places, columns = top.shape
     deep, wide = texture.shape[0], texture.shape[1]
     for column in range(columns):
@@ -35,7 +46,7 @@ def paint_band(
         u0 = min(int(beside), max(wide - 2, 0))
         u1 = min(u0 + 1, wide - 1)
         fu = beside - u0
-        for row in range(max(first, int(np.floor(highest))), min(last, int(np.ceil(lowest)))):
+        for row in range(max(0, int(np.floor(highest))), min(len(layer), int(np.ceil(lowest)))):
             cover = 0.0
             for place in range(places):
                 upper, lower = max(top[place, column], float(row)), min(bottom[place, column], row + 1.0)
@@ -59,13 +70,18 @@ def paint_band(
 
 
 @compiled
-def warp_floats(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
-    """Fill a float32 picture with another one that is shifted, as ``kernels.pixels.painting.warp``."""
+def warp(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
+    """Fill a picture with another one that is shifted, by a different distance everywhere.
+
+    source, target   : pixels [shape=(H, W, C)]; beyond its edges the source goes on with its last pixels
+    shift_x, shift_y : how far the source is from each target pixel, at every ``step``-th pixel from the first one on
+                       [shape=(ceil(H / step) + 1, ceil(W / step) + 1)]; interpolated between them
+    """
     height, width, channels = target.shape
     last_x, last_y = source.shape[1] - 1.0, source.shape[0] - 1.0
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
     for row in range(height):
-        _row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
         for cell in range((width + step - 1) // step):
             cell_x, more_x = row_x[cell], row_x[cell + 1] - row_x[cell]
             cell_y, more_y = row_y[cell], row_y[cell + 1] - row_y[cell]
@@ -83,19 +99,45 @@ def warp_floats(source: Layer, shift_x: Floats, shift_y: Floats, step: int, targ
                     target[row, column, channel] = above + fy * (left + fx * (right - left) - above)
 
 
-@compiled
-def warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
-    """Fill a picture of bytes with one of packed pixels that is shifted, as ``kernels.pixels.painting.warp_bytes``.
+def warp_bytes(source: Canvas, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+    """Fill a picture of bytes as ``warp`` does; shifts are rounded down to 1/65536, shares of pixels to 1/256.
 
-    All four channels are mixed at once, in the parts of a number; no sum needs more than 16 bits.
+    source : values 0..255 [shape=(H, W, 4)], the last two axes contiguous
+    target : [shape=(H, W, C)], of the first C channels, 3 or 4
     """
+    _warp_packed(source.view(np.uint64)[..., 0], shift_x, shift_y, step, target)
+
+
+@compiled
+def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas) -> None:
+    """Fill in the values 0..255 of four layers over one another [shape=(H, W, 4)], premultiplied.
+
+    below : what is behind
+    shade : is added to it where the shadow falls
+    skin  : a layer with the strength of its shadow on what is behind it, 0..1, in one more channel [shape=(H, W, 5)]
+    above : a layer over the skin
+    """
+    for row in range(target.shape[0]):
+        for column in range(target.shape[1]):
+            shadow = np.float64(skin[row, column, 4])
+            behind_skin, behind_above = 1 - np.float64(skin[row, column, 3]), 1 - np.float64(above[row, column, 3])
+            for channel in range(4):
+                mixed = below[row, column, channel] + shadow * shade[row, column, channel]
+                mixed = skin[row, column, channel] + behind_skin * mixed
+                mixed = above[row, column, channel] + behind_above * mixed
+                target[row, column, channel] = np.uint16(mixed * (255.0 if channel == 3 else 1.0) + 0.5)
+
+
+@compiled
+def _warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+    """Mix all four channels of ``warp_bytes`` at once, in the parts of a number; no sum needs more than 16 bits."""
     height, width, channels = target.shape
     end_x, end_y = (source.shape[1] - 1 << 16) - 1, (source.shape[0] - 1 << 16) - 1
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
     one, two, half = np.uint64(1), np.uint64(8), np.uint64(0x0080008000800080)
     share, byte = np.uint64(256), np.uint64(255)
     for row in range(height):
-        _row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
         for cell in range((width + step - 1) // step):
             x, more_x = int(np.floor(row_x[cell] * ONE)), int(np.floor((row_x[cell + 1] - row_x[cell]) * ONE / step))
             y, more_y = int(np.floor(row_y[cell] * ONE)), int(np.floor((row_y[cell + 1] - row_y[cell]) * ONE / step))
@@ -116,24 +158,10 @@ def warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, tar
 
 
 @compiled
-def _row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, row_y: Floats) -> None:
+def row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, row_y: Floats) -> None:
     """Fill in the values of two grids in one row of pixels."""
     r = min(int(down), shift_x.shape[0] - 2)
     share = down - r
     for column in range(shift_x.shape[1]):
         row_x[column] = shift_x[r, column] + share * (shift_x[r + 1, column] - shift_x[r, column])
         row_y[column] = shift_y[r, column] + share * (shift_y[r + 1, column] - shift_y[r, column])
-
-
-@compiled
-def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray[np.uint16]) -> None:
-    """Fill in the bytes of layers over one another, as ``kernels.pixels.painting.stack``."""
-    for row in range(target.shape[0]):
-        for column in range(target.shape[1]):
-            shadow = np.float64(skin[row, column, 4])
-            behind_skin, behind_above = 1 - np.float64(skin[row, column, 3]), 1 - np.float64(above[row, column, 3])
-            for channel in range(4):
-                mixed = below[row, column, channel] + shadow * shade[row, column, channel]
-                mixed = skin[row, column, channel] + behind_skin * mixed
-                mixed = above[row, column, channel] + behind_above * mixed
-                target[row, column, channel] = np.uint16(mixed * (255.0 if channel == 3 else 1.0) + 0.5)

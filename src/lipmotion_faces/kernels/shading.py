@@ -1,44 +1,36 @@
-"""Light on vertices, compiled."""
-
-# Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
+"""Light on vertices."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.compiler import compiled
-from lipmotion.kernels.pixels.shading import LEAST_FACING_COSINE
+from lipmotion.kernels.compiler import compiled
 
 Real = NDArray[np.float64]
-
-
-@compiled
-def add_normals(places: Real, triangles: NDArray[np.int32], total: Real) -> None:
-    """Add the normals of triangles to those of their vertices, corner after corner."""
-    part = np.empty(total.shape)
-    across = np.empty((len(triangles), 3))
-    for f in range(len(triangles)):
-        a, b, c = triangles[f]
-        bx, by, bz = places[b, 0] - places[a, 0], places[b, 1] - places[a, 1], places[b, 2] - places[a, 2]
-        cx, cy, cz = places[c, 0] - places[a, 0], places[c, 1] - places[a, 1], places[c, 2] - places[a, 2]
-        across[f, 0], across[f, 1], across[f, 2] = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    for corner in range(3):
-        part[:] = 0.0
-        for f in range(len(triangles)):
-            v = triangles[f, corner]
-            part[v, 0] += across[f, 0]
-            part[v, 1] += across[f, 1]
-            part[v, 2] += across[f, 2]
-        total += part
+LEAST_FACING_COSINE = -0.35
+"""Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 
 
 @compiled
 def shade(
     normals: Real, places: Real, viewer: Real, colours: Real, reaches: Real, strands: Real,
-    kinds: NDArray[np.intp], finishes: Real, lamps: Real, light: NDArray[np.float32],
-) -> None:  # fmt: skip
-    """Fill in the light that vertices send to the viewer; arguments as of ``kernels.pixels.shading``."""
+    kinds: NDArray[np.intp], finishes: Real, lamps: Real,
+) -> NDArray[np.float32]:  # fmt: skip
+    """Return the light that vertices send to the viewer [shape=(V, 3)].
+
+    normals, places : of the vertices, normals of length 1 [shape=(V, 3)];  viewer : his place [shape=(3,)]
+    colours  : diffuse reflection of red, green and blue [shape=(V, 3)]
+    reaches  : the parts of the sky and of the first lamp that are not hidden [shape=(V, 2)]
+    strands  : directions of hair, of length 1 [shape=(V, 3)]
+    kinds    : the row of ``finishes`` of every vertex [shape=(V,)]
+    finishes : how far light reaches into the shade (red, green, blue); strength of highlights and how often their
+               shape is squared; reflection at grazing angles; 1 where highlights run across strands [shape=(K, 7)]
+    lamps    : direction and light of key, fill and two rim lights, then light of sky and ground [shape=(6, 6)]
+    Powers are made by squaring.
+    Source: Blinn 1977 (highlights), Kajiya & Kay 1989 (hair), half-Lambert with a width for each colour (skin).
+    """
+    light = np.empty(normals.shape, np.float32)
     for v in range(len(normals)):
         nx, ny, nz = normals[v]
         ex, ey, ez = _towards(viewer, places[v])
@@ -89,6 +81,7 @@ def shade(
         light[v, 0] = cr * red + shine_r
         light[v, 1] = cg * green + shine_g
         light[v, 2] = cb * blue + shine_b
+    return light
 
 
 @compiled

@@ -4,8 +4,7 @@ Planes are uint8 [shape=(3, H, W)]; opaque. A *packed* plane holds, for every pi
 right, the one below and the one below that, from the lowest byte to the highest one [dtype uint32]: so one number is
 fetched for each pixel that is moved. Shifts are in pixels, at every ``STEP``-th pixel of a window from its first one on
 [shape=(ceil(h / STEP) + 1, ceil(w / STEP) + 1)], and interpolated between; they are rounded down to 1/65536 of a pixel,
-shares of pixels to 1/256. Beyond its edges a window goes on with its last pixels. Without numba faces are painted as
-layers (``kernels.pixels.painting``).
+shares of pixels to 1/256. Beyond its edges a window goes on with its last pixels.
 
 The work of a row is divided into short loops over neighbouring pixels, of 32-bit numbers alone (hence the conversions),
 so that each but the one that fetches pixels from memory becomes vector instructions: five times as fast as one loop.
@@ -18,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.compiler import compiled
-from lipmotion.kernels.compiled.painting import _row_of_grids
+from lipmotion.kernels.compiler import compiled
+from lipmotion_faces.kernels.painting import row_of_grids
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -112,18 +111,9 @@ def pack(plane: Bytes, y0: int, x0: int, y1: int, x1: int, mean: bool, packed: P
 
 @compiled
 def _places(
-    row_x: Floats,
-    row_y: Floats,
-    row: int,
-    first: int,
-    count: int,
-    height: int,
-    width: int,
-    stride: int,
-    index: Whole,
-    share_x: Packed,
-    share_y: Packed,
-) -> None:
+    row_x: Floats, row_y: Floats, row: int, first: int, count: int, height: int, width: int, stride: int, index: Whole,
+    share_x: Packed, share_y: Packed,
+) -> None:  # fmt: skip
     """Fill in the sources of some pixels of a row: number of the pixel, and 1/256 of the way to the next ones."""
     end_x, end_y, none = np.int32((width - 1 << 16) - 1), np.int32((height - 1 << 16) - 1), np.int32(0)
     for cell in range((count + STEP - 1) // STEP):
@@ -168,17 +158,9 @@ def _write(found: Packed, share_x: Packed, share_y: Packed, count: int, target: 
 
 @compiled
 def warp_planes(
-    packed: Packed,
-    y0: int,
-    x0: int,
-    y1: int,
-    x1: int,
-    shift_x: Floats,
-    shift_y: Floats,
-    luma: Bytes,
-    blue: Bytes,
-    red: Bytes,
-) -> None:
+    packed: Packed, y0: int, x0: int, y1: int, x1: int, shift_x: Floats, shift_y: Floats, luma: Bytes, blue: Bytes, red:
+    Bytes,
+) -> None:  # fmt: skip
     """Fill a window of a picture with another one that is shifted, by a different distance everywhere.
 
     packed    : planes of brightness and of two colours, the latter of means [shape=(3, H, W)]
@@ -192,7 +174,7 @@ def warp_planes(
     stride = packed.shape[2]
     flat = packed.reshape(3, packed.shape[1] * stride)
     for row in range(height):
-        _row_of_grids(shift_x, shift_y, row / STEP, row_x, row_y)
+        row_of_grids(shift_x, shift_y, row / STEP, row_x, row_y)
         _places(row_x, row_y, row, 0, width, height, width, stride, index, share_x, share_y)
         _fetch(flat[0, y0 * stride + x0 :], index, width, found)
         _write(found, share_x, share_y, width, luma[y0 + row, x0:x1])
@@ -209,16 +191,9 @@ def warp_planes(
 
 @compiled
 def lay_skin(
-    skin: Packed,
-    shift_x: Floats,
-    shift_y: Floats,
-    below: Singles,
-    shade: Singles,
-    above: Singles,
-    y0: int,
-    x0: int,
+    skin: Packed, shift_x: Floats, shift_y: Floats, below: Singles, shade: Singles, above: Singles, y0: int, x0: int,
     target: Bytes,
-) -> None:
+) -> None:  # fmt: skip
     """Lay skin that is shifted, by a different distance everywhere, between ``StillLayers`` on a window of planes.
 
     skin   : packed colours, premultiplied; cover, and strength of the shadow on what is behind, 0..255
@@ -234,7 +209,7 @@ def lay_skin(
     whole, half, part = np.float32(1), np.float32(0.5), np.float32(1 / 65536)
     share = np.float32(1 / (255 * 65536))
     for row in range(height):
-        _row_of_grids(shift_x, shift_y, row / STEP, row_x, row_y)
+        row_of_grids(shift_x, shift_y, row / STEP, row_x, row_y)
         for first in range(0, width, SEGMENT):
             count = min(SEGMENT, width - first)
             _places(row_x, row_y, row, first, count, height, width, width, index, share_x, share_y)
@@ -272,16 +247,9 @@ def lay_skin(
 
 @compiled
 def lay_eyes(
-    under: Singles,
-    opening: Singles,
-    over: Singles,
-    iris: Singles,
-    x: np.float32,
-    y: np.float32,
-    y0: int,
-    x0: int,
+    under: Singles, opening: Singles, over: Singles, iris: Singles, x: np.float32, y: np.float32, y0: int, x0: int,
     target: Bytes,
-) -> None:
+) -> None:  # fmt: skip
     """Lay ``EyeLayers`` on a window of planes that begins at y0, x0.
 
     x, y : from each pixel to the one of the irises that is seen there
@@ -321,7 +289,7 @@ def lay_eyes(
 
 @compiled
 def to_layer(planes: Bytes, y0: int, x0: int, layer: Singles) -> None:
-    """Copy a window of planes to an opaque layer [shape=(h, w, 4)], as ``kernels.pixels.painting`` paints on."""
+    """Copy a window of planes to an opaque layer [shape=(h, w, 4)], as ``kernels.painting`` paints on."""
     for row in range(layer.shape[0]):
         for column in range(layer.shape[1]):
             for channel in range(3):

@@ -1,0 +1,512 @@
+"""Posteriors and expected counts of factorial hidden Markov models (``kernels.factorial_loops``), by forward–backward.
+
+Each loop has transitions along its own axis of the joint states only, so a frame costs Na·Nv·(Ua + Uv) and not
+(Na·Nv)², and the matrix of joint transitions is never computed.
+
+Probabilities of a frame are scaled to sum to ``WHOLE``, and raised to 1 / ``WHOLE`` where they are less. Densities are
+multiplied in double precision, and products under a least value are set to 0. So no number is denormal, which would be
+many times slower, nor the product of two probabilities. What that may lose is bounded, and where it is too much, the
+recording is computed in the next precision, at last in logarithms: slow, and exact however improbable a path is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.compiler import compiled_to_rounding
+from lipmotion.kernels.factorial_loops import (
+    FactorialLogLikelihoods,
+    FrameDensity,
+    LogTransitions,
+    Loop,
+    LoopCounts,
+    kept_frames,
+    log_ends,
+)
+
+Array = NDArray[Any]
+Index = NDArray[np.intp]
+Double = NDArray[np.float64]
+SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
+OFF: dict[np.dtype[Any], float] = {SINGLE: 1e-4, DOUBLE: 1e-10}
+"""By precision: the largest share of the likelihood that may come of probabilities that were raised."""
+WHOLE: dict[np.dtype[Any], float] = {SINGLE: 1e16, DOUBLE: 1e70}
+"""By precision: the sum of the probabilities of a frame. They are raised to 1 divided by this where they are less."""
+LEAST_PRODUCT = {SINGLE: 1e-37, DOUBLE: 1e-300}
+"""By precision: smaller products of probabilities and densities are set to 0."""
+LEAST_TOTAL = {SINGLE: 1e-20, DOUBLE: 1e-150}
+"""By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed
+is less than what probabilities are raised to."""
+LEAST_POSTERIOR = 1e-20
+"""Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
+LEAST_PROBABILITY = 1e-100
+"""Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
+LARGEST_EXPONENT = 700.0
+"""Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
+
+
+class FactorialPosteriors(NamedTuple):
+    """Posteriors and expected counts of a recording in two loops.
+
+    audio, visual : [shapes=(T, Na), (T, Nv)], posteriors of the states of each loop
+    pair          : [shape=(T, P)], posteriors of the joint states with densities of their own
+    audio_counts, visual_counts : expected counts of the transitions of each loop
+    log_likelihood : -inf where there is no path: then everything else is 0
+    Posteriors and counts under 1e-20 are 0.
+
+    Guaranteed but for rounding, however improbable a path is at first: the likelihood is right to a share of δ, and the
+    errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most: δ is 1e-4
+    for log densities in single precision, 1e-10 for those in double precision (``OFF``).
+    """
+
+    audio: Array
+    visual: Array
+    pair: Array
+    audio_counts: LoopCounts
+    visual_counts: LoopCounts
+    log_likelihood: float
+
+
+def factorial_posteriors(
+    audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, stretch: int | None = None
+) -> FactorialPosteriors:
+    """Return the posteriors and expected counts of a recording in two loops.
+
+    logs    : log densities of the recording
+    stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
+        None: √T, or as many as ``ROOM_BYTES`` hold
+    Log densities in single precision are processed in single precision where that loses nothing, which takes half the
+    time. Where double precision may lose paths that count, because they were some 250 nats below a frame's best, the
+    recording is processed in logarithms.
+    Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
+    are raised to a least one, never set to 0, and so are upper bounds; how much may come of that follows from the
+    overlap of both in each frame.
+    Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
+    """
+    order = np.lexsort(logs.pairs.T[::-1])
+    logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
+    ways: list[_Scaled | _InLogs] = []
+    if min(_least_probability(loop) for loop in (audio, visual)) >= LEAST_PROBABILITY:
+        ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
+    found = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
+    result = next((each for each in found if each is not None), None) or _zero_posteriors(audio, visual, logs)
+    return result._replace(pair=result.pair[:, np.argsort(order)])
+
+
+class _Frame(NamedTuple):
+    """Posteriors of a frame.
+
+    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], of the states of each loop, and of joint states of their own
+    log_overlap         : the logarithm of the sum of forward times backward probabilities, as a share of the product of
+        both wholes
+    """
+
+    audio: Double
+    visual: Double
+    pair: Double
+    log_overlap: float
+
+
+class _StepBack(NamedTuple):
+    """The result of a step back to the frame before.
+
+    frame    : its posteriors
+    backward : its backward probabilities times densities [shape=(Na, Nv)]
+    audio_entered, visual_entered : [shapes=(U, U)], expected number of transitions from each unit to each, divided by
+        the probability of the transition
+    """
+
+    frame: _Frame
+    backward: Array
+    audio_entered: Array
+    visual_entered: Array
+
+
+def _forward_backward(
+    loops: tuple[Loop, Loop], logs: FactorialLogLikelihoods, way: _Scaled | _InLogs, stretch: int | None
+) -> FactorialPosteriors | None:
+    """Return the posteriors, computed in a way; None: there is no path, or the precision is not enough."""
+    frames, last = len(logs.audio), len(logs.audio) - 1
+    stretch = stretch or kept_frames(frames, way.frame_bytes)
+    starts, heads, log_likelihood = range(0, frames, stretch), list[Array | None](), 0.0
+    forward: list[tuple[Array, Array]] = []
+    for start in starts:
+        heads.append(forward[-1][0] if forward else None)
+        forward.clear()  # its memory is needed
+        log_likelihood += way.forward(start, min(start + stretch, frames), heads[-1], forward)
+        if log_likelihood == -math.inf:
+            return None
+    posteriors = [np.zeros(part.shape) for part in (logs.audio, logs.visual, logs.pair)]
+    entered = [np.zeros(loop.enter.shape) for loop in loops]
+    backward = leaving = forward[-1][0]
+    for start, head in zip(reversed(starts), reversed(heads), strict=True):
+        if start != starts[-1]:
+            forward.clear()
+            way.forward(start, start + stretch, head, forward)
+        for t in range(start + len(forward) - 1, start - 1, -1):
+            before = forward[t - start][0]
+            step = way.end(before) if t == last else way.back(before, backward, leaving, t)
+            if not step.frame.log_overlap > way.least_log_overlap:
+                return None
+            if t == last:
+                log_likelihood += step.frame.log_overlap
+            backward, leaving = step.backward, forward[t - start][1]
+            for part, values in zip(posteriors, step.frame[:3], strict=True):
+                part[t] = values
+            entered = [part + more for part, more in zip(entered, step[2:], strict=True)]
+    counts = [_counted(*parts) for parts in zip(loops, posteriors[:2], entered, strict=True)]
+    for part in (*posteriors, *counts[0], *counts[1]):
+        part[part < LEAST_POSTERIOR] = 0
+    of_audio, of_visual, of_pairs = posteriors
+    return FactorialPosteriors(of_audio, of_visual, of_pairs, counts[0], counts[1], log_likelihood)
+
+
+class _Scaled:
+    """Steps of forward–backward with scaled probabilities, in one precision."""
+
+    def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, kind: np.dtype[Any]) -> None:
+        self.logs, self.kind, self.whole = logs, kind, WHOLE[kind]
+        self.initial, self.final = log_ends(audio, visual)
+        self.audio, self.visual = _moves(audio, kind), _moves(visual, kind)
+        self.start, self.densities = 0, list[FrameDensity]()
+        # In a frame, what was raised is 1 / whole² at most for each joint state, forward and backward, times the sum of
+        # all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
+        raised = 2 * len(logs.audio) * 9 * self.initial.size / self.whole**2
+        self.least_log_overlap = math.log(raised / OFF[kind])
+
+    @property
+    def frame_bytes(self) -> int:
+        return self.initial.size * self.kind.itemsize
+
+    def forward(self, start: int, stop: int, before: Array | None, found: list[tuple[Array, Array]]) -> float:
+        """Append the forward probabilities of some frames, and those of leaving the last visual states after the audio
+        loop's transition only [shape=(Na, Uv)]; return the log of the product of their scales.
+        """
+        self.start, self.densities = start, self.logs.densities(start, stop)
+        log_total, units, count = 0.0, len(self.audio[2]), len(self.visual[2])
+        for density in self.densities:
+            if before is None:
+                before, log = self._shares(self.initial + self.logs.joint(0))
+                found.append((before, before[:, :count]))
+                log_total += log
+                continue
+            entering, after = self.audio[2].T @ before[-units:], np.empty_like(before)
+            moved = _moved_to_last(before, *self.audio[:2], entering, count)
+            total = _forward(
+                before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
+                density.audio, density.visual, density.pair, density.pair_audio, density.pair_visual,
+                LEAST_PRODUCT[self.kind], self.whole, after,
+            )  # fmt: skip
+            if not total > LEAST_TOTAL[self.kind]:
+                return -math.inf
+            log_total += math.log(total) + density.best
+            found.append((after, moved))
+            before = after
+        return log_total
+
+    def end(self, before: Array) -> _StepBack:
+        final = np.exp(self.final)
+        frame = _frame(np.multiply(before, final, dtype=np.float64), self.logs.pairs, self.whole)
+        backward, log = self._shares(self.final + self.logs.joint(len(self.logs.audio) - 1))
+        return _StepBack(frame if log > -math.inf else frame._replace(log_overlap=-math.inf), backward, *_NONE)
+
+    def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
+        """Return the result of a step back to frame ``t``.
+
+        before   : forward probabilities of frame ``t``
+        backward : backward probabilities times densities of the frame after it
+        leaving  : of the frame after it
+        """
+        density, units, first = self.densities[t - self.start], len(self.audio[2]), backward[:, : len(self.visual[2])]
+        moved = _moved_back(backward, *self.visual[:2], first @ self.visual[2].T)
+        after, sums = np.empty_like(before), [np.empty(len(part)) for part in density[:3]]
+        total = _backward(
+            before, moved, *self.audio[:2], self.audio[2] @ moved[:units], density.audio, density.visual, density.pair,
+            density.pair_audio, density.pair_visual,
+            LEAST_PRODUCT[self.kind], self.whole, after, *sums,
+        )  # fmt: skip
+        met = float(sums[0].sum())
+        enough = met > 0 and total > LEAST_TOTAL[self.kind]
+        scale = np.float64(1 / met if enough else 0.0)
+        log_overlap = math.log(met) - 2 * math.log(self.whole) if enough else -math.inf
+        frame = _Frame(sums[0] * scale, sums[1] * scale, sums[2] * scale, log_overlap)
+        return _StepBack(frame, after, scale * (before[-units:] @ moved[:units].T), scale * (leaving.T @ first))
+
+    def _shares(self, joint: Double) -> tuple[Array, float]:
+        """Return probabilities, scaled, and the log of their sum before, from log probabilities."""
+        best = float(joint.max())
+        if not math.isfinite(best):
+            return np.zeros(joint.shape, self.kind), -math.inf
+        joint = np.exp(joint - best)
+        total = float(joint.sum())
+        shares = np.maximum(joint * (self.whole / total), 1 / self.whole).astype(self.kind)
+        return shares, math.log(total) + best
+
+
+def _moves(loop: Loop, kind: np.dtype[Any]) -> tuple[Array, Array, Array]:
+    """Return probabilities of staying, of going on, and from each unit's last state to each unit's first."""
+    parts = loop.stay.ravel(), loop.onward.ravel(), loop.leave[:, None] * loop.enter
+    stay, onward, leaving = (np.ascontiguousarray(part, kind) for part in parts)
+    return stay, onward, leaving
+
+
+class _InLogs:
+    """The steps of ``_Scaled`` in logarithms: those of backward probabilities and densities, too."""
+
+    least_log_overlap = -math.inf
+
+    def __init__(self, audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> None:
+        self.audio, self.visual, self.logs = LogTransitions.of(audio), LogTransitions.of(visual), logs
+        self.initial, self.final = log_ends(audio, visual)
+
+    @property
+    def frame_bytes(self) -> int:
+        return self.initial.nbytes
+
+    def forward(self, start: int, stop: int, before: Array | None, found: list[tuple[Array, Array]]) -> float:
+        for t in range(start, stop):
+            prior, leaving = self.initial, self.initial
+            if before is not None:
+                moved = self.audio.forward(before)
+                prior, leaving = self.visual.forward(moved.T).T, moved[:, -len(self.visual.leaving) :]
+            before = prior + self.logs.joint(t)
+            found.append((before, leaving))
+        return 0.0
+
+    def end(self, before: Array) -> _StepBack:
+        return _StepBack(
+            self._frame(before + self.final), self.final + self.logs.joint(len(self.logs.audio) - 1), *_NONE
+        )
+
+    def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
+        units_audio, units_visual = len(self.audio.leaving), len(self.visual.leaving)
+        moved = self.visual.backward(backward.T).T
+        beta = self.audio.backward(moved)
+        frame = self._frame(before + beta)
+        audio_entered = np.logaddexp.reduce(before[-units_audio:, None] + moved[None, :units_audio], axis=2)
+        visual_entered = np.logaddexp.reduce(leaving[:, :, None] + backward[:, None, :units_visual], axis=0)
+        entered = (
+            np.exp(np.minimum(part - frame.log_overlap, LARGEST_EXPONENT)) for part in (audio_entered, visual_entered)
+        )
+        return _StepBack(frame, beta + self.logs.joint(t), *entered)
+
+    def _frame(self, joint: Double) -> _Frame:
+        log_overlap = float(np.logaddexp.reduce(joint, axis=None))
+        joint = np.exp(joint - log_overlap) if math.isfinite(log_overlap) else np.zeros_like(joint)
+        return _frame(joint, self.logs.pairs, 1.0)._replace(log_overlap=log_overlap)
+
+
+_NONE = np.zeros(()), np.zeros(())
+"""Expected transitions out of the last frame."""
+
+
+def _frame(joint: Double, pairs: Index, whole: float) -> _Frame:
+    """Return the posteriors of a frame from products of its forward and backward probabilities, of sum ``whole``."""
+    total = float(joint.sum())
+    joint = joint / (total if total > 0 else 1)
+    log_overlap = math.log(total / whole) if total > 0 else -math.inf
+    return _Frame(joint.sum(axis=1), joint.sum(axis=0), joint[tuple(pairs.T)], log_overlap)
+
+
+def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
+    """Return expected counts, from posteriors and from how often each unit was entered after each.
+
+    A state is left as often as it is entered, but for the first and last frame; it is kept in the other frames.
+    """
+    enter = entered * (loop.leave[:, None] * loop.enter)
+    frames = posterior.reshape(-1, *loop.stay.shape)
+    gained = frames[-1] - frames[0]
+    after = np.cumsum(gained[::-1], axis=0)[::-1] - gained
+    left = np.maximum(enter.sum(axis=1) + after, 0)
+    stay = np.maximum(frames[:-1].sum(axis=0) - left, 0)
+    return LoopCounts(stay, left[:-1], enter, frames[0])
+
+
+def _least_probability(loop: Loop) -> float:
+    """Return the least probability of a loop that is not 0."""
+    parts = (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
+    return min(float(part.min(where=part > 0, initial=1.0)) for part in parts)
+
+
+def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors:
+    """Return the result for a recording without a path."""
+    counts = [
+        LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
+        for loop in (audio, visual)
+    ]
+    in_audio, in_visual, in_pairs = (np.zeros(log.shape) for log in (logs.audio, logs.visual, logs.pair))
+    return FactorialPosteriors(in_audio, in_visual, in_pairs, counts[0], counts[1], -np.inf)
+
+
+@compiled_to_rounding
+def _moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
+    """Return the last ``count`` columns of joint probabilities, moved one frame on along axis 0.
+
+    entering : [shape=(U, M)], probabilities of entering the first states
+    """
+    last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
+    after = np.empty((len(before), count), before.dtype)
+    for i in range(len(before)):
+        _move(last, stay, onward, into_last, i, after[i])
+    return after
+
+
+@compiled_to_rounding
+def _moved_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
+    """Return joint backward probabilities, moved one frame back along axis 1.
+
+    left : [shape=(N, U)], those of leaving the last states
+    """
+    before, units = np.empty_like(after), left.shape[1]
+    inner = after.shape[1] - units
+    for i in range(len(after)):
+        into, out = before[i], after[i]
+        next_states = out[units:]
+        for j in range(inner):
+            into[j] = stay[j] * out[j] + onward[j] * next_states[j]
+        last, out_last, stay_last, left_last = into[inner:], out[inner:], stay[inner:], left[i]
+        for j in range(units):
+            last[j] = stay_last[j] * out_last[j] + left_last[j]
+    return before
+
+
+@compiled_to_rounding
+def _forward(
+    before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
+    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, least: float, whole: float,
+    after: Array,
+) -> float:  # fmt: skip
+    """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before
+    as a share of the whole.
+
+    entering_0, entering_1 : [shapes=(U, M), (N, U)], probabilities of entering the first states
+    pair, pair_0, pair_1 : the densities of pairs, and the two states of each, sorted by the first
+    least : smaller products are set to 0
+    """
+    moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
+    total, p = np.float64(0), 0
+    for i in range(len(before)):
+        _move(before, stay_0, onward_0, entering_0, i, moved)
+        _move_along(moved, stay_1, onward_1, entering_1[i], prior)
+        _emit(prior, density_0[i], density_1, least, after[i])
+        p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, least, after[i])
+        total += _sum(after[i])
+    _share(after, total, whole)
+    return total / whole
+
+
+@compiled_to_rounding
+def _backward(
+    before: Array, moved: Array, stay: Array, onward: Array, left: Array,
+    density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, least: float, whole: float,
+    after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
+) -> float:  # fmt: skip
+    """Fill in backward probabilities times densities, normalised, and posteriors, not normalised; return the sum of the
+    former before, as a share of the whole.
+
+    before : forward probabilities
+    moved  : backward probabilities that were moved back along axis 1; they are moved along axis 0 here
+    left   : [shape=(U, M)], those of leaving the last states
+    """
+    beta = np.empty(before.shape[1], before.dtype)
+    units, total, p = len(left), np.float64(0), 0
+    inner = len(before) - units
+    posterior_1[:] = 0
+    for i in range(len(before)):
+        if i < inner:
+            _combine(moved[i], stay[i], moved[i + units], onward[i], beta)
+        else:
+            _combine(moved[i], stay[i], left[i - inner], 1.0, beta)
+        posterior_0[i] = _meet(before[i], beta, posterior_1)
+        q = p
+        while q < len(pair_0) and pair_0[q] == i:
+            posterior_pair[q] = np.float64(before[i, pair_1[q]]) * beta[pair_1[q]]
+            q += 1
+        _emit(beta, density_0[i], density_1, least, after[i])
+        p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, least, after[i])
+        total += _sum(after[i])
+    _share(after, total, whole)
+    return total / whole
+
+
+@compiled_to_rounding
+def _combine(one: Array, weight: float, other: Array, other_weight: float, into: Array) -> None:
+    """Fill in the weighted sum of two rows."""
+    first, second = into.dtype.type(weight), into.dtype.type(other_weight)
+    for j in range(len(into)):
+        into[j] = first * one[j] + second * other[j]
+
+
+@compiled_to_rounding
+def _move(before: Array, stay: Array, onward: Array, entering: Array, i: int, into: Array) -> None:
+    """Fill in row i, one frame on along axis 0."""
+    units = len(entering)
+    if i < units:
+        _combine(before[i], stay[i], entering[i], 1.0, into)
+    else:
+        _combine(before[i], stay[i], before[i - units], onward[i - units], into)
+
+
+@compiled_to_rounding
+def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into: Array) -> None:
+    """Fill in a row, one frame on along itself."""
+    units = len(entering)
+    for j in range(units):
+        into[j] = stay[j] * before[j] + entering[j]
+    rest, before_rest, weight = into[units:], before[units:], stay[units:]
+    for j in range(len(onward)):
+        rest[j] = weight[j] * before_rest[j] + onward[j] * before[j]
+
+
+@compiled_to_rounding
+def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -> None:
+    """Fill in a row times the densities of both axes; ``own`` is that of the row."""
+    for j in range(len(prior)):
+        partly = np.float64(prior[j]) * own
+        product = (partly if partly > least else 0.0) * density[j]
+        into[j] = product if product > least else 0.0
+
+
+@compiled_to_rounding
+def _emit_pairs(
+    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, least: float, into: Array
+) -> int:
+    """Multiply the pairs of row i, from pair p on, by their own densities; return the first pair of the next row."""
+    while p < len(pair_0) and pair_0[p] == i:
+        product = np.float64(prior[pair_1[p]]) * pair[p]
+        into[pair_1[p]] = product if product > least else 0.0
+        p += 1
+    return p
+
+
+@compiled_to_rounding
+def _sum(row: Array) -> float:
+    total = np.float64(0)
+    for j in range(len(row)):
+        total += row[j]
+    return total
+
+
+@compiled_to_rounding
+def _meet(one: Array, other: Array, sums: Array) -> float:
+    """Add the products of two rows to ``sums``, and return their sum."""
+    total = np.float64(0)
+    for j in range(len(one)):
+        product = np.float64(one[j]) * other[j]
+        sums[j] += product
+        total += product
+    return total
+
+
+@compiled_to_rounding
+def _share(joint: Array, total: float, whole: float) -> None:
+    """Make joint probabilities sum to ``whole``; raise the least of them to 1 / ``whole``."""
+    flat = joint.reshape(joint.size)
+    scale, least = whole / total if total > 0 else 0.0, 1 / whole
+    for j in range(len(flat)):
+        share = flat[j] * scale
+        flat[j] = share if share > least else least

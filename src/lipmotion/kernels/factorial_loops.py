@@ -1,0 +1,270 @@
+"""Factorial hidden Markov models: two loops of units with independent transitions, joint densities, best paths.
+
+States of a loop are numbered state-major: index = state · U + unit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.compiler import compiled
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Logs = NDArray[np.floating[Any]]
+ROOM_BYTES = 2**27
+"""Memory for what is stored of many frames at once: of as many as fit in, but of √T at least."""
+
+
+class Loop(NamedTuple):
+    """The probabilities of a loop of U units in any order, each of n states from left to right without skips.
+
+    stay    : [shape=(n, U)], of staying in each state
+    onward  : [shape=(n - 1, U)], of going to the next state
+    leave   : [shape=(U,)], of leaving the last state
+    enter   : [shape=(U, U)], of each next unit (column) after the unit that is left (row)
+    initial : [shape=(n, U)], of beginning in each state
+    final   : [shape=(n, U)], of ending in each state (all ones: anywhere)
+    """
+
+    stay: Array
+    onward: Array
+    leave: Array
+    enter: Array
+    initial: Array
+    final: Array
+
+
+class LoopCounts(NamedTuple):
+    """Expected counts of the transitions of a loop; shapes as in ``Loop``.
+
+    enter   : [shape=(U, U)], of each unit after each; the sum of a row is the count of that unit being left
+    initial : [shape=(n, U)], posteriors of the first frame
+    """
+
+    stay: Array
+    onward: Array
+    enter: Array
+    initial: Array
+
+
+class FactorialLogLikelihoods(NamedTuple):
+    """Log densities of one recording, finite or -inf, all of one precision.
+
+    audio, visual : [shapes=(T, Na), (T, Nv)], whose sums are the log densities of joint states, except for pairs
+    pair          : [shape=(T, P)], the log densities of pairs, joint states that have densities of their own
+    pairs         : [shape=(P, 2)], the audio and visual state of each pair, each pair once
+    """
+
+    audio: Logs
+    visual: Logs
+    pair: Logs
+    pairs: Index
+
+    @classmethod
+    def of(cls, audio: Logs, visual: Logs) -> FactorialLogLikelihoods:
+        """Return the log densities of loops without pairs."""
+        return cls(audio, visual, np.empty((len(audio), 0), audio.dtype), np.empty((0, 2), np.intp))
+
+    def joint(self, t: int) -> Array:
+        """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
+        joint = np.add.outer(self.audio[t], self.visual[t], dtype=np.float64)
+        joint[tuple(self.pairs.T)] = self.pair[t]
+        return joint
+
+    def densities(self, start: int, stop: int) -> list[FrameDensity]:
+        """Return the densities of the frames from ``start`` up to ``stop``."""
+        logs = self.audio[start:stop], self.visual[start:stop], self.pair[start:stop]
+        tops = [log.max(axis=1, initial=-np.inf).astype(np.float64) for log in logs]
+        top_audio, top_visual = (np.where(np.isfinite(top), top, 0) for top in tops[:2])
+        best = np.maximum(top_audio + top_visual, tops[2])
+        audio, visual, pair = (
+            np.exp(log - top[:, None]) for log, top in zip(logs, (top_audio, best - top_audio, best), strict=True)
+        )
+        pair_audio, pair_visual = self.pairs.T
+        return [
+            FrameDensity(audio[t], visual[t], pair[t], pair_audio, pair_visual, float(best[t]))
+            for t in range(stop - start)
+        ]
+
+
+class FrameDensity(NamedTuple):
+    """Densities of a frame, relative to an upper bound.
+
+    audio, visual : [shapes=(Na,), (Nv,)], whose products are the densities of joint states, except for pairs
+    pair          : [shape=(P,)], the densities of pairs
+    pair_audio, pair_visual : [shape=(P,)], the states of pairs
+    best          : the logarithm of the bound
+    """
+
+    audio: Array
+    visual: Array
+    pair: Array
+    pair_audio: Index
+    pair_visual: Index
+    best: float
+
+
+class LogTransitions(NamedTuple):
+    """Log transition probabilities of a loop.
+
+    stay    : [shape=(N,)]
+    onward  : [shape=(N - U,)], from state i to i + U
+    leaving : [shape=(U, U)], from each unit's last state to each unit's first
+    """
+
+    stay: Array
+    onward: Array
+    leaving: Array
+
+    @classmethod
+    def of(cls, loop: Loop) -> LogTransitions:
+        """Return the transitions of a loop."""
+        with np.errstate(divide="ignore"):
+            leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)
+            return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving)
+
+    def forward(self, joint: Array) -> Array:
+        """Return log probabilities one frame on, along axis 0 [shape=(N, M)]."""
+        units = len(self.leaving)
+        after = joint + self.stay[:, None]
+        after[units:] = np.logaddexp(after[units:], joint[:-units] + self.onward[:, None])
+        entering = np.logaddexp.reduce(joint[-units:, None] + self.leaving[:, :, None], axis=0)
+        after[:units] = np.logaddexp(after[:units], entering)
+        return after
+
+    def backward(self, joint: Array) -> Array:
+        """Return log backward probabilities one frame back, along axis 0 [shape=(N, M)]."""
+        units = len(self.leaving)
+        before = joint + self.stay[:, None]
+        before[:-units] = np.logaddexp(before[:-units], joint[units:] + self.onward[:, None])
+        left = np.logaddexp.reduce(joint[None, :units] + self.leaving[:, :, None], axis=1)
+        before[-units:] = np.logaddexp(before[-units:], left)
+        return before
+
+    def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
+        """Return the best scores one frame on, along axis 0, and the decisions.
+
+        A decision is U for staying, U + 1 for the next state, else the unit that was left.
+        """
+        units = len(self.leaving)
+        after = score + self.stay[:, None]
+        decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
+        moved = score[: len(self.onward)] + self.onward[:, None]
+        _take_better(after[units:], decision[units:], moved, units + 1)
+        last, first = score[len(score) - units :], (after[:units], decision[:units])
+        _take_best_entering(last, self.leaving, *first)
+        return after, decision
+
+    def previous(self, state: int, decision: int) -> int:
+        """Return the state one frame before, given the decision."""
+        units = len(self.leaving)
+        if decision < units:
+            return len(self.stay) - units + decision
+        return state - units if decision > units else state
+
+
+def kept_frames(frames: int, frame_bytes: int) -> int:
+    """Return the number of frames that are stored at once, of ``frame_bytes`` each."""
+    return max(math.isqrt(max(frames - 1, 0)) + 1, min(frames, ROOM_BYTES // frame_bytes))
+
+
+def log_ends(audio: Loop, visual: Loop) -> tuple[Array, Array]:
+    """Return the log probabilities of beginning and of ending in each joint state [shapes=(Na, Nv)]."""
+    with np.errstate(divide="ignore"):
+        parts = ((np.log(loop.initial.ravel()), np.log(loop.final.ravel())) for loop in (audio, visual))
+        initial, final = (np.add.outer(*ends) for ends in zip(*parts, strict=True))
+    return initial, final
+
+
+def factorial_best_path(
+    audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, stretch: int | None = None
+) -> tuple[Index, Index, float]:
+    """Return the most probable states of both loops [shapes=(T,)], and the log probability of path and recording.
+
+    logs    : log densities of the recording
+    stretch : frames whose decisions are stored at once; those of the others are computed twice; None: as
+        ``factorial_posteriors``
+    Where there is no path: states 0, and -inf.  Of equally probable paths, any one.
+    Source: the Viterbi recursion, along one loop's axis and then along the other's.
+    Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
+    """
+    frames = len(logs.audio)
+    stretch = stretch or kept_frames(frames, 2 * logs.audio.shape[1] * logs.visual.shape[1])
+    search = _FactorialSearch(LogTransitions.of(audio), LogTransitions.of(visual), logs)
+    initial, final = log_ends(audio, visual)
+    score = initial + logs.joint(0)
+    befores, decisions = [], list[_Decisions]()
+    for start in range(1, frames, stretch):
+        befores.append((start, score))
+        score, decisions = search.through(start, min(start + stretch, frames), score)
+    path = np.zeros((frames, 2), np.intp)
+    score = score + final
+    best = float(score.max())
+    if best == -np.inf:
+        return path[:, 0], path[:, 1], best
+    path[-1] = np.unravel_index(int(score.argmax()), score.shape)
+    for start, before in reversed(befores):
+        if start != befores[-1][0]:
+            _, decisions = search.through(start, min(start + stretch, frames), before)
+        for t in range(start + len(decisions) - 1, start - 1, -1):
+            path[t - 1] = search.previous(decisions[t - start], *path[t])
+    return path[:, 0], path[:, 1], best
+
+
+_Decisions = tuple[NDArray[Any], NDArray[Any]]
+"""For each loop, the decision at each joint state [shape=(N, M)], the loop's own states along axis 0."""
+
+
+def _take_better(score: Array, decision: NDArray[Any], other: Array, number: int) -> None:
+    """Replace scores by greater ones, and their decisions by a number."""
+    np.copyto(decision, number, where=other > score)
+    np.maximum(score, other, out=score)
+
+
+class _FactorialSearch(NamedTuple):
+    """The search in both loops for one recording."""
+
+    audio: LogTransitions
+    visual: LogTransitions
+    logs: FactorialLogLikelihoods
+
+    def through(self, start: int, stop: int, score: Array) -> tuple[Array, list[_Decisions]]:
+        """Return the scores after the frames of a stretch, and the decisions of each frame."""
+        decisions = []
+        for t in range(start, stop):
+            score, by_audio = self.audio.best_forward(score)
+            turned, by_visual = self.visual.best_forward(np.ascontiguousarray(score.T))
+            score = turned.T + self.logs.joint(t)
+            decisions.append((by_audio, by_visual))
+        return score, decisions
+
+    def previous(self, decisions: _Decisions, audio: int, visual: int) -> tuple[int, int]:
+        """Return both states one frame before; the decision of the visual loop was the later one."""
+        by_audio, by_visual = decisions
+        visual = self.visual.previous(visual, int(by_visual[visual, audio]))
+        return self.audio.previous(audio, int(by_audio[audio, visual])), visual
+
+
+@compiled
+def _take_best_entering(last: Array, leaving: Array, score: Array, decision: Array) -> None:
+    """Replace the log scores of first states by those of the best transition from a last state, where that is greater,
+    and their decisions by the unit that is left.
+
+    last     : log scores of the last states [shape=(U, M)]
+    leaving  : log probabilities of the transitions from them to the first states [shape=(U, U)]
+    score, decision : of the first states [shapes=(U, M)]
+    """
+    for i in range(len(score)):
+        best, unit = score[i], decision[i]
+        for u in range(len(last)):
+            before, weight = last[u], leaving[u, i]
+            for j in range(len(best)):
+                other = before[j] + weight
+                is_better = other > best[j]
+                best[j] = other if is_better else best[j]
+                unit[j] = u if is_better else unit[j]

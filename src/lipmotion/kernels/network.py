@@ -1,0 +1,555 @@
+"""State posteriors and expected arc counts of networks of states, by forward–backward with scaled probabilities.
+
+All is in one precision, single or double, but for products and sums that are followed by a division. Probabilities
+under a least one are raised to it, never set to 0: so no product is denormal, which would be many times slower, and
+forward probabilities are upper bounds.
+
+Let N be the sum over the states of a frame of forward times backward probabilities, divided by the likelihood that was
+computed: in the last frame it is 1. From each frame to the one before, and from the first frame to the beginning (whose
+forward probabilities are the initial ones), N changes by
+
+    + what was raised backward, times the forward probabilities: negligible, as these sum to ``MOST_SCALE`` at most
+    − what was raised forward, times the backward probabilities
+    − what was lost backward (where blocks are multiplied, or an arc underflows), times the forward probabilities
+
+So if no N is under 1 − δ, the last two sum to δ at most, over all frames. They bound what is wrong: the likelihood is
+too great by a share of δ at most, and the errors of the posteriors of a frame sum to 3 δ at most, but for rounding. A
+recording with a smaller N is left to the caller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arc_layout, arc_weights
+from lipmotion.kernels.compiler import compiled_to_rounding
+from lipmotion.kernels.forward_backward import log_forward_backward
+
+Index = NDArray[np.intp]
+Unsigned = NDArray[np.uintp]
+"""Unsigned, as loops over indices that may be negative are not vectorised."""
+Array = NDArray[Any]
+"""float32 or float64."""
+CHUNK = 16
+"""Runs are padded to multiples of this, so that vectorised loops over them have no remainder."""
+FRAMES_AT_ONCE = 256
+"""Frames whose roots are taken at once: they stay in the cache."""
+LOWEST_ROOT = -80.0
+"""Least logarithm of a density's eighth root: exp of less is denormal in single precision, which is slow."""
+LEAST_ROOT = 1.9e-35
+"""exp(-80): densities up to its eighth power are set to 0."""
+LEAST_JOINT = 1e-4
+"""Least root of a frame's best joint density, relative to the product of the chains' best ones: where it is less, joint
+densities are computed from sums of logarithms, as factors under e^LOWEST_ROOT may count."""
+LIMITS = {np.dtype(np.float32): (1e-24, 1e-12, 1e-4), np.dtype(np.float64): (1e-140, 1e-100, 1e-10)}
+"""By precision: ``least``, ``least_scale`` and ``off`` of ``_forward_backward``."""
+LEAST_POSTERIOR = 1e-12
+"""Smaller posteriors are set to 0."""
+SHARE = 1e-6
+"""Shares of a block's sources are set to 0 under this times the least probability: less than what is raised."""
+MOST_SCALE = 1e6
+"""Greatest scale of a frame. With a smaller one no share of forward probabilities is set to 0."""
+FRAMES_SUMMED = 256
+"""Frames that are summed in the kernel's precision, before they are added in double precision."""
+
+
+class NetworkPosteriors(NamedTuple):
+    """Posteriors of recordings in a network.
+
+    posterior      : [shape=(T, S)], of the states by place (``kernels.arcs``), all recordings concatenated; those
+        under 1e-12 may be 0
+    counts         : [shape=(E,)], expected number of times that each arc is followed, over all recordings
+    log_likelihood : [shape=(U,)], of each recording; -inf where there is no path: then its posteriors are 0
+
+    Guaranteed but for rounding, however improbable a path is at first: a likelihood is right to a share of δ, and the
+    errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most: δ is 1e-4
+    for log densities in single precision, 1e-10 for those in double precision (``LIMITS``).
+    """
+
+    posterior: NDArray[Any]
+    counts: Array
+    log_likelihood: Array
+
+
+class Chunks(NamedTuple):
+    """Runs of arcs, each padded to a multiple of ``CHUNK``.
+
+    runs   : [shape=(R, 4)], first target's place, first source's place, padded length, position in ``weight``
+    weight : [shape=(M,)], the probabilities of arcs, 0 for padding
+    arcs   : [shape=(N,)], the positions in ``weight`` of the arcs that are no padding
+    """
+
+    runs: NDArray[np.uintp]
+    weight: Array
+    arcs: Index
+
+    @classmethod
+    def of(cls, layout: ArcLayout, weights: ArcWeights) -> Chunks:
+        """Return the padded runs of a layout."""
+        runs = layout.runs.copy()
+        runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
+        runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
+        weight = np.zeros(runs[:, 2].sum())
+        arcs = np.arange(len(weights.runs)) + np.repeat(runs[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
+        weight[arcs] = weights.runs
+        return cls(runs.astype(np.uintp), weight, arcs)
+
+
+class ForwardBackwardNetwork(NamedTuple):
+    """A network prepared for forward–backward.
+
+    arc_from, arc_log, arc_start, log_initial, log_final : as in ``kernels.paths.NetworkArrays``
+    layout     : of the arcs
+    best_arc   : logarithm of the greatest probability of an arc
+    weights    : the probabilities of arcs relative to that, in the layout
+    transposed : those of blocks, targets as rows, sources as columns
+    chunks     : those of runs
+    """
+
+    arc_from: Index
+    arc_log: Array
+    arc_start: Index
+    log_initial: Array
+    log_final: Array
+    layout: ArcLayout
+    best_arc: float
+    weights: ArcWeights
+    transposed: Array
+    chunks: Chunks
+
+    @classmethod
+    def of(
+        cls,
+        arc_from: Index,
+        arc_log: NDArray[np.floating[Any]],
+        arc_start: Index,
+        log_initial: NDArray[np.floating[Any]],
+        log_final: NDArray[np.floating[Any]],
+    ) -> ForwardBackwardNetwork:
+        """Return a network prepared for forward–backward; parameters as in ``kernels.paths.NetworkArrays``."""
+        layout = arc_layout(arc_from, arc_start)
+        logs, initial, final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
+        return cls(arc_from, logs, arc_start, initial, final, layout, *_weighted(layout, logs))
+
+    def with_arcs(
+        self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
+    ) -> ForwardBackwardNetwork:
+        """Return the network with other probabilities of arcs [shape=(E,)] and of beginnings [shape=(S,)]."""
+        logs, initial = arc_log.astype(np.float64), log_initial.astype(np.float64)
+        best_arc, weights, transposed, chunks = _weighted(self.layout, logs)
+        changed = self._replace(best_arc=best_arc, weights=weights, transposed=transposed, chunks=chunks)
+        return changed._replace(arc_log=logs, log_initial=initial)
+
+    def posteriors(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> NetworkPosteriors:
+        """Return the posteriors of recordings, which are concatenated in ``log_emission``.
+
+        log_emission : [shape=(T, G)], finite or -inf; the posteriors have the same precision
+        columns      : [shape=(S,)], the density of the state at each place
+        frames       : [shape=(U,)], number of frames of each recording
+        Cost: as ``product_posteriors``.
+        """
+        return self.product_posteriors([log_emission], [columns], frames)
+
+    def product_posteriors(
+        self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
+    ) -> NetworkPosteriors:
+        """Return the posteriors of recordings whose densities are products of one factor from each chain.
+
+        log_emissions : one or more [shape=(T, G_c)], all of one precision, finite or -inf; the log density of the state
+            at place s is the sum over chains of ``log_emissions[c][:, columns[c][s]]``
+        columns       : of each chain [shape=(S,)]
+        frames        : [shape=(U,)], number of frames of each recording
+        What is computed is ``log_forward_backward``: by ``_forward_backward`` in the precision of ``log_emissions``;
+        for recordings of which that would lose what counts, in double precision, and at last in logarithms by NumPy.
+        Cost: O(T·E), and exponentials of the chains' densities; in double precision twice, in logarithms some fifty
+        times as slow.
+        """
+        precision = log_emissions[0].dtype
+        expected = self._scaled(log_emissions, columns, frames)
+        edges = np.append(0, np.cumsum(frames))
+        for u in np.flatnonzero(np.isneginf(expected.log_likelihood)):
+            of_recording = slice(edges[u], edges[u + 1])
+            logs = [log[of_recording].astype(np.float64) for log in log_emissions]
+            again = None
+            if precision == np.float32:
+                again = self._scaled(logs, columns, frames[u : u + 1])
+            if again is None or np.isneginf(again.log_likelihood[0]):
+                again = self._in_logs(_joint(logs, columns))
+            expected.posterior[of_recording], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
+            expected.counts[:] += again.counts
+        return expected
+
+    def _scaled(
+        self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
+    ) -> NetworkPosteriors:
+        """Return the posteriors of recordings by scaled probabilities, in the precision of ``log_emissions``.
+
+        A recording for which that is not enough has a log likelihood of -inf, no counts, and no posteriors.
+        """
+        root, best = _products(log_emissions, columns)
+        layout, edges = self.layout, np.append(0, np.cumsum(frames))
+        (initial, first), (final, last) = (
+            _probabilities(log[layout.order]) for log in (self.log_initial, self.log_final)
+        )
+        run_counts, leaving, entering, scales, ends = _forward_backward(
+            root, edges, initial, final, self.chunks.runs, self.chunks.weight.astype(root.dtype),
+            layout.blocks.astype(np.uintp), layout.block_sources.astype(np.uintp),
+            self.weights.blocks.astype(root.dtype), self.transposed.astype(root.dtype), *LIMITS[root.dtype],
+        )  # fmt: skip
+        counts = np.zeros(len(self.arc_log))
+        counts[layout.run_arcs] = run_counts[self.chunks.arcs] * self.weights.runs
+        _count_blocks(counts, layout, self.weights, leaving, entering)
+        with np.errstate(divide="ignore"):
+            log_likelihood = np.add.reduceat(np.log(scales) + best, edges[:-1]) + (np.log(ends) + first + last)
+        return NetworkPosteriors(root, counts, log_likelihood + (frames - 1) * self.best_arc)
+
+    def _in_logs(self, log_density: Array) -> NetworkPosteriors:
+        """Return the posteriors of one recording by NumPy, in logarithms, without underflow.
+
+        log_density : [shape=(T, S)], by place
+        """
+        arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
+        log_emission = log_density[:, self.layout.place]
+        log_posterior, counts, log_likelihood = log_forward_backward(
+            self.log_initial, log_emission, self.arc_from, arc_to, self.arc_log, self.log_final
+        )
+        return NetworkPosteriors(np.exp(log_posterior)[:, self.layout.order], counts, np.array([log_likelihood]))
+
+
+def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the eighth roots of densities relative to the best of each frame, and the logarithm of the best.
+
+    Roots of densities above e⁻⁶⁴⁰ are normal numbers in single precision; lower densities are raised to that.
+    """
+    best = log_density.max(axis=1)
+    best[~np.isfinite(best)] = 0
+    root = log_density - best[:, None]
+    root *= root.dtype.type(1 / 8)
+    return np.exp(np.maximum(root, LOWEST_ROOT, out=root), out=root), best
+
+
+def _products(
+    log_densities: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index]
+) -> tuple[NDArray[Any], Array]:
+    """Return the roots of joint densities, by place, relative to each frame's best, and the logarithm of the best.
+
+    Densities lower than the best by some 560 nats may be 0; where all are, the logarithm is -inf.
+    """
+    firsts = np.cumsum([0, *(log.shape[1] for log in log_densities[:-1])])
+    shifted = (np.stack(columns) + firsts[:, None]).astype(np.uint32)
+    frames = len(log_densities[0])
+    joint, best = np.empty((frames, shifted.shape[1]), log_densities[0].dtype), np.empty(frames)
+    for start in range(0, frames, FRAMES_AT_ONCE):
+        of_recording = slice(start, start + FRAMES_AT_ONCE)
+        if len(log_densities) == 1:
+            joint[of_recording], best[of_recording] = _roots(log_densities[0][of_recording].take(columns[0], axis=1))
+            continue
+        roots, bests = zip(*(_roots(log[of_recording]) for log in log_densities), strict=True)
+        _joint_roots(np.hstack(roots), shifted, joint[of_recording], best[of_recording])
+        far = start + np.flatnonzero(best[of_recording] < LEAST_JOINT)
+        with np.errstate(divide="ignore"):
+            best[of_recording] = 8 * np.log(best[of_recording]) + np.sum(bests, axis=0, dtype=np.float64)
+        if len(far):
+            joint[far], best[far] = _roots(_joint([log[far] for log in log_densities], columns))
+    return joint, best
+
+
+def _joint(log_densities: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index]) -> Array:
+    """Return joint log densities [shape=(T, S)], by place."""
+    factors = (log[:, column].astype(np.float64) for log, column in zip(log_densities, columns, strict=True))
+    return np.asarray(sum(factors))
+
+
+def _probabilities(log: Array) -> tuple[Array, float]:
+    """Return probabilities relative to the greatest, and the logarithm of the greatest."""
+    best = float(log.max())
+    best = best if np.isfinite(best) else 0.0
+    return np.exp(log - best), best
+
+
+def _weighted(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
+    """Return the logarithm of the greatest probability of an arc, and the probabilities relative to that, in all forms
+    that the kernels take.
+
+    arc_log : logarithms of probabilities [shape=(E,)]
+    """
+    relative, best = _probabilities(arc_log)
+    weights = arc_weights(layout, relative, 0.0)
+    return best, weights, _transposed(layout, weights), Chunks.of(layout, weights)
+
+
+def _transposed(layout: ArcLayout, weights: ArcWeights) -> Array:
+    """Return the weights of all blocks, targets as rows, sources as columns, padded."""
+    transposed = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDING_ROWS) * PADDING_ROWS))]
+    for _, targets, first, sources in layout.blocks:
+        matrix = np.zeros((targets, transposed[0].shape[1]))
+        matrix[:, :sources] = weights.blocks[first : first + sources, :targets].T
+        transposed.append(matrix)
+    return np.concatenate(transposed)
+
+
+def _count_blocks(counts: Array, layout: ArcLayout, weights: ArcWeights, leaving: Array, entering: Array) -> None:
+    """Fill in the expected counts of the arcs of all blocks: one matrix product each."""
+    start = 0
+    for _, targets, first, sources in layout.blocks:
+        of_recording = slice(first, first + sources), slice(0, targets)
+        pairs = leaving[:, of_recording[0]].T @ entering[:, start : start + targets]
+        counts[layout.block_arcs[of_recording]] = pairs * weights.blocks[of_recording]
+        start += targets
+
+
+@compiled_to_rounding
+def _joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, best: Array) -> None:
+    """Fill in the roots of joint densities relative to the best of each frame, and the root of the best.
+
+    roots   : float32 or float64 [shape=(T, G)], of all chains side by side, each relative to the chain's best
+    columns : [shape=(C, S)], for each chain, the column of the state at each place
+    joint   : [shape=(T, S)], of the precision of ``roots``
+    best    : [shape=(T,)]; 0 where all are 0
+    """
+    states = columns.shape[1]
+    factor, product, tops = np.empty(roots.shape[1], roots.dtype), np.empty(states), np.empty(8)
+    for t in range(len(roots)):
+        for g in range(len(factor)):
+            factor[g] = roots[t, g] if roots[t, g] > LEAST_ROOT else 0.0
+        for s in range(states):
+            product[s] = factor[columns[0, s]]
+        for c in range(1, len(columns)):
+            column = columns[c]
+            for s in range(states):
+                product[s] *= factor[column[s]]
+        tops[:] = 0.0
+        for s in range(0, states - 7, 8):
+            for k in range(8):
+                tops[k] = max(tops[k], product[s + k])
+        for s in range(states // 8 * 8, states):
+            tops[0] = max(tops[0], product[s])
+        best[t] = tops.max()
+        scale = 1 / best[t] if best[t] > 0 else 0.0
+        row = joint[t]
+        for s in range(states):
+            root = product[s] * scale
+            row[s] = root if root > LEAST_ROOT else 0.0
+
+
+@compiled_to_rounding
+def _forward_backward(
+    emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
+    blocks: Unsigned, block_sources: Unsigned, block_weight: Array, transposed: Array,
+    least: float, least_scale: float, off: float,
+) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
+    """Return the expected counts of recordings in a network; ``emission`` is overwritten by the posteriors.
+
+    emission     : [shape=(T, S)], by place, all recordings concatenated: the eighth roots of densities relative to the
+                   best of each frame; its precision, which the weights have too, is that of the computation
+    edges        : [shape=(U + 1,)], the first frame of each recording, and T
+    initial, final : [shape=(S,)], in double precision, the greatest 1
+    runs, run_weight : of the layout and its weights (``kernels.arcs``), padded with arcs of weight 0; weights up to 1
+    blocks ... block_weight : of the layout and its weights
+    transposed   : the weights of blocks, targets as rows
+    least, least_scale, off : least probability, least scale of a frame, and largest error of N (see above)
+    Returns the expected count of each run arc divided by its weight [shape=(N,)]; the forward probabilities of all
+    blocks' sources and the backward ones of their targets in the next frame, whose products summed over time give the
+    counts of block arcs [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)]: the
+    product of all scales is the likelihood. For a recording that was left the scale of the end is 0, and ``emission``
+    has no meaning.
+    """
+    T, S = emission.shape
+    targets, longest = 0, 0
+    for b in range(len(blocks)):
+        targets += blocks[b, 1]
+    counts, scales, ends = np.zeros(len(run_weight)), np.ones(T), np.zeros(len(edges) - 1)
+    leaving, entering = np.zeros((T, len(block_sources))), np.zeros((T, targets))
+    for u in range(len(ends)):
+        longest = max(longest, edges[u + 1] - edges[u])
+    forward, few = np.empty((longest, S + CHUNK), emission.dtype), np.empty(len(counts), emission.dtype)
+    beta, onward = np.zeros(S + CHUNK, emission.dtype), np.zeros(S + CHUNK, emission.dtype)
+    of_recording = np.zeros(len(counts))
+    room = np.empty(max(block_weight.shape[1], transposed.shape[1]), emission.dtype)
+    share = np.empty(max(len(block_weight), len(transposed)), emission.dtype)
+    for u in range(len(ends)):
+        frames = slice(edges[u], edges[u + 1])
+        density, scale, leave, enter = emission[frames], scales[frames], leaving[frames], entering[frames]
+        alpha = forward[: len(density)]
+        valid = _forward(
+            alpha, density, scale, initial, runs, run_weight, blocks, block_sources, block_weight, leave, room, share,
+            least, least_scale,
+        )  # fmt: skip
+        end = (alpha[-1, :S] * final).sum() if valid else 0.0
+        if end > least_scale * scale[-1]:
+            beta[:S] = final / end
+            of_recording[:] = 0
+            valid = _backward(
+                alpha, density, scale, initial, beta, onward, runs, run_weight, of_recording, few,
+                blocks, block_sources, transposed, enter, room, share, least, off,
+            )  # fmt: skip
+            ends[u] = end / scale[-1] if valid else 0.0
+        if ends[u] > 0:
+            counts += of_recording
+        else:
+            leave[:] = 0
+    return counts, leaving, entering, scales, ends
+
+
+@compiled_to_rounding
+def _forward(
+    alpha: Array, density: Array, scale: Array, initial: Array, runs: Unsigned, run_weight: Array,
+    blocks: Unsigned, sources: Unsigned, block_weight: Array, leave: Array, room: Array, share: Array,
+    least: float, least_scale: float,
+) -> bool:  # fmt: skip
+    """Fill in forward probabilities, scaled by the sum of the frame before, and their sums; return whether valid."""
+    for t in range(len(alpha)):
+        alpha[t] = least
+        if t == 0:
+            alpha[t, : len(initial)] = initial
+        else:
+            _forward_runs(alpha, t, runs, run_weight)
+            _forward_blocks(alpha, t, blocks, sources, block_weight, leave, room, share, SHARE * least)
+        scale[t] = _emit(alpha, density, t, 1 / scale[t - 1] if t > 0 else 1.0, least)
+        if not least_scale < scale[t] < MOST_SCALE:
+            return False
+    return True
+
+
+@compiled_to_rounding
+def _backward(
+    alpha: Array, density: Array, scale: Array, initial: Array, beta: Array, onward: Array, runs: Unsigned,
+    run_weight: Array, counts: Array, few: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, enter: Array,
+    room: Array, share: Array, least: float, off: float,
+) -> bool:  # fmt: skip
+    """Replace densities by posteriors, and add to the counts; return whether all are valid."""
+    few[:] = least
+    for t in range(len(alpha) - 1, -1, -1):
+        total = _close(density, alpha, t, beta, onward, 1 / scale[t - 1] if t > 0 else 1.0, least)
+        if not abs(total - 1) < off:
+            return False
+        if t > 0:
+            beta[:] = least
+            _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, few)
+            _backward_blocks(onward, beta, blocks, sources, transposed, enter, t - 1, room, share, SHARE * least)
+        if t % FRAMES_SUMMED == 0:
+            counts += few
+            few[:] = least
+    begun = 0.0
+    for i in range(len(initial)):
+        begun += initial[i] * onward[i]
+    return abs(begun - 1) < off
+
+
+@compiled_to_rounding
+def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
+    for r in range(len(runs)):
+        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
+        for i in range(length):
+            alpha[t, target + i] += weight[first + i] * alpha[t - 1, source + i]
+
+
+@compiled_to_rounding
+def _forward_blocks(
+    alpha: Array, t: int, blocks: Unsigned, sources: Unsigned, weight: Array, leaving: Array, room: Array, share: Array,
+    least: float,
+) -> None:  # fmt: skip
+    for b in range(len(blocks)):
+        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
+        for s in range(count):
+            leaving[t - 1, first + s] = alpha[t - 1, sources[first + s]]
+        total = _shares(leaving, t - 1, first, count, share, least)
+        _times(share, count, weight, first, room)
+        for i in range(targets):
+            alpha[t, target + i] += total * room[i]
+
+
+@compiled_to_rounding
+def _density(root: float) -> float:
+    """Return the eighth power of a root, in double precision."""
+    square = np.float64(root) * np.float64(root)
+    return square * square * (square * square)
+
+
+@compiled_to_rounding
+def _emit(alpha: Array, emission: Array, t: int, scale: float, least: float) -> float:
+    """Multiply the forward probabilities of a frame by its densities and a scale; return their sum."""
+    total = 0.0
+    for i in range(emission.shape[1]):
+        product = np.float64(alpha[t, i]) * (_density(emission[t, i]) * scale)
+        kept = product if product > least else least
+        alpha[t, i] = kept
+        total += kept
+    return total
+
+
+@compiled_to_rounding
+def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float, least: float) -> float:
+    """Replace the densities of a frame by its posteriors, and fill in backward probabilities times densities; return
+    the sum of the posteriors.
+    """
+    total = 0.0
+    for i in range(emission.shape[1]):
+        back = np.float64(beta[i])
+        product = back * (_density(emission[t, i]) * scale)
+        onward[i] = product if product > least else least
+        posterior = alpha[t, i] * back
+        total += posterior
+        emission[t, i] = posterior if posterior > LEAST_POSTERIOR else 0.0
+    return total
+
+
+@compiled_to_rounding
+def _backward_runs(
+    alpha: Array, t: int, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array
+) -> None:
+    for r in range(len(runs)):
+        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
+        for i in range(length):
+            beta[source + i] += weight[first + i] * onward[target + i]
+        for i in range(length):
+            counts[first + i] += alpha[t, source + i] * onward[target + i]
+
+
+@compiled_to_rounding
+def _backward_blocks(
+    onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, entering: Array, t: int,
+    room: Array, share: Array, least: float,
+) -> None:  # fmt: skip
+    start = np.uintp(0)
+    for b in range(len(blocks)):
+        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
+        for i in range(targets):
+            entering[t, start + i] = onward[target + i]
+        total = _shares(entering, t, start, targets, share, least)
+        _times(share, targets, transposed, start, room)
+        for s in range(count):
+            beta[sources[first + s]] += total * room[s]
+        start += targets
+
+
+@compiled_to_rounding
+def _shares(values: Array, t: int, first: Any, count: Any, share: Array, least: float) -> float:
+    """Fill in values of a row divided by their sum, 0 where that is less than ``least``; return the sum."""
+    total = 0.0
+    for i in range(count):
+        total += values[t, first + i]
+    scale = 1 / total if total > 0 else 0.0
+    for i in range(count):
+        part = values[t, first + i] * scale
+        share[i] = part if part > least else 0.0
+    return total
+
+
+@compiled_to_rounding
+def _times(row: Array, count: Any, matrix: Array, first: Any, product: Array) -> None:
+    """Fill in the product of a row with as many rows of a matrix, four of them at a time."""
+    wide = matrix.shape[1]
+    product[:] = 0
+    for r in range(0, count // 4 * 4, 4):
+        a, b, c, d = row[r], row[r + 1], row[r + 2], row[r + 3]
+        w, x, y, z = first + r, first + r + 1, first + r + 2, first + r + 3
+        for i in range(wide):
+            product[i] += a * matrix[w, i] + b * matrix[x, i] + c * matrix[y, i] + d * matrix[z, i]
+    for r in range(count // 4 * 4, count):
+        for i in range(wide):
+            product[i] += row[r] * matrix[first + r, i]

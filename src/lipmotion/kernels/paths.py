@@ -1,0 +1,309 @@
+"""Best paths through networks, in NumPy for a short recording, which must not wait for numba, and compiled.
+
+Both forms give the same bits. Paths are also drawn from their posterior, in NumPy alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.compiler import compiled, pays
+
+Index = NDArray[np.intp]
+Array = NDArray[np.float64]
+Scores = NDArray[np.float32]
+LogEmission = Callable[[int, int], NDArray[np.float32]]
+"""Function of a first frame and an end: returns the log densities of these frames [shape=(end - first, G)]."""
+BLOCK, BLOCK_SCORES = 2048, 1 << 22
+"""Frames whose scores are in memory at a time, and scores, whichever are more; earlier scores are computed again from
+checkpoints."""
+WINDOW_BLOCK = 512
+"""Frames that are searched at a time, through the states that may have one of them; scores before them are computed
+again from checkpoints."""
+MANY_ARCS = 1000
+"""So many arcs take NumPy as long in a frame as the calls of its functions."""
+IMPOSSIBLE = np.float32(-np.inf)
+
+
+class NetworkArrays(NamedTuple):
+    """A network of S states and E arcs; logarithms are of probabilities.
+
+    emission    : [shape=(S,)], the density of each state
+    arc_from    : [shape=(E,)], the source states of all arcs, sorted by target
+    arc_log     : [shape=(E,)], of the arcs
+    arc_start   : [shape=(S,)], the first arc of each target; every state has at least one
+    log_initial, log_final : [shape=(S,)], of beginning and ending in each state
+    """
+
+    emission: Index
+    arc_from: Index
+    arc_log: NDArray[np.floating[Any]]
+    arc_start: Index
+    log_initial: NDArray[np.floating[Any]]
+    log_final: NDArray[np.floating[Any]]
+
+
+class Windows(NamedTuple):
+    """The frames that each state may have: from the first one to the end, which is excluded [shape=(S,)].
+
+    Neither may decrease from state to state.
+    """
+
+    first: Index
+    end: Index
+
+
+def best_path(
+    log_emission: LogEmission,
+    count: int,
+    network: NetworkArrays,
+    beam: float | None = None,
+    windows: Windows | None = None,
+) -> tuple[Index, float]:
+    """Return the most probable path and its log probability (-inf: no path).
+
+    log_emission : of G emission densities; called for at most the frames of a block and one, and for each frame at most
+                   twice, with the same result
+    count        : frames, T
+    network      : logarithms in single precision
+    beam         : states with a score lower than the best of the frame by more than this are dropped: that is faster,
+                   but may miss the best path, or every path; None: exact
+    windows      : the frames that each state may have; None: any
+    Returns the states of the path [shape=(T,)], and its score. Scores are relative to the best of their frame and in
+    single precision: no path is lost, but one may be preferred to another that is better by less than their rounding.
+    Cost: O(T·E) time, O((T / B + B)·(S + G)) memory, with B frames in a block; with windows E and S are of the states
+    and arcs that have windows in one block, so both are linear in the duration where windows are short.
+    """
+    least = np.float32(-np.inf if beam is None else -beam)
+    length = WINDOW_BLOCK if windows else max(BLOCK, BLOCK_SCORES // len(network.emission))
+    starts = range(0, max(count - 1, 1), length)
+    blocks = [_Block(network, windows, start, min(start + length + 1, count)) for start in starts]
+    path = np.full(count, -1, np.intp)
+    if any(block.states.start >= block.states.stop for block in blocks):
+        return path, -np.inf
+    is_compiled = pays(count * (1 + sum(block.arcs for block in blocks) // len(blocks) // MANY_ARCS))
+
+    def scores(block: _Block, row: Scores) -> tuple[Scores, float]:
+        return _scores(block.network, row, block.log_emission(log_emission), least, is_compiled)
+
+    rows, total = [blocks[0].first_row(log_emission)], 0.0
+    for block, following in pairwise(blocks):
+        delta, shift = scores(block, rows[-1])
+        rows.append(following.row_after(block, delta[-1]))
+        total += shift
+    for block, row in zip(reversed(blocks), reversed(rows), strict=True):
+        delta, shift = scores(block, row)
+        if path[-1] < 0:
+            last = delta[-1] + block.network.log_final
+            total += shift + float(last.max())
+            path[-1] = block.states.start + last.argmax()
+            if not np.isfinite(total):
+                break
+        part = path[block.start : block.stop - 1]
+        _trace(block.network, part, delta, int(path[block.stop - 1]) - block.states.start, is_compiled)
+        part += block.states.start
+    return path, total
+
+
+class _Block:
+    """Some frames, and the states that may have one of them: consecutive ones, in a network of their own.
+
+    The last frame is the first one of the block that follows.
+    """
+
+    def __init__(self, network: NetworkArrays, windows: Windows | None, start: int, stop: int):
+        self.whole, self.windows, self.start, self.stop = network, windows, start, stop
+        self.states = slice(0, len(network.emission))
+        if windows is not None:
+            first = int(np.searchsorted(windows.end, start, side="right"))
+            self.states = slice(first, int(np.searchsorted(windows.first, stop)))
+        edges = np.append(network.arc_start, len(network.arc_from))
+        self._arcs = slice(int(edges[self.states.start]), int(edges[self.states.stop]))
+        self.arcs = self._arcs.stop - self._arcs.start
+
+    def first_row(self, log_emission: LogEmission) -> Scores:
+        """Return the scores of the states in the first frame of all."""
+        values = self._masked(log_emission(0, 1), 0)[0]
+        return self.whole.log_initial[self.states] + (values[self.whole.emission] if self.windows is None else values)
+
+    def row_after(self, before: _Block, last: Scores) -> Scores:
+        """Return the scores in the first frame, from those of the block before in its last frame."""
+        row = np.full(self.states.stop - self.states.start, -np.inf, np.float32)
+        first, stop = max(self.states.start, before.states.start), min(self.states.stop, before.states.stop)
+        if first < stop:
+            row[first - self.states.start : stop - self.states.start] = last[
+                first - before.states.start : stop - before.states.start
+            ]
+        return row
+
+    def log_emission(self, log_emission: LogEmission) -> Scores:
+        """Return the log densities as ``network`` numbers them: of every state, -inf outside its window."""
+        return self._masked(log_emission(self.start, self.stop), self.start)
+
+    def _masked(self, values: Scores, start: int) -> Scores:
+        if self.windows is None:
+            return values
+        values = values[:, self.whole.emission[self.states]]
+        frames = np.arange(start, start + len(values))[:, None]
+        outside = (frames < self.windows.first[self.states]) | (frames >= self.windows.end[self.states])
+        values[outside] = -np.inf
+        return values
+
+    @property
+    def network(self) -> NetworkArrays:
+        """The network of the states; arcs from others are left out."""
+        if self.windows is None:
+            return self.whole
+        first, whole = self.states.start, self.whole
+        kept = (whole.arc_from[self._arcs] >= first) & (whole.arc_from[self._arcs] < self.states.stop)
+        starts = whole.arc_start[self.states] - self._arcs.start
+        position = np.append(0, np.cumsum(kept))
+        return NetworkArrays(
+            np.arange(self.states.stop - first),
+            whole.arc_from[self._arcs][kept] - first,
+            whole.arc_log[self._arcs][kept],
+            position[starts],
+            whole.log_initial[self.states],
+            whole.log_final[self.states],
+        )
+
+
+def _scores(
+    network: NetworkArrays, first: Scores, log_emission: Scores, least: np.float32, is_compiled: bool
+) -> tuple[Scores, float]:
+    """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best.
+
+    first        : the scores in the first frame [shape=(S,)]
+    log_emission : [shape=(T, G)]
+    least        : relative scores under this become -inf
+    """
+    emission, arc_from, arc_log, arc_start, _, _ = network
+    delta = np.empty((len(log_emission), len(emission)), np.float32)
+    delta[0] = first
+    if is_compiled:
+        arc_log, log_emission = (np.ascontiguousarray(part, np.float32) for part in (arc_log, log_emission))
+        columns, sources = emission.astype(np.uintp), arc_from.astype(np.uintp)  # others are not vectorised
+        stops = np.append(arc_start[1:], len(arc_from))
+        return delta, float(_fill(delta, columns, sources, log_emission, arc_log, stops, least))
+    arrivals = np.empty(len(arc_from), np.float32)
+    shift = 0.0
+    for frame in range(1, len(delta)):
+        np.take(delta[frame - 1], arc_from, out=arrivals)
+        arrivals += arc_log
+        row = np.maximum.reduceat(arrivals, arc_start, out=delta[frame])
+        row += log_emission[frame, emission]
+        best = row.max()
+        if best > -np.inf:
+            row -= best
+            row[row < least] = -np.inf
+            shift += float(best)
+    return delta, shift
+
+
+def _trace(network: NetworkArrays, path: Index, delta: Scores, state: int, is_compiled: bool) -> None:
+    """Fill in the path before ``state`` in the last frame of ``delta``: without back-pointers, from the scores."""
+    _, arc_from, arc_log, arc_start, _, _ = network
+    stops = np.append(arc_start[1:], len(arc_from))
+    if is_compiled:
+        _trace_back(path, delta, state, arc_from, np.asarray(arc_log, np.float32), arc_start, stops)
+        return
+    for frame in range(len(path) - 1, -1, -1):
+        arcs = slice(arc_start[state], stops[state])
+        sources = arc_from[arcs]
+        state = int(sources[(delta[frame, sources] + arc_log[arcs]).argmax()])
+        path[frame] = state
+
+
+@compiled
+def _fill(
+    delta: Scores, emission: NDArray[np.uintp], arc_from: NDArray[np.uintp], log_emission: Scores, arc_log: Scores,
+    arc_stop: Index, least: np.float32,
+) -> float:  # fmt: skip
+    """Fill in all scores but the first ones; return the sum of the frames' best ones."""
+    shift = 0.0
+    for t in range(1, len(delta)):
+        before, after, best, first = delta[t - 1], delta[t], IMPOSSIBLE, 0
+        for state in range(len(after)):
+            a = b = c = d = IMPOSSIBLE  # four running maxima: a single one waits for itself
+            stop = arc_stop[state]
+            whole = first + (stop - first) // 4 * 4
+            for arc in range(first, whole, 4):
+                a = max(a, before[arc_from[arc]] + arc_log[arc])
+                b = max(b, before[arc_from[arc + 1]] + arc_log[arc + 1])
+                c = max(c, before[arc_from[arc + 2]] + arc_log[arc + 2])
+                d = max(d, before[arc_from[arc + 3]] + arc_log[arc + 3])
+            for arc in range(whole, stop):
+                a = max(a, before[arc_from[arc]] + arc_log[arc])
+            first = stop
+            after[state] = max(a, b, c, d) + log_emission[t, emission[state]]
+            best = max(best, after[state])
+        if best > IMPOSSIBLE:
+            for state in range(len(after)):
+                score = after[state] - best
+                after[state] = score if score >= least else IMPOSSIBLE
+            shift += float(best)
+    return shift
+
+
+@compiled
+def _trace_back(
+    path: Index, delta: Scores, state: int, arc_from: Index, arc_log: Scores, arc_start: Index, arc_stop: Index
+) -> None:
+    """Fill in the path [shape=(T - 1,)] before ``state`` in the last of T frames."""
+    for t in range(len(path) - 1, -1, -1):
+        best, source = IMPOSSIBLE, arc_from[arc_start[state]]
+        for arc in range(arc_start[state], arc_stop[state]):
+            score = delta[t, arc_from[arc]] + arc_log[arc]
+            if score > best:
+                best, source = score, arc_from[arc]
+        state = path[t] = source
+
+
+def sample_paths(
+    log_emission: NDArray[np.floating[Any]], network: NetworkArrays, uniform: Array
+) -> tuple[Index, float]:
+    """Return paths drawn independently from the posterior of all paths.
+
+    log_emission : [shape=(T, G)], finite or -inf
+    uniform      : [shape=(N, T)], random numbers from 0 up to 1, one row for each path
+    Returns the states of the paths [shape=(N, T)] and the log likelihood; where there is no path, -1 and -inf.
+    Source: forward filtering, backward sampling (Carter & Kohn 1994), in the log domain.
+    Cost: O(T·E) for the filter, O(T·S) memory; O(T·E / S) a path.
+    """
+    _, arc_from, arc_log, arc_start, _, log_final = network
+    alpha = _forward(log_emission, network)
+    last = alpha[-1] + log_final
+    log_likelihood = float(np.logaddexp.reduce(last))
+    paths = np.full((len(uniform), len(alpha)), -1, np.intp)
+    if not np.isfinite(log_likelihood):
+        return paths, -np.inf
+    stops = np.append(arc_start[1:], len(arc_from))
+    for path, draws in zip(paths, uniform, strict=True):
+        state = path[-1] = _drawn(last, float(draws[-1]))
+        for frame in range(len(alpha) - 2, -1, -1):
+            arcs = slice(arc_start[state], stops[state])
+            sources = arc_from[arcs]
+            state = path[frame] = sources[_drawn(alpha[frame, sources] + arc_log[arcs], float(draws[frame]))]
+    return paths, log_likelihood
+
+
+def _forward(log_emission: NDArray[np.floating[Any]], network: NetworkArrays) -> Array:
+    """Return the joint log probability of each state and all frames up to each frame [shape=(T, S)]."""
+    emission, arc_from, arc_log, arc_start, log_initial, _ = network
+    alpha = np.empty((len(log_emission), len(emission)))
+    alpha[0] = log_initial + log_emission[0, emission]
+    for frame in range(1, len(alpha)):
+        np.logaddexp.reduceat(alpha[frame - 1, arc_from] + arc_log, arc_start, out=alpha[frame])
+        alpha[frame] += log_emission[frame, emission]
+    return alpha
+
+
+def _drawn(log_weights: Array, uniform: float) -> int:
+    """Return a number drawn with probabilities proportional to the weights; ``uniform`` is from 0 up to 1."""
+    sums = np.cumsum(np.exp(log_weights - log_weights.max()))
+    return int(np.searchsorted(sums, uniform * sums[-1], side="right").clip(max=len(sums) - 1))

@@ -1,1 +1,0 @@
-"""Inner loops over sequences: state networks, chains, parameter generation."""

@@ -1,0 +1,227 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kernels.networks import phone_loop, random_network
+from lipmotion.kernels import paths
+from lipmotion.kernels.paths import NetworkArrays, Windows
+from oracles import paths as oracle
+
+
+def random_emission(seed: int, frames: int, densities: int) -> np.ndarray:
+    return np.random.default_rng([seed, 1]).normal(-20, 4, (frames, densities)).astype(np.float32)
+
+
+def asked(log_emission: np.ndarray):
+    """Return the function of log densities that the kernel takes, and the number of frames."""
+    return lambda first, end: log_emission[first:end], len(log_emission)
+
+
+@pytest.fixture(params=["numpy", "compiled"], autouse=True)
+def form(request, monkeypatch) -> None:
+    """Every test runs with both forms, NumPy and compiled, and with blocks of ``BLOCK`` frames."""
+    monkeypatch.setattr(paths, "BLOCK_SCORES", 0)
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    monkeypatch.setattr(paths, "pays", lambda _: request.param == "compiled")
+
+
+@pytest.fixture(params=[1, 3, 2048])
+def block(request, monkeypatch) -> int:
+    monkeypatch.setattr(paths, "BLOCK", request.param)
+    monkeypatch.setattr(paths, "WINDOW_BLOCK", request.param)
+    return request.param
+
+
+@pytest.mark.usefixtures("block")
+def test_agrees_with_the_enumeration_of_all_paths():
+    for frames in range(1, 7):
+        for seed in range(3):
+            arrays, arcs = random_network(seed, states=3 + seed % 2, densities=3, density_of_arcs=0.5)
+            log_emission = random_emission(seed, frames, 3)
+            path, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays))
+            ends = arrays["log_initial"], arrays["log_final"]
+            wanted, best = oracle.best_path(log_emission, arrays["emission"], arcs, *ends)
+            if np.isinf(best):
+                assert score == -np.inf
+            else:
+                assert tuple(path) == wanted
+                assert score == pytest.approx(best, abs=1e-3)
+
+
+@given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 80), block=st.integers(1, 90))
+@settings(max_examples=25)
+def test_blocks_change_nothing(seed, frames, block):
+    arrays, arcs = random_network(seed, states=7, densities=4, density_of_arcs=0.3)
+    log_emission = random_emission(seed, frames, 4)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(paths, "BLOCK", 1000)
+        whole, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays))
+        patch.setattr(paths, "BLOCK", block)
+        path, in_blocks = paths.best_path(*asked(log_emission), NetworkArrays(**arrays))
+    assert np.array_equal(path, whole)
+    assert in_blocks == pytest.approx(score, abs=1e-3)
+    if np.isfinite(score):  # and the score is that of the path
+        ends = arrays["log_initial"], arrays["log_final"]
+        own = oracle.path_score(tuple(path), log_emission, arrays["emission"], arcs, *ends)
+        assert score == pytest.approx(own, abs=1e-2)
+
+
+def left_to_right(states: int, densities: int = 8) -> dict:
+    """Return a chain of states, with paths from the first to the last."""
+    nowhere = np.full(states, -np.inf, np.float32)
+    first, last = nowhere.copy(), nowhere.copy()
+    first[0] = last[-1] = 0
+    sources = [source for target in range(states) for source in (target - 1, target) if source >= 0]
+    return {
+        "emission": np.arange(states) % densities,
+        "arc_from": np.array(sources, np.intp),
+        "arc_log": np.full(len(sources), -0.5, np.float32),
+        "arc_start": np.array([0, *range(1, 2 * states - 1, 2)], np.intp),
+        "log_initial": first,
+        "log_final": last,
+    }
+
+
+@pytest.mark.usefixtures("block")
+def test_a_network_longer_than_the_recording_is_impossible():
+    for frames in [1, 2, 3, 4, 6, 7]:
+        _, score = paths.best_path(*asked(np.zeros((frames, 8), np.float32)), NetworkArrays(**left_to_right(8)))
+        assert score == -np.inf
+
+
+@pytest.mark.usefixtures("block")
+def test_the_only_path_is_found():
+    path, score = paths.best_path(*asked(np.zeros((8, 8), np.float32)), NetworkArrays(**left_to_right(8)))
+    assert path.tolist() == list(range(8))
+    assert score == pytest.approx(-3.5)
+
+
+def test_hours_lose_no_precision():
+    chain = left_to_right(2)
+    log_emission = np.full((30_000, 2), -80.0, np.float32)
+    log_emission[:17_000, 0] += 0.25
+    log_emission[17_000:, 1] += 0.25
+    path, score = paths.best_path(*asked(log_emission), NetworkArrays(**chain))
+    assert path.argmax() == 17_000
+    assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)
+
+
+def both(monkeypatch, log_emission: np.ndarray, arrays: dict, beam: float | None = None) -> list:
+    """Return the paths and scores of NumPy and of the compiled form."""
+    pytest.importorskip("numba")
+    found = []
+    for compiled in (False, True):
+        monkeypatch.setattr(paths, "pays", lambda _, compiled=compiled: compiled)
+        found.append(paths.best_path(*asked(log_emission), NetworkArrays(**arrays), beam=beam))
+    return found
+
+
+@pytest.mark.parametrize("beam", [None, 2.0, 20.0])
+@pytest.mark.parametrize("seed", range(2))
+def test_both_forms_find_the_same_to_the_bit(seed, beam, monkeypatch):
+    arrays, _ = phone_loop(seed) if seed % 2 else random_network(seed, states=9, densities=4, density_of_arcs=0.4)
+    log_emission = random_emission(seed, 90, len(arrays["emission"]))
+    (plain, score), (fast, same_score) = both(monkeypatch, log_emission, arrays, beam)
+    assert score == same_score
+    assert np.isfinite(score) or beam is not None
+    if np.isfinite(score):
+        assert np.array_equal(plain, fast)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_ties_are_broken_alike(seed, monkeypatch):
+    arrays, _ = phone_loop(seed)
+    arrays["arc_log"] = np.round(arrays["arc_log"])
+    log_emission = np.round(random_emission(seed, 60, len(arrays["emission"])) / 4)
+    (plain, _), (fast, _) = both(monkeypatch, log_emission, arrays)
+    assert np.array_equal(plain, fast)
+
+
+def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
+    chain = left_to_right(2)
+    chain["log_initial"] = chain["log_final"] = np.zeros(2, np.float32)
+    chain["arc_from"], chain["arc_start"] = (
+        np.array([0, 1], np.intp),
+        np.array([0, 1], np.intp),
+    )  # two loops, no arc between them
+    chain["arc_log"] = np.zeros(2, np.float32)
+    log_emission = np.array([[0, -10], [0, 0], [-30, 0]], np.float32)
+    assert paths.best_path(*asked(log_emission), NetworkArrays(**chain))[0].tolist() == [1, 1, 1]
+    assert paths.best_path(*asked(log_emission), NetworkArrays(**chain), beam=50.0)[0].tolist() == [1, 1, 1]
+    path, score = paths.best_path(*asked(log_emission), NetworkArrays(**chain), beam=5.0)
+    assert path.tolist() == [0, 0, 0]
+    assert score == -30
+
+
+def random_windows(seed: int, states: int, frames: int) -> Windows:
+    draw = np.random.default_rng([seed, 2])
+    first = np.sort(draw.integers(0, max(frames // 2, 1), states))
+    return Windows(first, np.sort(draw.integers(0, frames + 2, states)))
+
+
+@pytest.mark.usefixtures("block")
+def test_agrees_with_the_enumeration_of_all_paths_in_the_windows():
+    possible = 0
+    for frames in range(1, 6):
+        for seed in range(8):
+            arrays, arcs = random_network(seed, states=4, densities=3, density_of_arcs=0.6)
+            windows = random_windows(seed, 4, frames)
+            log_emission = random_emission(seed, frames, 3)
+            path, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays), windows=windows)
+            moments = np.arange(frames)[:, None]
+            inside = (moments >= windows.first) & (moments < windows.end)
+            of_states = np.where(inside, log_emission[:, arrays["emission"]], -np.inf)
+            ends = arrays["log_initial"], arrays["log_final"]
+            wanted, best = oracle.best_path(of_states, np.arange(4), arcs, *ends)
+            if np.isinf(best):
+                assert score == -np.inf
+            else:
+                possible += 1
+                assert tuple(path) == wanted
+                assert score == pytest.approx(best, abs=1e-3)
+    assert possible > 15
+
+
+def test_wide_windows_change_nothing_and_narrow_ones_are_kept(monkeypatch):
+    monkeypatch.setattr(paths, "WINDOW_BLOCK", 37)
+    states, frames = 60, 900
+    log_emission, chain = random_emission(3, frames, 7), NetworkArrays(**left_to_right(states, 7))
+    everywhere = Windows(np.zeros(states, np.intp), np.full(states, frames))
+    free, score = paths.best_path(*asked(log_emission), chain)
+    path, same = paths.best_path(*asked(log_emission), chain, windows=everywhere)
+    assert np.array_equal(path, free)
+    assert same == pytest.approx(score, abs=0.1)
+    middles = np.linspace(0, frames, states).astype(np.intp)
+    windows = Windows(np.maximum(middles - 40, 0), np.minimum(middles + 40, frames))
+    path, less = paths.best_path(*asked(log_emission), chain, windows=windows)
+    assert less <= score + 0.1
+    assert np.all(windows.first[path] <= np.arange(frames))
+    assert np.all(np.arange(frames) < windows.end[path])
+    assert set(np.diff(path)) <= {0, 1}
+
+
+def test_what_is_in_memory_does_not_grow_with_the_recording():
+    states, frames = 600, 6_000
+    seen: list[int] = []
+
+    def log_emission(first: int, end: int) -> np.ndarray:
+        seen.append(end - first)
+        return random_emission(first, end - first, 7)
+
+    middles = np.linspace(0, frames, states).astype(np.intp)
+    windows = Windows(np.maximum(middles - 60, 0), np.minimum(middles + 60, frames))
+    path, score = paths.best_path(log_emission, frames, NetworkArrays(**left_to_right(states, 7)), windows=windows)
+    assert np.isfinite(score)
+    assert (path[0], path[-1]) == (0, states - 1)
+    assert max(seen) <= paths.WINDOW_BLOCK + 1
+    assert sum(seen) <= 2.1 * frames
+
+
+def test_windows_without_room_have_no_path():
+    gap = Windows(np.array([0, 600, 700]), np.array([100, 1000, 1000]))
+    assert (
+        paths.best_path(*asked(random_emission(0, 1000, 7)), NetworkArrays(**left_to_right(3, 7)), windows=gap)[1]
+        == -np.inf
+    )
