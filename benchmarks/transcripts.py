@@ -41,11 +41,12 @@ from numpy.typing import NDArray
 from robust import SPOKEN
 
 import lipmotion
+from lipmotion.corpora.labels.label_files import read_transcript
 from lipmotion.corpora.layouts import words_of_name
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
+from lipmotion.pipeline.understand.transcribe import transcribe
 from lipmotion.pipeline.understand.understood_speech import understood_speech
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, transcript_fit
