@@ -20,13 +20,11 @@ import pytest
 from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, Model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.faces.filmed.face import FilmedFace, save_face
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
-from lipmotion.pipeline.model import Model, save_model
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.network.hama import Hama
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face

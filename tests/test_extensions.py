@@ -15,7 +15,8 @@ from lipmotion.cli.terminal.status import outcome
 from lipmotion.corpora.discover import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import MOTION_FORMATS, MotionFormat, check_motion
+from lipmotion.export import MotionFormat
+from lipmotion.export.base import MOTION_FORMATS, check_motion
 from lipmotion.extensions import Registry, install_command
 from lipmotion.faces import FACES, Face, face_named
 from lipmotion.testing.examples import example

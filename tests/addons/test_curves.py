@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import read_motion as read_library_motion
 from lipmotion.addons.blender.curves import at_frames, closures, control, matched, read_motion, spelling
-from lipmotion.export.base import read_motion as read_library_motion
-from lipmotion.export.base import write_motion
+from lipmotion.export import write_motion
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
 NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from appearance.test_eigenlips import pictures
+from lipmotion import Corpus
 from lipmotion.appearance.candidates import choose_candidates, make_candidates
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, sharpened
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import fit_pca
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import MissingDependencyError
+from lipmotion.export import write_mp4
 from lipmotion.export.sound import write_sound
-from lipmotion.export.video import write_mp4
 from lipmotion.pipeline.corpus import prepare
 from lipmotion.pipeline.corpus import sync as offset
 from lipmotion.pipeline.corpus.prepare import PrepareReport

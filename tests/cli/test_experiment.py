@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve, runner
 from lipmotion.experiments.engines import engine_comparison as text
 from lipmotion.experiments.hofer2008 import table1

@@ -13,7 +13,7 @@ from PIL import Image
 
 import lipmotion
 from docs.site_pages import ROOT
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.export.sound import write_sound
 from lipmotion.study.answers import write_answers
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances

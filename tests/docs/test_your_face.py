@@ -12,8 +12,8 @@ import pytest
 
 from docs.site_pages import blocks
 from lipmotion.cli.main import main
+from lipmotion.export import write_mp4
 from lipmotion.export.sound import write_sound
-from lipmotion.export.video import write_mp4
 from lipmotion.faces import Staging, staged_face
 from lipmotion.testing.toy import CAMERA_HZ, toy_motion, toy_sentences
 from lipmotion.types import Audio, Timeline

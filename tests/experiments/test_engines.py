@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Selection, evaluate, load_model
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.experiments.engines.engine_comparison import engines, table
 from lipmotion.experiments.engines.models import ENGINES_COMPARED
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.model import load_model
 from lipmotion.testing.examples import speech, timeline
 from lipmotion.types import Progress
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied, renamed
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.experiments import folds as module
 from lipmotion.experiments.folds import folds, table
@@ -20,7 +20,6 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
 from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.evaluation.held_out import ComparedClip, compared_clips, held_out_recordings
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)

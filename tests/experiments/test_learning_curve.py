@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 from experiments.copies import renamed
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Selection, evaluate, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.experiments import learning_curve as module
 from lipmotion.experiments.learning_curve import SIZES, learning_curve, table
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.training.train import train
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)

@@ -5,11 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection
 from lipmotion.errors import InputError
 from lipmotion.experiments.noise import LONGEST_S, read_talkers, recordings_in_noise
 from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings, held_out_recordings
-from lipmotion.pipeline.model import Model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.noise import noisy_audio

@@ -16,12 +16,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from lipmotion import CueSheet, read_motion
 from lipmotion.citations import model_citations
 from lipmotion.corpora.labels.textgrid import parse_interval_tiers
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import read_motion, write_motion
-from lipmotion.export.cues.base import write_cue_file
-from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.export import write_motion
+from lipmotion.export.cues import write_cue_file
 from lipmotion.export.synthetic_mark import mark_metadata
 from lipmotion.export.timed_labels import write_labels
 from lipmotion.meshes.files.gltf_container import read_gltf_document

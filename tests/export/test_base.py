@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export import motion_suffix, motion_suffixes, read_motion, readable_suffixes, write_motion
-from lipmotion.export.base import MOTION_FORMATS, MotionFormat
+from lipmotion.export import MotionFormat, motion_suffix, motion_suffixes, read_motion, readable_suffixes, write_motion
+from lipmotion.export.base import MOTION_FORMATS
 from lipmotion.types import Channel, Generation, Motion, Timeline
 
 EXACT = (".json", ".csv", ".npz", ".c3d")

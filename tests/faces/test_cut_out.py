@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from lipmotion import Staging
 from lipmotion.errors import InputError
-from lipmotion.faces.base import Staging
 from lipmotion.faces.cut_out import read_cut_out
 from lipmotion.units.mouth_chart import BLAIR
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion import Staging
 from lipmotion.errors import InputError
-from lipmotion.faces.base import Staging
 from lipmotion.faces.mesh import MeshFace, MeshStage
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.model.bones import HEAD, NECK, Bone

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from lipmotion import Staging
 from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.faces import base
-from lipmotion.faces.base import DrawsPlanes, Face, Staging
+from lipmotion.faces.base import DrawsPlanes, Face
 from lipmotion.faces.portrait.characters import CARTOON, MAN, WOMAN
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lipmotion import Staging
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
-from lipmotion.faces.base import Staging, alive
+from lipmotion.faces.base import alive
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights

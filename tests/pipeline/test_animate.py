@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from lipmotion import Model, SpeechRequest, animate, write
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit

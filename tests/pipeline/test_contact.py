@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lipmotion import Delivery, Staging, read_motion
 from lipmotion.articulation.contact import LEAST_GAP
-from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
-from lipmotion.export.base import read_motion, write_motion
-from lipmotion.faces.base import Staging
+from lipmotion.export import write_motion
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.shape_fit import lip_gap
 from lipmotion.faces.head.stage import figure, head_mesh

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Delivery, read_motion, write
 from lipmotion.articulation.contact import closures
-from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
-from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.meshes.fitting.driven import driven_character
@@ -22,7 +21,6 @@ from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody
 from lipmotion.pipeline.outputs.scenes import delivered_scene
 from lipmotion.pipeline.outputs.shown_faces import ShownPerson, shown_face
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey
 from meshes.heads import head, write_glb

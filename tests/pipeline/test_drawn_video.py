@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.base import Staging
+from lipmotion import Staging
 from lipmotion.faces.portrait.planar import PlanarRasteriser
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.choice import numba_works

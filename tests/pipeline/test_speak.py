@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model, load_model, read_motion, speak, write
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
-from lipmotion.export.base import read_motion
 from lipmotion.pipeline.generate import speak as module
-from lipmotion.pipeline.generate.speak import REST_S, speak
-from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.generate.speak import REST_S
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.installed import default_voice, installed_voices
 from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit

@@ -10,19 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection, SpeechRequest, animate, evaluate, explain, load_model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speaker_maps import speaker_arrays
-from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.explain import explain
 from lipmotion.pipeline.generate.posteriors import animate_with_posteriors
-from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
 

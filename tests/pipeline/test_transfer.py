@@ -10,17 +10,23 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion.corpora.store import Corpus
+from lipmotion import (
+    Corpus,
+    Model,
+    SpeechRequest,
+    animate,
+    explain,
+    load_model,
+    map_onto,
+    save_model,
+    train,
+    with_person,
+)
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.explain import explain
-from lipmotion.pipeline.generate.transfer import map_onto, with_person
-from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.understand.request import Onto, SpeechRequest
+from lipmotion.pipeline.understand.request import Onto
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance

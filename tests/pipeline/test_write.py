@@ -12,15 +12,12 @@ import av
 import numpy as np
 import pytest
 
+from lipmotion import Model, animate, read_motion, write
 from lipmotion.articulation.delivery import closed_on_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import read_motion
 from lipmotion.faces import Staging
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation
 
 

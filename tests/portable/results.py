@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.testing.toy import toy_sentences, toy_utterances

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model, load_model
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.recognition import recogniser as module

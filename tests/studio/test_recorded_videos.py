@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion.export import write_mp4
 from lipmotion.export.sound import write_sound
-from lipmotion.export.video import write_mp4
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.studio.recorded_videos import MP4, played_as, sound_begins_s, video_of, write_playable
 from lipmotion.testing.toy import ToySentence

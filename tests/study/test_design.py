@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.export import write_mp4
 from lipmotion.export.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
-from lipmotion.export.video import write_mp4
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion.study.answers import ANCHOR, MOS, PAIRED, RANKING

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from children import wait_until
-from lipmotion.export.video import write_mp4
+from lipmotion.export import write_mp4
 from lipmotion.study.answers import MOS, PAIRED, RANKING, Answer
 from lipmotion.study.collected import collected_answers
 from lipmotion.study.manifest import VIDEOS, Study, StudyVideo

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.export.base import MOTION_FORMATS, MotionFormat
+from lipmotion.export import MotionFormat
+from lipmotion.export.base import MOTION_FORMATS
 from lipmotion.faces import Face, face_named
 from lipmotion.testing import ContractError, check_exporter, check_face
 

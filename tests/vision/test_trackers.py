@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import prepare
 from lipmotion.errors import InputError
 from lipmotion.extensions import GROUPS
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion.vision.mediapipe import FaceFinder, MediaPipe
 from lipmotion.vision.track import track

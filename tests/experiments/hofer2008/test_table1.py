@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from experiments.copies import copied, renamed
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.errors import CorpusError
@@ -17,8 +17,6 @@ from lipmotion.experiments.hofer2008 import table1
 from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, Table1Options, hofer2008, table, what_held
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.training.train import train
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)

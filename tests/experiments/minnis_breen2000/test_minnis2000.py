@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.experiments.minnis_breen2000.minnis2000 import (
@@ -25,9 +25,7 @@ from lipmotion.experiments.minnis_breen2000.minnis2000 import (
 )
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.evaluation.held_out import ComparedClip, HeldOutRecordings
-from lipmotion.pipeline.training.train import train
 
 LONG = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)

@@ -14,7 +14,7 @@ import pytest
 
 from experiments.copies import copied, renamed
 from experiments.report.test_sections import figures_of
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.experiments.hofer2008 import table1
 from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, Table1Options

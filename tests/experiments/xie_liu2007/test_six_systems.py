@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.experiments.noise import NoiseConditions
@@ -33,9 +33,7 @@ from lipmotion.experiments.xie_liu2007.text import table
 from lipmotion.experiments.xie_liu2007.tuning import TuningOptions
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.evaluation.held_out import compared_clips, held_out_recordings
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
 

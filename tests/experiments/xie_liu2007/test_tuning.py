@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
@@ -24,7 +24,6 @@ from lipmotion.experiments.xie_liu2007.tuning import (
 )
 from lipmotion.measures import curves
 from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings, compared_clips, held_out_recordings
-from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.examples import examples
 from lipmotion.types import silent_monitor

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from export.cues.conftest import result, spoken, timeline
-from lipmotion.export.cues.choose import choose_cues, default_hold_frames
-from lipmotion.export.cues.sheet import CueSheet
+from lipmotion import CueSheet
+from lipmotion.export.cues import choose_cues
+from lipmotion.export.cues.choose import default_hold_frames
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent

@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import CueSheet, read_motion
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.export.base import read_motion
-from lipmotion.export.cues.base import CUE_FORMATS, write_cue_file
+from lipmotion.export.cues import CUE_FORMATS, SHAPES, write_cue_file
 from lipmotion.export.cues.cue_motion import PARSERS, cue_motion, read_cues
-from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import Span, Timeline
-from lipmotion.units.mouth_chart import SHAPES
 
 SHOWN = [("X", 0.5), ("A", 0.625), ("D", 0.875), ("G", 1.0), ("C", 1.25), ("F", 1.5), ("H", 1.625), ("B", 1.75),
          ("E", 2.0), ("X", 2.5)]  # fmt: skip

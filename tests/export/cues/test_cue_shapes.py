@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import pytest
 
+from lipmotion.export.cues import OPTIONAL, SHAPES
 from lipmotion.export.cues.cue_shapes import ANY_OPEN, ANY_SHAPE, PHONE_SHAPES, shapes_of_phone
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
-from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, drawn_shape
+from lipmotion.units.mouth_chart import drawn_shape
 
 BLAIR = "AI E O U FV L MBP WQ etc rest".split()
 """The names that OpenToonz knows."""

@@ -12,13 +12,11 @@ import numpy as np
 import pytest
 
 from export.cues.conftest import result, spoken
+from lipmotion import CueSheet
 from lipmotion.errors import ExportError
-from lipmotion.export.cues.base import CUE_FORMATS, format_of, write_cue_file
-from lipmotion.export.cues.choose import choose_cues
-from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.export.cues import CUE_FORMATS, SHAPES, choose_cues, format_of, write_cue_file
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Motion, Timeline
-from lipmotion.units.mouth_chart import SHAPES
 
 NAMES = ["hi.wav", "C:\\av\\hi.wav", 'Größe & <"tea\'s"> 茶 😀.wav', "line\nbreak\ttab.wav", "bell\x07\x00.wav", ""]
 OPENTOONZ = {"ai", "e", "o", "u", "fv", "l", "mbp", "wq", "other", "etc", "rest"}

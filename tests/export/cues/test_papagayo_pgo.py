@@ -10,13 +10,11 @@ import pytest
 
 from export.cues.conftest import result, spoken
 from export.cues.test_formats import shown_by_opentoonz
-from lipmotion.export.cues.base import CUE_FORMATS
-from lipmotion.export.cues.choose import choose_cues
+from lipmotion import CueSheet
+from lipmotion.export.cues import CUE_FORMATS, SHAPES, choose_cues
 from lipmotion.export.cues.papagayo_pgo import UNKNOWN
-from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units.mouth_chart import SHAPES
 
 Word = tuple[str, int, int, list[tuple[int, str]]]
 

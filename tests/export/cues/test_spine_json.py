@@ -9,9 +9,8 @@ import pytest
 
 import programs
 from export.cues.conftest import spoken
-from lipmotion.export.cues.base import format_of, write_cue_file
-from lipmotion.export.cues.choose import choose_cues
-from lipmotion.export.cues.sheet import CueSheet
+from lipmotion import CueSheet
+from lipmotion.export.cues import choose_cues, format_of, write_cue_file
 
 
 @pytest.fixture

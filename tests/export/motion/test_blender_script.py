@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.export.base import write_motion
+from lipmotion.export import write_motion
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
 

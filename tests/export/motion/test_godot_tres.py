@@ -10,7 +10,7 @@ import pytest
 
 from export.motion.curve_examples import generation
 from lipmotion.errors import ExportError
-from lipmotion.export.base import write_motion
+from lipmotion.export import write_motion
 
 TRACK = re.compile(
     r'tracks/(\d+)/type = "blend_shape"\ntracks/\1/imported = false\ntracks/\1/enabled = true\n'

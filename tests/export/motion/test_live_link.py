@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.export.base import write_motion
+from lipmotion.export import write_motion
 from lipmotion.export.motion.live_link import CURVES, timecode
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline

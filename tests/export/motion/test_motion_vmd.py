@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import programs
+from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import read_motion, write_motion
+from lipmotion.export import write_motion
 from lipmotion.export.motion.motion_vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_weights, given_gaze

@@ -10,7 +10,7 @@ import pytest
 
 from export.motion.curve_examples import generation
 from lipmotion.errors import ExportError
-from lipmotion.export.base import write_motion
+from lipmotion.export import write_motion
 
 HEAD = "%YAML 1.1\n%TAG !u! tag:unity3d.com,2011:\n--- !u!74 &7400000\nAnimationClip:\n  m_ObjectHideFlags: 0\n"
 CURVE = re.compile(

@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require, short_speech
+from lipmotion import Corpus, CueSheet
 from lipmotion.corpora.facegood import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
-from lipmotion.corpora.store import Corpus
-from lipmotion.export.base import write_motion
-from lipmotion.export.cues.base import CUE_FORMATS
+from lipmotion.export import write_motion
+from lipmotion.export.cues import CUE_FORMATS, SHAPES
 from lipmotion.export.cues.cue_motion import PARSERS
-from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
-from lipmotion.units.mouth_chart import SHAPES
 from meshes import gltf
 from meshes.flame import head
 from meshes.live_link_app import write_take

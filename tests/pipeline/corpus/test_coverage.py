@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.pipeline.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Span, Timeline, Unit

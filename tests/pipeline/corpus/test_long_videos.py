@@ -11,11 +11,10 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError
 from lipmotion.pipeline.corpus import long_videos
 from lipmotion.pipeline.corpus import prepare as module
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Channel, Motion, Progress, Track
 from lipmotion.vision.frames import WHOLE, VideoSpan

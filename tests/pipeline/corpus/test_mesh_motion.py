@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Corpus, prepare
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.supplied_motion import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
 from meshes.flame import head
 

@@ -11,9 +11,8 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.types import Item
 
 CLIP = "brwa3s"

@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Corpus, prepare
 from lipmotion.corpora.source_recordings import SourceRecording
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.export.base import write_motion
+from lipmotion.export import write_motion
 from lipmotion.export.sound import write_sound
 from lipmotion.pipeline.corpus import long_videos as module
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.separate_sound import SeparateSound, in_step, on_own_time
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track

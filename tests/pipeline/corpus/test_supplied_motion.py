@@ -11,15 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lipmotion import Corpus, prepare
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.export.base import write_motion
+from lipmotion.export import write_motion
 from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
 from lipmotion.meshes.files.curve_table import SPEECH_CURVES
 from lipmotion.motion import acoustic_network, posterior_network
 from lipmotion.pipeline.corpus import prepare as module
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
@@ -178,10 +177,7 @@ def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, m
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
     monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 100)
     monkeypatch.setattr(posterior_network, "STEPS", 6.0)
-    from lipmotion.pipeline.evaluation.evaluate import evaluate
-    from lipmotion.pipeline.generate.animate import animate
-    from lipmotion.pipeline.model import load_model, save_model
-    from lipmotion.pipeline.training.train import train
+    from lipmotion import animate, evaluate, load_model, save_model, train
 
     folder = recordings / "facegood"
     if not folder.is_dir():

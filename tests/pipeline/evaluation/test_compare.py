@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import lipmotion
+from lipmotion import compare
 from lipmotion.errors import InputError
 from lipmotion.measures import curves, vertices
-from lipmotion.pipeline.evaluation.compare import compare
 from lipmotion.types import WEIGHT, Channel, Motion, Track
 from meshes.speech import motion
 

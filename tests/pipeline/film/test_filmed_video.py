@@ -10,6 +10,7 @@ import av
 import numpy as np
 import pytest
 
+from lipmotion import Model, SpeechRequest, animate, write
 from lipmotion.appearance.person import Appearance
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.export.synthetic_mark import SOURCE_TYPE
@@ -18,12 +19,8 @@ from lipmotion.faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptio
 from lipmotion.pipeline.film import filmed_video as module
 from lipmotion.pipeline.film.background import stored_sequence
 from lipmotion.pipeline.film.filmed_video import FilmOptions, face_codes, film_of, write_film
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.pipeline.outputs.shown_faces import shown_face
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from speech.sounds import tone, write_sound

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, here, run
+from lipmotion import SpeechRequest, animate
 from lipmotion.faces.filmed.face import load_face
 from lipmotion.pipeline.film.filmed_video import film_of, write_film
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
 from lipmotion.vision.track import track

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline.film import takes
 from lipmotion.pipeline.film.takes import MOST_FOOTAGE_S, takes_of

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.export.video import write_mp4
+from lipmotion.export import write_mp4
 from lipmotion.pipeline.film import background, build
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Motion, Track

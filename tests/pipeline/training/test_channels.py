@@ -9,21 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Corpus, Model, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
-from lipmotion.export.base import read_motion
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.evaluation.held_out import compared_clips, held_out_recordings
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance

@@ -7,15 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Run, Selection, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.resample import model_motion
-from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
-from lipmotion.pipeline.training.train import Run, about_training, phones_of, train
+from lipmotion.pipeline.training.train import about_training, phones_of
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, train
 from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training import labels as module
@@ -15,7 +15,6 @@ from lipmotion.pipeline.training.labels import (
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Timeline, Unit, Utterance
