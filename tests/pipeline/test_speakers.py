@@ -177,7 +177,9 @@ def test_an_explanation_is_in_the_units_of_the_person(model: Model, toy_sentence
 
 
 def test_one_person_is_not_mapped(people: Corpus) -> None:
-    model, _ = train(people, selection=Selection("train", ("anna",)), recogniser=SMALL)
+    model, _ = train(
+        people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
+    )
     assert model.speakers is None
 
 
