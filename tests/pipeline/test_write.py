@@ -18,7 +18,7 @@ from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.faces import Staging
 from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.types import Audio, Generation
+from lipmotion.types import Generation
 
 
 @pytest.fixture(scope="module")
@@ -51,21 +51,6 @@ def test_a_recording_may_have_any_name(result: Generation, toy_model: Model, tmp
     document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert document["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
     assert len(read_motion(tmp_path / "a.npz")[1]) == len(result.units)
-
-
-def test_the_sound_of_a_video_is_read_without_a_second_warning(
-    result: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    warns = []
-
-    def read(*_: object, warn: bool = True) -> Audio:
-        warns.append(warn)
-        return Audio(np.zeros(16_000, np.float32), 16_000)
-
-    monkeypatch.setattr("lipmotion.pipeline.outputs.drawn_video.read_audio", read)
-    monkeypatch.setattr("lipmotion.export.video.write_mp4", lambda *_, **__: None)
-    write(result, [tmp_path / "a.mp4"], speech=toy_speech)
-    assert warns == [False]
 
 
 def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> None:
