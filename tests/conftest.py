@@ -46,7 +46,7 @@ settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100
 settings.load_profile(FIXED)
 
 
-HASTY = {"cli", "experiments", "training", "batch"}
+HASTY = {"cli", "experiments", "training"}
 """Folders of tests whose networks are trained for a few steps."""
 MEASURED_S = pytest.StashKey[float]()
 """Processor time of these tests, and of all processes that they waited for, when it was last looked at."""
@@ -215,8 +215,7 @@ def joint_model(toy_corpus: Corpus) -> Model:
 @pytest.fixture(scope="session")
 def pictured_model(toy_corpus: Corpus) -> Model:
     """A model of lip distances and eigenlips."""
-    engine = engine_named("trajectory", {"predictor": "prior", "articulation": False})
-    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine, visual="both")[0]
+    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), visual="both")[0]
 
 
 @pytest.fixture(scope="session")
