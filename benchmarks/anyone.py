@@ -15,10 +15,10 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Iterator
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
-from kept_tracks import kept_track
 from numpy.typing import NDArray
 from robust import SPOKEN
 from scipy.signal import butter, fftconvolve, sosfilt
@@ -31,7 +31,8 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.noise import noisy_audio
-from lipmotion.types import Audio, Motion, Track
+from lipmotion.types import Audio, Channel, Motion, Track
+from lipmotion_faces.tracking.track import track
 
 RATE_HZ = 16_000
 CHANNELS = ("opening", "width", "outer")
@@ -41,6 +42,25 @@ PIECE_S = 5
 OPEN_VOWELS, NARROW = ("aa", "ae", "ay", "aw"), ("s", "t", "iy", "ih", "n", "d")
 ROUND, SPREAD = ("uw", "ow", "w", "ao"), ("iy", "ey")
 Curves = NDArray[np.float64]
+
+
+def kept_track(path: Path, folder: Path | None) -> Track:
+    """Return the track of a video, without pictures.
+
+    folder : where tracks are kept, by the content of the video; it is made if need be. None: tracked anew
+    """
+    if folder is None:
+        return track(path, crops=False)
+    kept = folder / f"{path.stem}-{sha256(path.read_bytes()).hexdigest()[:12]}.npz"
+    if not kept.exists():
+        found = track(path, crops=False)
+        folder.mkdir(parents=True, exist_ok=True)
+        np.savez(
+            kept, values=found.motion.values, rate_hz=found.motion.rate_hz, names=found.motion.names, seen=found.seen
+        )
+    with np.load(kept) as arrays:
+        channels = tuple(Channel(str(name)) for name in arrays["names"])
+        return Track(Motion(arrays["values"], float(arrays["rate_hz"]), channels), arrays["seen"])
 
 
 def main() -> None:

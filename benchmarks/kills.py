@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import json
 import os
 import platform
 import random
@@ -23,14 +24,14 @@ import sys
 import tempfile
 import threading
 import time
+import wave
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from kill_jobs import MAKERS, Job, make_inputs
-from kill_verdict import verdict
+import numpy as np
 
 COMMAND = [sys.executable, "-m", "lipmotion.cli.main"]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
@@ -39,6 +40,160 @@ END_SHARE, END_S = 0.2, 0.3
 """Share of the kills that are aimed at the end of a run, and the length of the end in seconds."""
 PATIENCE_S = 300
 OLD = b"an earlier output"
+
+
+CLIPS, TRAINING_CLIPS, BATCH_LINES = 3, 6, 96
+"""Recordings to track; utterances to train on; utterances for which two processes share the training."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A command.
+
+    replaces : the outputs of a verb that cannot continue after a stop: each is the old file or the complete new one
+    events   : the stream on which it writes JSON lines, if it does
+    weight   : its share of the kills
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    replaces: tuple[str, ...] = ()
+    events: str = ""
+    weight: int = 2
+
+    @property
+    def shown(self) -> str:
+        """The command line, with file names instead of paths."""
+        return " ".join(["lipmotion", *(Path(word).name if "/" in word else word for word in self.arguments)])
+
+
+def make_inputs(folder: Path, command: Sequence[str], names: Sequence[str]) -> Path:
+    """Write what jobs of these names use: recordings, sounds with motion, corpora and a model; return the folder."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.testing.toy import toy_utterances
+    from lipmotion_faces.testing import write_toy_recordings
+
+    write_toy_recordings(folder / "recordings", sentences=CLIPS)
+    counts = {"corpus": TRAINING_CLIPS} | ({"large": BATCH_LINES} if "train-share" in names else {})
+    utterances = toy_utterances(max(counts.values()))
+    for name, count in counts.items():
+        corpus = Corpus.create(folder / name)
+        for utterance in utterances[:count]:
+            corpus.add(utterance)
+    (folder / "sounds").mkdir()
+    for utterance in utterances[:TRAINING_CLIPS]:
+        _write_sound(folder / "sounds" / f"{utterance.name}.wav", utterance)
+    train = ["train", folder / "corpus", "-o", folder / "model.lipmotion", "--workers", "1", "--engine", "joint"]
+    subprocess.run([*command, *map(str, train)], check=True, capture_output=True)
+    shutil.rmtree(folder / "model.lipmotion.unfinished", ignore_errors=True)
+    return folder
+
+
+def _write_sound(path: Path, utterance: object) -> None:
+    """Write the sound of an utterance, and its motion as a table beside it."""
+    audio, motion = utterance.audio, utterance.track.motion  # type: ignore[attr-defined]
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(audio.rate_hz)
+        file.writeframes(np.round(audio.samples * 32767).astype("<i2").tobytes())
+    table = np.column_stack([motion.time_s, motion.values])
+    np.savetxt(path.with_suffix(".csv"), table, "%.9f", ",", header=f"time_s,{','.join(motion.names)}", comments="")
+
+
+def _train(name: str, corpus: Path, *more: str, **other: object) -> Job:
+    arguments = ("train", str(corpus), "-o", "m.lipmotion", "--machine-readable", *more)
+    return Job(name, arguments, events="stdout", **other)  # type: ignore[arg-type]
+
+
+def _prepare(name: str, recordings: Path, workers: str) -> Job:
+    return Job(name, ("corpus", "prepare", str(recordings), "-o", "corpus", "--workers", workers))
+
+
+def _animate(inputs: Path) -> Job:
+    speech = (
+        str(inputs / "recordings" / "toy00.mp4"),
+        "--model",
+        str(inputs / "model.lipmotion"),
+        "--recogniser",
+        "own",
+    )
+    return Job("animate", ("animate", *speech, "-o", "a.json", "a.mp4"), ("a.json", "a.mp4"))
+
+
+def _cues(inputs: Path) -> Job:
+    speech = (
+        str(inputs / "recordings" / "toy00.mp4"),
+        "--model",
+        str(inputs / "model.lipmotion"),
+        "--recogniser",
+        "own",
+    )
+    return Job("cues", ("cues", *speech, "-o", "a.tsv", "--machine-readable"), ("a.tsv",), "stderr")
+
+
+def _adapt(inputs: Path) -> Job:
+    recordings = [str(inputs / "recordings" / f"toy{n:02}.mp4") for n in range(CLIPS)]
+    arguments = ("adapt", *recordings, "--model", str(inputs / "model.lipmotion"), "-o", "a.lipmotion")
+    return Job("adapt", arguments, ("a.lipmotion",))
+
+
+COUPLED = ("--engine", "coupled", "--set", "chains=sVis 2vis", "--set", "mixtures=1", "--set", "states=2")
+MAKERS: dict[str, Callable[[Path], Job]] = {
+    "prepare": lambda inputs: _prepare("prepare", inputs / "recordings", "1"),
+    "prepare-sounds": lambda inputs: _prepare("prepare-sounds", inputs / "sounds", "2"),
+    "train": lambda inputs: _train("train", inputs / "corpus", "--workers", "1"),
+    "train-joint": lambda inputs: _train("train-joint", inputs / "corpus", "--workers", "1", "--engine", "joint"),
+    "train-coupled": lambda inputs: _train("train-coupled", inputs / "corpus", "--workers", "1", *COUPLED),
+    "train-share": lambda inputs: _train("train-share", inputs / "large", "--workers", "2", weight=1),
+    "animate": _animate,
+    "cues": _cues,
+    "adapt": _adapt,
+}
+
+
+LINE = "lipmotion: stopped; run the same command again to go on"
+EARLY_SHARE = 0.5
+"""Before this share of its usual duration, Python may still be starting, without the program's signal handlers."""
+
+
+def verdict(number: int, code: int, out: str, err: str, share: float, job: Job) -> tuple[str, str]:
+    """Return how a killed run ended, and what is wrong with it; an empty text if nothing is.
+
+    number, code : the signal, and the exit code
+    out, err     : standard output and standard error
+    share        : time of the signal relative to the usual duration
+    """
+    early = not out and share < EARLY_SHARE
+    if number == signal.SIGKILL:
+        return "killed at once", "" if code == -number else f"exit code {code}: {err}"
+    if "runpy" in err or (code == -number and early):
+        return "before the program had begun", ""
+    if code != 128 + number:
+        what = "killed without a word" if code == -number else f"exit code {code}"
+        return what, f"at {share:.0%} of its duration, with output {out[-200:]!r} and {err!r}"
+    return _stopped(out, err, job)
+
+
+def _stopped(out: str, err: str, job: Job) -> tuple[str, str]:
+    events, others = events_and_lines(out if job.events == "stdout" else err)
+    if job.events and (not events or events[-1].get("type") != "failure"):
+        return "no failure event", f"said {out!r} and {err!r}"
+    lines = err.splitlines() if job.events != "stderr" else others
+    if lines != [LINE] and not (job.events == "stderr" and not lines):
+        return "other words", f"said {err!r}"
+    return "stopped with one line", ""
+
+
+def events_and_lines(text: str) -> tuple[list[dict[str, object]], list[str]]:
+    """Return the JSON objects among the lines, and the other lines."""
+    events, others = [], []
+    for line in text.splitlines():
+        if line.startswith("{"):
+            events.append(json.loads(line))
+        else:
+            others.append(line)
+    return events, others
 
 
 @dataclass
@@ -132,8 +287,7 @@ def undisturbed(job: Job, folder: Path, pool: ThreadPoolExecutor) -> Goal:
         shutil.rmtree(here)
         return found
 
-    whole(0)  # fills the caches of the system
-    goals = list(pool.map(whole, range(1, 3)))
+    goals = list(pool.map(whole, range(2)))
     if any(goal.content != goals[0].content for goal in goals):
         raise SystemExit(f"{job.name}: two undisturbed runs differ")
     return Goal(goals[0].content, statistics.median(goal.duration_s for goal in goals))

@@ -40,8 +40,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from picture_measures import outline_figures, picture_figures, psnr_db
-from video_results import Judged, load_judged, save_judged
-from video_sheets import Sheets, face_crop, write_sheets
+from video_sheets import Judged, Sheets, face_crop, load_judged, save_judged, write_sheets
 from video_ways import (
     CROSSED,
     LOWER_FACE,

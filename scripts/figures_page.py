@@ -3,9 +3,9 @@
 A sheet is one JSON file: ``page``, the page that it belongs to; ``tables`` by name, each with ``columns``, ``rows`` and
 its stamp; ``stated``, what the text of that page says in figures beside the tables. The stamp of that is the table
 ``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
-``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A model is ``shipped`` and
-the first digits of the SHA-256 of its file; an engine and the digest of its default options; ``none``, where no model
-takes part; or words.
+``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``, which a page shows as long
+as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file; an engine and the
+digest of its default options; ``none``, where no model takes part; or words.
 
 In a page a table stands between ``<!-- figures: SHEET.TABLE -->`` and ``<!-- end -->``. Run
 ``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.
@@ -59,7 +59,9 @@ def made_by(model: str, current: frozenset[str]) -> str:
 
 def stamp(table: Sheet, current: frozenset[str]) -> str:
     """Return the line below a table: its commit, its model and the command that made it."""
-    command = f" · `{table['command']}`" if table.get("command") else ""
+    command = table.get("command", "")
+    gone = any(not (ROOT / "benchmarks" / name).exists() for name in re.findall(r"benchmarks/(\w+\.py)", command))
+    command = " · the driver is in the history" if gone else f" · `{command}`" if command else ""
     title = f"{table['title']}: " if table.get("title") and not table["columns"] else ""
     return f"*{title}{table['commit']}, {table['date']}{made_by(table['model'], current)}{command}*"
 

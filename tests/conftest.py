@@ -20,12 +20,10 @@ import pytest
 from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, Model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
-from lipmotion.pipeline.model import Model, save_model
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.network.hama import Hama
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion_faces.filmed.face import FilmedFace, save_face
@@ -48,7 +46,7 @@ settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100
 settings.load_profile(FIXED)
 
 
-HASTY = {"cli", "experiments"}
+HASTY = {"cli", "experiments", "training"}
 """Folders of tests whose networks are trained for a few steps."""
 MEASURED_S = pytest.StashKey[float]()
 """Processor time of these tests, and of all processes that they waited for, when it was last looked at."""

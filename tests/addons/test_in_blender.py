@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lipmotion import write
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.formats.blender import write_addon
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation, StateTrace
 from meshes.speech import motion, units
 from programs import python_with, run_with

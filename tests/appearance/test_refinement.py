@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from appearance.test_eigenlips import pictures
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.stats.pca import fit_pca

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formats.cue_examples import result, spoken, timeline
-from lipmotion.articulation.cue_sheets import CueSheet, choose_cues, default_hold_frames
+from lipmotion import CueSheet
+from lipmotion.articulation.cue_sheets import choose_cues, default_hold_frames
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent

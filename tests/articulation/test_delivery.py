@@ -7,16 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion import Delivery
 from lipmotion.articulation.contact import closures
-from lipmotion.articulation.delivery import (
-    Delivery,
-    closed_on_grid,
-    closed_times,
-    held,
-    intensified,
-    moved_in_time,
-    sound_units,
-)
+from lipmotion.articulation.delivery import closed_on_grid, closed_times, held, intensified, moved_in_time, sound_units
 from lipmotion.errors import InputError
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from meshes.speech import motion, units

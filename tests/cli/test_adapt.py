@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.pipeline.model import load_model, save_model
-from lipmotion.pipeline.training.adapt import adapt
+from lipmotion import adapt, load_model, save_model
 
 
 def sound(path: Path, samples: np.ndarray) -> Path:

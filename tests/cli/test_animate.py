@@ -8,12 +8,7 @@ import pytest
 from PIL import Image
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
-from lipmotion.formats.base import read_motion
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion import Corpus, SpeechRequest, animate, load_model, read_motion, write
 
 
 @pytest.fixture

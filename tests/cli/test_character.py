@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.formats.base import read_motion
+from lipmotion import read_motion
 from lipmotion.meshes.files.character_files import read_character
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj

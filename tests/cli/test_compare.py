@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
+from lipmotion import compare
 from lipmotion.measures.comparison_table import comparison_table
-from lipmotion_lab.compare import compare
 
 
 def table(factor: float) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import MissingDependencyError
 from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio, Item, Progress

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion_faces.corpus.coverage import coverage
 
 

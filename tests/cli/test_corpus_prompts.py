@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.pipeline.training.prompts import prompts
 
 

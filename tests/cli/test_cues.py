@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Done, RunCommand, is_one_error
+from lipmotion import animate, cues, load_model, write_cues
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.outputs.cues import cue_text, cues, write_cues
+from lipmotion.pipeline.outputs.cues import cue_text
 
 
 @pytest.fixture

@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, evaluate, load_model
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.evaluation_table import figures_table
-from lipmotion.pipeline.model import VERSION, load_model
+from lipmotion.pipeline.model import VERSION
 from lipmotion_lab.evaluation import figures as evaluation_figures
-from lipmotion_lab.evaluation.evaluate import evaluate
 
 
 @pytest.fixture(autouse=True)

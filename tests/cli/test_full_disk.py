@@ -9,7 +9,7 @@ import pytest
 
 from children import run_child
 from cli.conftest import RunCommand
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 
 resource = pytest.importorskip("resource")
 LIMIT = 3000

@@ -4,7 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.pipeline.model import VERSION, load_model, read_header, save_model, shipped_path
+from lipmotion import load_model, save_model
+from lipmotion.pipeline.model import VERSION, read_header, shipped_path
 
 
 def test_a_model_says_whose_recordings_it_comes_from(run: RunCommand, toy_model_file: Path) -> None:

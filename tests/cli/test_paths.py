@@ -11,16 +11,10 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
+from lipmotion import Corpus, Run, SpeechRequest, animate, cues, load_model, prepare, train, write, write_cues
 from lipmotion.cli.command_line import parser
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import load_model, shipped_path
-from lipmotion.pipeline.outputs.cues import cues, write_cues
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.training.train import Run, train
-from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion_faces.corpus.prepare import prepare
+from lipmotion.pipeline.model import shipped_path
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
 FIGURES = "c --lexicon l.txt"

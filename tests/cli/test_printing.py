@@ -19,13 +19,13 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand
+from lipmotion import Corpus
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import reporting
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.cli.verbs import info
-from lipmotion.corpora.store import Corpus
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit

@@ -16,11 +16,11 @@ import pytest
 
 from children import LIPMOTION, environment, run_child
 from cli.conftest import Done, RunCommand
+from lipmotion import Corpus
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, JsonLines
 from lipmotion.cli.terminal.progress import reporting
 from lipmotion.cli.terminal.stop import Stopper
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
 from lipmotion.types import Item, Progress
 from lipmotion_lab.verbs import evaluate

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
+from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.formats.base import read_motion
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import WEIGHT, Channel, Motion

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
+from lipmotion import read_motion
 from lipmotion.cli.main import main
-from lipmotion.formats.base import read_motion
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.testing.toy import ToySentence
 from meshes.heads import head, write_glb

@@ -7,11 +7,8 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
+from lipmotion import load_model, read_motion, speak, write
 from lipmotion.extensions import install_command
-from lipmotion.formats.base import read_motion
-from lipmotion.pipeline.generate.speak import speak
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.speech.voices import installed
 from speech import stand_in_voice
 

@@ -17,9 +17,9 @@ from children import LIPMOTION, PIPE, child, environment, run_child
 from children import Done as Completed
 from cli import signalled
 from cli.conftest import RunCommand
+from lipmotion import Corpus
 from lipmotion.cli.terminal.stop import Stopped, Stopper
 from lipmotion.cli.verbs import info
-from lipmotion.corpora.store import Corpus
 
 LINE = "lipmotion: stopped; run the same command again to go on"
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.corpora.store import Corpus
-from lipmotion.formats.base import read_motion
-from lipmotion.pipeline.model import Model, load_model
+from lipmotion import Corpus, Model, load_model, read_motion
 from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.train import TrainReport
 from lipmotion.speech.voices.synthesiser import SyntheticVoice

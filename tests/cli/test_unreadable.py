@@ -13,7 +13,7 @@ import pytest
 
 from children import LIPMOTION, run_child
 from cli.conftest import Done, is_one_error
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 
 MODEL = "--model m.lipmotion --recogniser own"
 LINES = [

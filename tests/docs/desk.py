@@ -13,7 +13,7 @@ from PIL import Image
 
 import lipmotion
 from docs.site_pages import ROOT
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.formats.sound import write_sound
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion.types import Audio

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from children import environment, run_child
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")

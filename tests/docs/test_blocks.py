@@ -12,11 +12,10 @@ import pytest
 import lipmotion
 from docs.desk import copied, set_desk
 from docs.site_pages import ROOT, Block, blocks, pages
+from lipmotion import Corpus, Model
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
-from lipmotion.corpora.store import Corpus
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training import train as train_module
 
 TESTED = {

@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 
 from docs.test_links import broken
+from lipmotion import Corpus, load_model
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
-from lipmotion.corpora.store import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.bootstrap import bootstrap_interval
-from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training import train as train_module
 from lipmotion.testing import toy_utterances
 from lipmotion.types import Track, Utterance

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from children import LIPMOTION, Done, environment, run_child
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 
 PAGES = Path(__file__).parents[2] / "docs" / "extend"
 PROJECT = """[build-system]

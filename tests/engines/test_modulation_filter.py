@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.engines import engine_named
-from lipmotion.engines.base import Engine
+from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import ModelFormatError
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import silent_monitor

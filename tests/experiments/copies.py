@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.types import Channel, Utterance
 
 

@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Selection, evaluate, load_model
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.model import load_model
 from lipmotion.testing.examples import speech, timeline
 from lipmotion.types import Progress
 from lipmotion_lab.engines.engine_comparison import engines, table
 from lipmotion_lab.engines.models import ENGINES_COMPARED
-from lipmotion_lab.evaluation.evaluate import evaluate
 from lipmotion_lab.runner import ExperimentSettings
 
 LONG = pytest.mark.long

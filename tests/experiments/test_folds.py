@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied, renamed
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab.evaluation.figures import BILABIAL

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 
 from experiments.copies import renamed
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Selection, evaluate, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.training.train import train
 from lipmotion_lab import learning_curve as module
-from lipmotion_lab.evaluation.evaluate import evaluate
 from lipmotion_lab.learning_curve import SIZES, learning_curve, table
 from lipmotion_lab.runner import ExperimentSettings
 

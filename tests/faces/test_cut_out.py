@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from lipmotion import Staging
 from lipmotion.errors import InputError
 from lipmotion.units.mouth_chart import BLAIR
-from lipmotion_faces.base import Staging
 from lipmotion_faces.cut_out import read_cut_out
 
 LETTERS = "ABCDEFGHX"

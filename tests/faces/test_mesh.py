@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion import Staging
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.model.bones import HEAD, NECK, Bone
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
-from lipmotion_faces.base import Staging
 from lipmotion_faces.mesh import MeshFace, MeshStage
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units

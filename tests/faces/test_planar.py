@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from lipmotion import Staging
 from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.types import Channel, Motion, Timeline
 from lipmotion_faces import base
-from lipmotion_faces.base import DrawsPlanes, Face, Staging
+from lipmotion_faces.base import DrawsPlanes, Face
 from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
 from lipmotion_faces.portrait.movement import HeadPlacement
 from lipmotion_faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of

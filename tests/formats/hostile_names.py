@@ -16,10 +16,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from lipmotion.articulation.cue_sheets import CueSheet
+from lipmotion import CueSheet, read_motion
 from lipmotion.citations import model_citations
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.base import read_motion, write_motion
+from lipmotion.formats.base import write_motion
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.formats.label_files import write_labels
 from lipmotion.formats.textgrid import parse_interval_tiers

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.formats.base import read_motion, write_motion
+from lipmotion.formats.base import write_motion
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, with_mouth
 from lipmotion.meshes.model.shape_names import ARKIT_52
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.formats.base import read_motion
 from lipmotion.meshes.model.shape_names import ARKIT_52
 from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
 from lipmotion.types import Motion

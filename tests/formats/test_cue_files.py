@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from formats.cue_examples import result, spoken
-from lipmotion.articulation.cue_sheets import CueSheet, choose_cues
+from lipmotion import CueSheet
+from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.errors import ExportError
 from lipmotion.formats.cues import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.testing.toy import ToySentence

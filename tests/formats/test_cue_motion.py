@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.articulation.cue_sheets import CueSheet
+from lipmotion import CueSheet, read_motion
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.formats.base import read_motion
 from lipmotion.formats.cues import CUE_FORMATS, cue_motion, read_cues, write_cue_file
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import Span, Timeline

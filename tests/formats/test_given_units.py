@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import SpeechRequest, load_model
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_units
 from lipmotion.pipeline.generate.outlook import outlook_of
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech, understood_speech
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser

@@ -10,7 +10,8 @@ import pytest
 
 from formats.cue_examples import result, spoken
 from formats.test_cue_files import shown_by_opentoonz
-from lipmotion.articulation.cue_sheets import CueSheet, choose_cues
+from lipmotion import CueSheet
+from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.papagayo import UNKNOWN
 from lipmotion.testing.toy import ToySentence

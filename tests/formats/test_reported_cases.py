@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from lipmotion import Request
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_labels, read_phones, read_transcript, speakers_in
-from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.types import TimedTranscript
 from lipmotion.units import UNKNOWN_PHONES

@@ -9,7 +9,8 @@ import pytest
 
 import programs
 from formats.cue_examples import spoken
-from lipmotion.articulation.cue_sheets import CueSheet, choose_cues
+from lipmotion import CueSheet
+from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.formats.cues import format_of, write_cue_file
 
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import programs
+from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.base import read_motion, write_motion
+from lipmotion.formats.base import write_motion
 from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_weights, given_gaze

@@ -10,8 +10,9 @@ import pytest
 
 import programs
 from formats.curve_examples import generation
+from lipmotion import read_motion
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import read_motion, write_motion
+from lipmotion.formats.base import write_motion
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.model.head_angles import ANGLES, head_quaternions
 from lipmotion.types import Generation

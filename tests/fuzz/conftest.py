@@ -7,7 +7,7 @@ import pytest
 
 from fuzz.inputs import Good
 from fuzz.worker import Worker
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 
 
 @pytest.fixture(scope="session")

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from fuzz.inputs import Good
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.model import save_model
-from lipmotion.pipeline.training.train import train
 from lipmotion.testing.toy import toy_utterances
 
 SENTENCES = 6

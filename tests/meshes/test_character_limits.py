@@ -88,23 +88,6 @@ def test_lines_of_obj_are_counted_before_they_are_read(tmp_path: Path) -> None:
             read_character(path)
 
 
-def test_a_picture_that_many_materials_name_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from lipmotion.meshes.files import obj_files
-    from lipmotion.meshes.model.textures import Texture
-
-    read = []
-    texture = Texture(np.zeros((1, 1, 4), np.uint8))
-    monkeypatch.setattr(obj_files, "read_texture", lambda *given: read.append(given) or texture)
-    names = "".join(f"newmtl m{n}\nmap_Kd skin.png\n" for n in range(9)) + "newmtl other\nmap_Kd other.png\n"
-    (tmp_path / "head.mtl").write_text(names)
-    (tmp_path / "skin.png").write_bytes(b"x")
-    faces = "".join(f"usemtl m{n}\nf 1 2 3\n" for n in range(9))
-    (tmp_path / "head.obj").write_text(f"mtllib head.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}")
-    mesh = read_character(tmp_path / "head.obj")
-    assert [part.material.texture for part in mesh.parts] == [texture] * 9
-    assert len(read) == 1
-
-
 def test_a_file_without_scenes_is_animated(tmp_path: Path) -> None:
     content, binary = document()
     del content["scene"], content["scenes"]

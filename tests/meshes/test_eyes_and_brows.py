@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lipmotion import Staging
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
@@ -13,7 +14,7 @@ from lipmotion.meshes.model.head_angles import ANGLES
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline
 from lipmotion.types.moods import moods_of
 from lipmotion.types.motion import RADIAN
-from lipmotion_faces.base import Staging, alive
+from lipmotion_faces.base import alive
 from lipmotion_faces.head.performance import head_poses
 
 TIME_S = np.arange(60) / 30

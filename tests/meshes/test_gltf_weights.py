@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.formats.base import read_motion, readable_suffixes
+from lipmotion.formats.base import readable_suffixes
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes import gltf
 from meshes.heads import head, write_glb

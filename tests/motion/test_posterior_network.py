@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion import load_model
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion import posterior_network
 from lipmotion.motion.acoustic_network import POSTERIOR_SHARES, AcousticNetwork
 from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.posterior_network import RECURRENT, PosteriorNetwork
 from lipmotion.motion.predictors import PredictorTraining, predictor_arrays, predictor_from_arrays
-from lipmotion.pipeline.model import load_model
 from lipmotion.types import (
     Channel,
     ConditionSpectrum,

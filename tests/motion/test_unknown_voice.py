@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lipmotion import SpeechRequest, load_model
 from lipmotion.motion.closure import REACH_S, closable_ranges
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import (
@@ -22,8 +23,6 @@ from lipmotion.motion.unknown_voice import (
     with_breath,
     with_contrast,
 )
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.recogniser import voice_knowledge
 from lipmotion.testing.examples import timeline

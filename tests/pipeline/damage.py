@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion import Model
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_from_arrays
 from lipmotion.motion.eigenlips import eigenlips_from_arrays
-from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.adaptation import adaptation_from_arrays
 from lipmotion.types import Generation, Speech
 

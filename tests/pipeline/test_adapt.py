@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model, SpeechRequest, adapt, animate, load_model, save_model
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model, load_model, read_header, save_model
-from lipmotion.pipeline.training.adapt import adapt
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.model import read_header
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 from pipeline.test_model import npy, rewritten

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lipmotion import Delivery, Staging, read_motion
 from lipmotion.articulation.contact import LEAST_GAP
-from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
-from lipmotion.formats.base import read_motion, write_motion
+from lipmotion.formats.base import write_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.facial_animation import FAP
@@ -27,7 +27,6 @@ from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.moods import MOODS
 from lipmotion.units import closing_phones
-from lipmotion_faces.base import Staging
 from lipmotion_faces.head.performance import head_poses
 from lipmotion_faces.head.shape_fit import lip_gap
 from lipmotion_faces.head.stage import figure, head_mesh

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import lipmotion
+from lipmotion import Model
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.cues import CUE_FORMATS
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.types import Generation, Timeline
 from lipmotion.units import LIP_CLOSING, is_silent

@@ -8,11 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from lipmotion import Model, SpeechRequest
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_arrays
 from lipmotion.motion.eigenlips import eigenlips_arrays
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
 from lipmotion.testing.toy import ToySentence

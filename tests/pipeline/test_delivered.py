@@ -9,16 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Delivery, read_motion, write
 from lipmotion.articulation.contact import closures
-from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
-from lipmotion.formats.base import read_motion
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey
 from lipmotion_faces import Face, Staging

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from lipmotion import Staging
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, silent_monitor
-from lipmotion_faces.base import Staging
 from lipmotion_faces.outputs.drawn_video import load_drawing, write_drawn_face
 from lipmotion_faces.portrait.planar import PlanarRasteriser
 from lipmotion_faces.registry import face_named

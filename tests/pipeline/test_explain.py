@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import lipmotion
+from lipmotion import Model, SpeechRequest
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate.explain import explanation_document, explanation_text
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence
 
 WORDS = "See Bob, papa & mama!"

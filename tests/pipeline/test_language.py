@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 import lipmotion
+from lipmotion import Model, Request, SpeechRequest
 from lipmotion.errors import InputError
-from lipmotion.pipeline.job import Request
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand import language as told
 from lipmotion.pipeline.understand.language import in_language
 from lipmotion.pipeline.understand.read_request import read_request
-from lipmotion.pipeline.understand.request import SpeechRequest, request_of
+from lipmotion.pipeline.understand.request import request_of
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE, LanguageLexicon
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model, animate, load_model, save_model
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.pipeline import model as module
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import VERSION, Model, load_model, read_header, save_model
+from lipmotion.pipeline.model import VERSION, read_header
 from lipmotion.storage.archive import HEADER
 from lipmotion.types import Audio
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.articulation.delivery import Delivery, closed_times
+from lipmotion import Delivery, write
+from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
@@ -21,7 +22,6 @@ from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.motion_files import in_format, thinned
 from lipmotion.pipeline.outputs.motion_input import read_generation
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.moods import moods_of
 from lipmotion_faces import Staging

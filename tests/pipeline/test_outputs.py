@@ -8,15 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from lipmotion import Model, animate, cues, write, write_cues
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs import output
-from lipmotion.pipeline.outputs.cues import CueOutput, cues, write_cues
+from lipmotion.pipeline.outputs.cues import CueOutput
 from lipmotion.pipeline.outputs.motion_files import MotionOutput
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, plan
-from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput, write
+from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput
 from lipmotion.types import Generation
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion_faces.outputs.scenes import SceneOutput

@@ -6,10 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.pipeline.model import load_model, save_model
-from lipmotion.pipeline.training.train import train
-from lipmotion_lab.evaluation.evaluate import evaluate
+from lipmotion import Corpus, Selection, evaluate, load_model, save_model, train
 
 TRAIN, TEST = 30, 6
 
@@ -40,7 +37,7 @@ def some_of_grid(recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> 
 @pytest.mark.slow
 def test_from_videos_to_figures(some_of_grid: Path, tmp_path: Path) -> None:
     pytest.importorskip("mediapipe")
-    from lipmotion_faces.corpus.prepare import prepare
+    from lipmotion import prepare
 
     report = prepare(some_of_grid, tmp_path / "corpus")
     assert not report.failed

@@ -8,15 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.formats.base import read_motion
+from lipmotion import Model, SpeechRequest, animate, cues, read_motion, speak, write
 from lipmotion.formats.label_files import read_units
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.speak import speak
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outputs.cues import cue_text, cues
+from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.pipeline.outputs.motion_input import read_generation
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.testing.toy import ToySentence

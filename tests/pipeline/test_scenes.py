@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.articulation.delivery import Delivery, closed_times
+from lipmotion import Delivery
+from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.gltf_accessors import GltfArrays

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.pipeline.generate.animate import animate
+from lipmotion import animate
 from lipmotion.pipeline.model import read_header, shipped_path
 from lipmotion.types import Generation
 

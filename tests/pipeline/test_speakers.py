@@ -10,21 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection, SpeechRequest, animate, evaluate, explain, load_model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speaker_maps import speaker_arrays
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.explain import explain
 from lipmotion.pipeline.generate.posteriors import animate_with_posteriors
-from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
-from lipmotion_lab.evaluation.evaluate import evaluate
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
@@ -184,7 +178,9 @@ def test_an_explanation_is_in_the_units_of_the_person(model: Model, toy_sentence
 
 
 def test_one_person_is_not_mapped(people: Corpus) -> None:
-    model, _ = train(people, selection=Selection("train", ("anna",)), recogniser=SMALL)
+    model, _ = train(
+        people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
+    )
     assert model.speakers is None
 
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion.pipeline.generate.state_runs import StateRun, run_lines, runs_of, state_runs
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion import Model, SpeechRequest, state_runs
+from lipmotion.pipeline.generate.state_runs import StateRun, run_lines, runs_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from lipmotion import Model, load_model
 from lipmotion.errors import AlignmentError
-from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.understand.transcribe import (
     MOST_WARNINGS,
     Transcription,

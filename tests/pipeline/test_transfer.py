@@ -10,21 +10,27 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion.corpora.store import Corpus
+from lipmotion import (
+    Corpus,
+    Model,
+    SpeechRequest,
+    animate,
+    explain,
+    load_model,
+    map_onto,
+    save_model,
+    train,
+    with_person,
+)
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.explain import explain
-from lipmotion.pipeline.model import Model, load_model, save_model, with_person
-from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.understand.request import Onto, SpeechRequest
+from lipmotion.pipeline.understand.request import Onto
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.transfer import map_onto
 
 GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
 """How ben's opening, width and outer differ from those of the toy."""

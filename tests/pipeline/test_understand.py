@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from lipmotion import Model, SpeechRequest
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate.outlook import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, outlook_of
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand import understood_speech as pipeline_understand
-from lipmotion.pipeline.understand.request import SpeechRequest, request_of
+from lipmotion.pipeline.understand.request import request_of
 from lipmotion.pipeline.understand.understood_speech import (
     recognised_speech,
     speech_of,

@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion import Model, SpeechRequest, animate
 from lipmotion.articulation.pauses import LAUGH_GAP
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.delivered import delivered
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.types import Delivery
 from lipmotion.types.voice_event import LAUGHTER
 from speech.made_voices import laugh, pulses, recording, said, vowels

@@ -5,10 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from lipmotion import SpeechRequest, animate, load_model
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand, understood_speech
 from lipmotion.pipeline.understand.words import recognise_words, words_as_text, write_words
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition

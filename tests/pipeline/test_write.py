@@ -12,15 +12,12 @@ import av
 import numpy as np
 import pytest
 
+from lipmotion import Model, animate, read_motion, write
 from lipmotion.articulation.delivery import closed_on_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.base import read_motion
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.types import Audio, Generation
+from lipmotion.types import Generation
 from lipmotion_faces import Staging
 
 
@@ -54,21 +51,6 @@ def test_a_recording_may_have_any_name(result: Generation, toy_model: Model, tmp
     document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert document["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
     assert len(read_motion(tmp_path / "a.npz")[1]) == len(result.units)
-
-
-def test_the_sound_of_a_video_is_read_without_a_second_warning(
-    result: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    warns = []
-
-    def read(*_: object, warn: bool = True) -> Audio:
-        warns.append(warn)
-        return Audio(np.zeros(16_000, np.float32), 16_000)
-
-    monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.read_audio", read)
-    monkeypatch.setattr("lipmotion_faces.video.mp4.write_mp4", lambda *_, **__: None)
-    write(result, [tmp_path / "a.mp4"], speech=toy_speech)
-    assert warns == [False]
 
 
 def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> None:

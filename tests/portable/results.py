@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.train import train
+from lipmotion.motion import posterior_network
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.testing.toy import toy_sentences, toy_utterances
@@ -27,7 +26,7 @@ TRAINED = {
     "trajectory": ("trajectory", {"predictor": "prior"}),
     "network": ("trajectory", {}),
     "joint": ("joint", {"mixtures": 1}),
-    "coupled": ("coupled", {"chains": "sVis 2vis", "mixtures": 1}),
+    "coupled": ("coupled", {"chains": "sVis 2vis", "mixtures": 1, "articulation": False}),
 }
 """Engines and options of the models that are trained."""
 Results = Iterator[tuple[str, NDArray[np.generic]]]
@@ -35,7 +34,7 @@ Results = Iterator[tuple[str, NDArray[np.generic]]]
 
 def without_speech() -> dict[str, Audio]:
     """Return sounds of which all features are 0."""
-    values = {"silence": np.zeros(RATE_HZ), "ten minutes of silence": np.zeros(600 * RATE_HZ)}
+    values = {"silence": np.zeros(RATE_HZ), "a minute of silence": np.zeros(60 * RATE_HZ)}
     values |= {"constant": np.full(RATE_HZ, 0.3), "faint constant": np.full(3 * RATE_HZ, 1e-6)}
     values |= {"half the sampling rate": np.tile([0.5, -0.5], RATE_HZ)}
     return {name: Audio(samples.astype(np.float32), RATE_HZ) for name, samples in values.items()}
@@ -62,7 +61,8 @@ def animated(name: str, model: Model | None, speech: Audio | Path) -> Results:
 
 
 def trained() -> Results:
-    """Yield the results of models that are trained here."""
+    """Yield the results of models that are trained here; of networks by few steps: every one rounds anew."""
+    posterior_network.STEPS = posterior_network.RECURRENT_STEPS = 6.0
     with TemporaryDirectory() as folder:
         corpus = Corpus.create(Path(folder) / "toy")
         for utterance in toy_utterances(8):

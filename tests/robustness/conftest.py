@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import here, run, run_outside
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from robustness import spoken_cases
 from robustness.case import Bench
 from speech import stand_in_voice

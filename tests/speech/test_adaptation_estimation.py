@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
+from lipmotion import Model
 from lipmotion.errors import InputError
-from lipmotion.pipeline.model import Model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
 from lipmotion.speech.recognition.recogniser import Recogniser

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model, load_model
 from lipmotion.corpora.layouts import words_of_name
-from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import (
     DOUBTFUL_SCORE,

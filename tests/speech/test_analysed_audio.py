@@ -9,9 +9,8 @@ from zlib import crc32
 import numpy as np
 import pytest
 
+from lipmotion import Model, animate, load_model
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech.features import analysed_audio as module
 from lipmotion.speech.features import mfcc as front_end
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.pipeline.model import Model
+from lipmotion import Model
 from lipmotion.speech.recognition import combined_phones as module
 from lipmotion.speech.recognition.combined_phones import NOISES, combine_phones, combined_log_likelihoods
 from lipmotion.speech.recognition.general.acoustic import general_model

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lipmotion import load_model
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.hmm.log_likelihoods import log_likelihoods_from
-from lipmotion.pipeline.model import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network import network_search, posteriors
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored

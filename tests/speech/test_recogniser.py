@@ -8,17 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model, load_model
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.recognition import recogniser as module
 from lipmotion.speech.recognition import word_search
-from lipmotion.speech.recognition.combined_phones import combined_log_likelihoods
 from lipmotion.speech.recognition.recogniser import (
-    FULL_WEIGHT_SCORE,
-    NO_WEIGHT_SCORE,
     Recogniser,
 )
 from lipmotion.speech.sound.audio_files import read_audio
@@ -185,20 +181,6 @@ def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list
 def test_an_unknown_kind() -> None:
     with pytest.raises(InputError, match="unknown recogniser 'best'; required one of: auto, words, fast, own, general"):
         Recogniser(load_model().phones, "best")
-
-
-def test_the_own_models_are_weighted_by_the_speaker_similarity(
-    hmm: UnitHmm, sentences: list[ToySentence], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "FEW_GAUSSIANS", 0)
-    weights = []
-    real = combined_log_likelihoods
-    monkeypatch.setattr(module, "combined_log_likelihoods", lambda *given: weights.append(given[2]) or real(*given))
-    middle = (FULL_WEIGHT_SCORE + NO_WEIGHT_SCORE) / 2
-    for score, weight in ((0.0, 1.0), (middle, 0.5), (-99.0, 0.0)):
-        monkeypatch.setattr(module, "speaker_similarity", lambda *_, score=score: SpeakerSimilarity(1.0, score))
-        recognise(hmm, sentences[0].audio, "fast")
-        assert weights[-1] == pytest.approx(weight)
 
 
 def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: list[ToySentence]) -> None:

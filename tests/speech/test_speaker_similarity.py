@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.pipeline.model import Model
+from lipmotion import Model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.speaker_similarity import WARPS, speaker_similarity
 from lipmotion.testing.toy import toy_sentences

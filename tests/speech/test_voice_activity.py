@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lipmotion import animate
 from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, power_level, spoken_frames
-from lipmotion.pipeline.generate.animate import animate
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW, log_energy
 from lipmotion.speech.sound.audio_files import read_audio

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.pipeline.model import load_model
+from lipmotion import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition.recognised_speech import Recognition

@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lipmotion.pipeline.model import Model
+from lipmotion import Model
 from lipmotion_studio.access import TOKEN_HEADER, Access
 from lipmotion_studio.application import studio_application
 from lipmotion_studio.folder import ProjectFolder, opened_folder

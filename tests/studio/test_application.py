@@ -16,10 +16,10 @@ import av
 import numpy as np
 import pytest
 
+from lipmotion import Model, save_model
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
-from lipmotion.pipeline.model import Model, save_model
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.units import Lexicon

@@ -15,9 +15,8 @@ from typing import Any
 import pytest
 
 from children import wait_until
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, Model, load_model
 from lipmotion.errors import InputError
-from lipmotion.pipeline.model import Model, load_model
 from lipmotion.testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")

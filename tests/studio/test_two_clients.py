@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from lipmotion import Model
 from lipmotion.pipeline.edit_files import read_edits, write_edits
-from lipmotion.pipeline.model import Model
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 

@@ -24,9 +24,9 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
+from lipmotion import Model
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import read_edits
-from lipmotion.pipeline.model import Model
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion_studio.access import Access

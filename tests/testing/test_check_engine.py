@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lipmotion.engines.base import Engine, Fit
+from lipmotion.engines import Engine, Fit
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion import (
     LEARNED_MOTION_ARRAYS,

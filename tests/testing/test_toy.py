@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lipmotion import Lexicon
 from lipmotion.errors import ExportError, InputError
 from lipmotion.testing.toy import (
     LIP_LEAD_S,
@@ -21,7 +22,6 @@ from lipmotion.testing.toy import (
     toy_utterances,
 )
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units.lexicon import Lexicon
 from lipmotion.units.phones import SILENCE
 from lipmotion_faces.testing import write_toy_recordings
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.pipeline.model import load_model
+from lipmotion import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.formant_synthesiser import synthesise

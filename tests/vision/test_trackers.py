@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import prepare
 from lipmotion.errors import InputError
 from lipmotion.extensions import GROUPS
-from lipmotion_faces.corpus.prepare import prepare
 from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion_faces.tracking.mediapipe import FaceFinder, MediaPipe
 from lipmotion_faces.tracking.track import track

@@ -1,7 +1,7 @@
 """Steady placing: maps of a tracked face without the noise of tracking, so that a patch placed by them sits still.
 
-``benchmarks/steadying.py`` measures how far one half of nose and cheeks moves from frame to frame after alignment, root
-mean square, px of the picture, where registration sees only the other half and so is noisier than in use:
+How far one half of nose and cheeks moves from frame to frame after alignment, root mean square, px of the picture,
+where registration sees only the other half and so is noisier than in use:
 
                               tracked  Gaussian of a frame  steady  registered  registered, steady
 4 clips of GRID ``val``         0.220                0.136   0.139       0.190               0.165

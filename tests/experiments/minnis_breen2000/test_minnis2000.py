@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.training.train import train
-from lipmotion_lab.evaluation.evaluate import evaluate
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
 from lipmotion_lab.minnis_breen2000.minnis2000 import (
     ADDITIONS,

@@ -14,7 +14,7 @@ import pytest
 
 from experiments.copies import copied, renamed
 from experiments.report.test_sections import figures_of
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.units import Lexicon

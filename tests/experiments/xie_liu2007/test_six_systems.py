@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
-from lipmotion_lab.evaluation.evaluate import evaluate
 from lipmotion_lab.evaluation.held_out import compared_clips, held_out_recordings
 from lipmotion_lab.noise import NoiseConditions
 from lipmotion_lab.runner import ExperimentSettings

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.measures import curves
-from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.examples import examples
 from lipmotion.types import silent_monitor

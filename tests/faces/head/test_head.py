@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from faces.head.motions import NOTHING_SAID, opening
+from lipmotion import Staging
 from lipmotion.errors import InputError
 from lipmotion_faces import face_named
-from lipmotion_faces.base import Staging
 from lipmotion_faces.head import Head, render
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.stage import Stage, camera_for

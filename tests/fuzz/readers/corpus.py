@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzz.inputs import Files, Good, picked_up
 from fuzz.readers.plausible import check_motion, require
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.types import Audio, Motion, Timeline, Track, Utterance
 

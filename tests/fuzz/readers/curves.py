@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require, short_speech
-from lipmotion.articulation.cue_sheets import CueSheet
+from lipmotion import Corpus, CueSheet
 from lipmotion.corpora.facegood import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
-from lipmotion.corpora.store import Corpus
 from lipmotion.formats.base import write_motion
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.cues import CUE_FORMATS

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, require, short_speech
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion import SpeechRequest, animate
 from lipmotion.units import PHONES, Lexicon
 
 TEXTS = (

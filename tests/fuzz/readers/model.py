@@ -6,9 +6,7 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, short_speech
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion import SpeechRequest, animate, load_model
 
 
 def seeds(good: Good) -> list[Files]:

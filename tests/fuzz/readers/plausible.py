@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 
 from fuzz.inputs import Good, ImplausibleError
-from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.write import write
+from lipmotion import Corpus, Model, load_model, write
 from lipmotion.types import Audio, Generation, Motion
 from lipmotion.types.motion import LARGEST_MAGNITUDE
 

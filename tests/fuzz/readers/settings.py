@@ -10,10 +10,9 @@ from tempfile import TemporaryDirectory
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
+from lipmotion import Edits, Job, Request
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits
-from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.job import Job, Request
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit

@@ -8,10 +8,7 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, short_speech
-from lipmotion.formats.base import read_motion
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion import SpeechRequest, animate, read_motion, write
 from robustness.motion_cases import GOOD
 
 

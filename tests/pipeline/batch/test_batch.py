@@ -18,7 +18,7 @@ import pytest
 
 import lipmotion
 from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
-from lipmotion.articulation.delivery import Delivery
+from lipmotion import Delivery, Job, Model, Outputs, Request
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
@@ -27,8 +27,6 @@ from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
 from lipmotion.pipeline.batch.pool import WorkerDied
 from lipmotion.pipeline.edit_files import EditFile
-from lipmotion.pipeline.job import Job, Outputs, Request
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.opened_job import OpenedJob
 from lipmotion.types import Item
 from lipmotion_faces.filmed.face import FilmedFace

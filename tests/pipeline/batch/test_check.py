@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.pipeline.batch import check
+from lipmotion import Job, Request
+from lipmotion.pipeline.batch import BatchLine, check
 from lipmotion.pipeline.batch.check import (
     FEWEST_LINES,
     CheckedLine,
@@ -20,8 +21,6 @@ from lipmotion.pipeline.batch.check import (
     expected_s,
     letters_of,
 )
-from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.job import Job, Request
 
 pytest.importorskip("joblib")
 RATE_HZ = 16_000

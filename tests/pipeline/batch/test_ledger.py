@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from lipmotion import Job, Outputs, Request
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.batch import settings
+from lipmotion.pipeline.batch import BatchLine, settings
 from lipmotion.pipeline.batch.ledger import RECEIPTS, RUN, WORK, Place, opened_ledger, read_receipt, write_receipt
-from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
+from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER
 from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD_BYTES, Record
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import (
@@ -22,7 +23,6 @@ from lipmotion.pipeline.batch.settings import (
     input_files,
     line_fingerprint,
 )
-from lipmotion.pipeline.job import Job, Outputs, Request
 from lipmotion.storage.files import LOCK
 
 CONTENT = b"motion"

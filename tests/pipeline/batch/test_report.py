@@ -9,8 +9,8 @@ from urllib.parse import unquote
 
 import pytest
 
+from lipmotion.pipeline.batch import BatchLine
 from lipmotion.pipeline.batch.ledger import Place, opened_ledger
-from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.report import COLUMNS, doubt_of, write_reports
 from lipmotion.printable import printable
 

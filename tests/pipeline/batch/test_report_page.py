@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from children import wait_until
+from lipmotion.pipeline.batch import BatchLine
 from lipmotion.pipeline.batch.ledger import Place, opened_ledger
-from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.marks import Mark, read_marks
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.types import Audio

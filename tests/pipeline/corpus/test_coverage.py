@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon, most_similar_lips

@@ -11,13 +11,12 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Channel, Motion, Progress, Track
 from lipmotion_faces.corpus import long_videos
 from lipmotion_faces.corpus import prepare as module
-from lipmotion_faces.corpus.prepare import prepare
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.video_scan import VideoScan

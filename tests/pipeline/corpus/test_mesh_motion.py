@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Corpus, prepare
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.store import Corpus
 from lipmotion.corpora.vocaset import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
 from lipmotion.errors import InputError
-from lipmotion_faces.corpus.prepare import prepare
 from meshes.flame import head
 
 RATE_HZ, MESHES = 60.0, 30

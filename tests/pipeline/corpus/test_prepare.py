@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 from children import NOWHERE, child
+from lipmotion import Corpus, prepare
 from lipmotion.corpora.entry import read_entry
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.storage.files import locked
 from lipmotion.types import Channel, Item, Motion, Progress, Track
 from lipmotion_faces.corpus import prepare as module
-from lipmotion_faces.corpus.prepare import prepare
 
 
 def speak(path: Path, seed: int) -> None:

@@ -11,10 +11,9 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError
 from lipmotion.types import Item
-from lipmotion_faces.corpus.prepare import prepare
 
 CLIP = "brwa3s"
 COUNT = 75

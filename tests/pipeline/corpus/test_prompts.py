@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.prompts import greedy_cover, prompts, units_of
 from lipmotion.units import Lexicon

@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Corpus, prepare
 from lipmotion.corpora.source_recordings import SourceRecording
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
 from lipmotion.formats.base import write_motion
 from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
 from lipmotion_faces.corpus import long_videos as module
-from lipmotion_faces.corpus.prepare import prepare
 from lipmotion_faces.corpus.separate_sound import SeparateSound, in_step, on_own_time
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Corpus
 from lipmotion.corpora.entry import read_entry
-from lipmotion.corpora.store import Corpus
 from lipmotion.measures.offset import best_offset
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio

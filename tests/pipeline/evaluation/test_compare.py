@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import lipmotion
+from lipmotion import compare
 from lipmotion.errors import InputError
 from lipmotion.measures import curves, vertices
 from lipmotion.types import WEIGHT, Channel, Motion, Track
-from lipmotion_lab.compare import compare
 from meshes.speech import motion
 
 SPEECH = motion()

@@ -11,19 +11,18 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection
+from lipmotion import evaluate as evaluated
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.generation_for import generate_for
-from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import NO_WEIGHT_SCORE, OWN_VOICE_SCORE, cached_recogniser
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
 from lipmotion_lab.evaluation.evaluate import _was_trained_on
-from lipmotion_lab.evaluation.evaluate import evaluate as evaluated
 from lipmotion_lab.evaluation.figures import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, here, run
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion import SpeechRequest, animate
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import film_of, write_film

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import toy_utterances

@@ -9,20 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.articulation.delivery import Delivery
+from lipmotion import Delivery, Edits, Request, SpeechRequest, Staging, animate, load_model
 from lipmotion.errors import InputError
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
-from lipmotion.pipeline.edits import STEPS, Edits, MoodStep, step_of
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.job import Request
-from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.edits import STEPS, MoodStep, step_of
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion.units import words_in_time
-from lipmotion_faces.base import Staging
 
 SENTENCES = (
     "word 3 is blue",

@@ -7,13 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion import Edits, Model, Session, SpeechRequest
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
-from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, excerpt_of_change
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Generation, Pin, Span, Timeline, Unit

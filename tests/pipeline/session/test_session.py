@@ -10,21 +10,15 @@ from threading import Barrier
 import numpy as np
 import pytest
 
+from lipmotion import Delivery, Edits, Model, Session, SpeechRequest, animate, write
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
-from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edit_files import EditFile
-from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
-from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion_faces.outputs.drawn_video import sound_track

@@ -9,23 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
-from lipmotion.formats.base import read_motion
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance
-from lipmotion_lab.evaluation.evaluate import evaluate
 from lipmotion_lab.evaluation.held_out import compared_clips, held_out_recordings
 
 SMALL = HmmConfig(mixtures=1, iterations=2)

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model
 from lipmotion.errors import CorpusError, MissingDependencyError
-from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training import other_speakers as module
 from lipmotion.pipeline.training.other_speakers import (
     is_held_out_speaker,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,17 +12,15 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
-from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import fingerprint as fingerprints
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.channels import BOTH, GEOMETRY
 from lipmotion.pipeline.training.fingerprint import fingerprint
-from lipmotion.pipeline.training.train import Run, train
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 
@@ -45,10 +43,12 @@ def stopping_after(events: int) -> Monitor:
     return monitor
 
 
-@pytest.fixture(autouse=True)
-def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module", autouse=True)
+def few_steps() -> Iterator[None]:
     """A network is trained in one go, so that it must fit between two stops."""
-    monkeypatch.setattr(posterior_network, "STEPS", 4.0)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(posterior_network, "STEPS", 4.0)
+        yield
 
 
 @pytest.fixture
@@ -83,13 +83,20 @@ def events_of(corpus: Corpus, work: Path | None = None) -> list[Progress | Item]
     return events
 
 
+@pytest.fixture(scope="module")
+def whole(corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The model file of a training that nothing stops."""
+    return content(run(corpus), tmp_path_factory.mktemp("whole"))
+
+
 @pytest.mark.long
-def test_stopped_after_any_event(corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stopped_after_any_event(
+    corpus: Corpus, whole: bytes, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
-    whole = content(run(corpus), tmp_path)
     count = len(events_of(corpus))
     assert count > 15
-    for number in range(1, count + 1, 3):
+    for number in range(1, count + 1, 4):
         with pytest.raises(Stopped):
             run(corpus, work, stopping_after(number))
         assert content(run(corpus, work), tmp_path) == whole, number
@@ -98,7 +105,7 @@ def test_stopped_after_any_event(corpus: Corpus, work: Path, tmp_path: Path, mon
 
 
 @pytest.mark.long
-def test_stopped_again_and_again(corpus: Corpus, work: Path, tmp_path: Path) -> None:
+def test_stopped_again_and_again(corpus: Corpus, whole: bytes, work: Path, tmp_path: Path) -> None:
     """Every run gets some steps further than the one before."""
     stops = 0
     while True:
@@ -109,7 +116,7 @@ def test_stopped_again_and_again(corpus: Corpus, work: Path, tmp_path: Path) -> 
             stops += 1
             assert stops < 50
     assert stops > 1
-    assert content(model, tmp_path) == content(run(corpus), tmp_path)
+    assert content(model, tmp_path) == whole
 
 
 @pytest.mark.long
@@ -131,8 +138,8 @@ def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, wha
 
 
 @pytest.mark.long
-def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: Path) -> None:
-    whole = content(run(corpus, work), tmp_path)
+def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, whole: bytes, work: Path, tmp_path: Path) -> None:
+    assert content(run(corpus, work), tmp_path) == whole
     for name in ("phones", "labels-0"):
         path = work / f"{name}.checkpoint"
         path.write_bytes(path.read_bytes()[:-500])
@@ -140,33 +147,27 @@ def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("here", "there"), [(1, 2)])
 def test_threads_of_matrix_products_change_nothing(
-    corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: int, there: int
+    corpus: Corpus, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Neither this process's own nor those that the processes it starts would use."""
-    whole = content(run(corpus), tmp_path)
     monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", str(there))
-    with threadpool_limits(here, user_api="blas"):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    with threadpool_limits(1, user_api="blas"):
         assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
-        assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {here}
+        assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {1}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("stop", [0, 6])
-def test_in_two_processes(
-    corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: int
+def test_stopped_in_two_processes(
+    corpus: Corpus, whole: bytes, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The model is the same to the bit, stopped or not."""
-    whole = content(run(corpus), tmp_path)
     monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
     before = set(multiprocessing.active_children())
-    if stop:
-        with pytest.raises(Stopped):
-            train(corpus, recogniser=CONFIG, run=Run(work=work, monitor=stopping_after(stop), workers=2))
-        assert set(multiprocessing.active_children()) == before
+    with pytest.raises(Stopped):
+        train(corpus, recogniser=CONFIG, run=Run(work=work, monitor=stopping_after(6), workers=2))
+    assert set(multiprocessing.active_children()) == before
     assert content(train(corpus, recogniser=CONFIG, run=Run(work=work, workers=2))[0], tmp_path) == whole
 
 

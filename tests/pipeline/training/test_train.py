@@ -7,22 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion import Corpus, Model, Run, Selection, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.resample import model_motion
-from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
-from lipmotion.pipeline.training.train import Run, about_training, phones_of, train
+from lipmotion.pipeline.training.train import about_training, phones_of
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
+SMALL, JOINT = HmmConfig(mixtures=1, iterations=2), engine_named("joint", {})
 TRAINED = tuple(f"toy0{number}" for number in range(8))
 
 
@@ -39,13 +38,13 @@ def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
 
 @pytest.mark.long
 def test_other_lists_all_and_given_names(toy_corpus: Corpus, tmp_path: Path) -> None:
-    assert train(toy_corpus, selection=Selection("val"), recogniser=SMALL)[1].used == ("toy08", "toy09")
+    assert train(toy_corpus, selection=Selection("val"), recogniser=SMALL, engine=JOINT)[1].used == ("toy08", "toy09")
     few = corpus_of([toy_corpus.utterance(name) for name in ("toy10", "toy02", "toy03")], tmp_path)
     for selection, used, split in (
         (Selection(None), ("toy02", "toy03", "toy10"), "all"),
         (Selection(names=("toy10", "toy02")), ("toy10", "toy02"), "given names"),
     ):
-        model, report = train(few, selection=selection, recogniser=SMALL)
+        model, report = train(few, selection=selection, recogniser=SMALL, engine=JOINT)
         assert (report.used, model.about["split"]) == (used, split)
     with pytest.raises(CorpusError, match=r"no utterances of split 'tset' \(there are train: 8, val: 2, test: 2\)"):
         train(toy_corpus, selection=Selection("tset"))
@@ -60,7 +59,7 @@ def test_untranscribed_utterances_are_recognised_and_used(
     utterances = some(toy_corpus, 8)
     utterances[5] = replace(utterances[5], words=None)
     mixed = corpus_of(utterances, tmp_path)
-    model, report = train(mixed, recogniser=SMALL)
+    model, report = train(mixed, recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert "1 of 8 recordings have no words: their phones are recognised" in caplog.text
     recogniser = Recogniser(model.phones, "own")
@@ -86,7 +85,7 @@ def test_labelled_phones_are_used_as_they_are(
     monkeypatch.setattr(module, "phones_in_time", None)
     given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
     given[0] = replace(given[0], words=("not", "what", "is", "said"))
-    model, report = train(corpus_of(given, tmp_path), recogniser=SMALL)
+    model, report = train(corpus_of(given, tmp_path), recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
@@ -96,7 +95,7 @@ def test_labelled_phones_are_used_as_they_are(
 @pytest.mark.long
 def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_path: Path) -> None:
     both = [u if number % 2 else labelled(u) for number, u in enumerate(some(toy_corpus, 8))]
-    model, report = train(corpus_of(both, tmp_path), recogniser=SMALL)
+    model, report = train(corpus_of(both, tmp_path), recogniser=SMALL, engine=JOINT)
     assert (report.used, report.skipped) == (TRAINED, {})
     truth = labelled(toy_corpus.utterance("toy11"))
     assert truth.phones is not None
@@ -110,7 +109,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
 def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:
     names = ("anna", "ben", "ben", "anna", "anna")
     corpus = corpus_of([replace(u, speaker=n) for u, n in zip(some(toy_corpus), names, strict=True)], tmp_path)
-    model, report = train(corpus, selection=Selection(speakers=["anna"]), recogniser=SMALL)
+    model, report = train(corpus, selection=Selection(speakers=["anna"]), recogniser=SMALL, engine=JOINT)
     assert report.used == ("toy00", "toy03", "toy04")
     assert model.about["speakers"] == ["anna"]
     with pytest.raises(CorpusError, match="no speaker 'carl'"):
@@ -122,7 +121,7 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corp
     utterances = some(toy_corpus)
     utterances[1] = replace(utterances[1], words=("five",) * 100)
     utterances[2] = replace(utterances[2], words=("mama", "日本"))
-    model, report = train(corpus_of(utterances, tmp_path), recogniser=SMALL)
+    model, report = train(corpus_of(utterances, tmp_path), recogniser=SMALL, engine=JOINT)
     assert report.used == ("toy00", "toy03", "toy04")
     assert set(report.skipped) == {"toy01", "toy02"}
     assert "too short" in report.skipped["toy01"]
@@ -140,7 +139,7 @@ def test_without_any_transcript_the_shipped_phones_are_used(
 ) -> None:
     monkeypatch.setattr(module, "load_model", lambda: toy_model)
     silent = corpus_of([replace(utterance, words=None) for utterance in some(toy_corpus)], tmp_path)
-    model, report = train(silent, recogniser=SMALL)
+    model, report = train(silent, recogniser=SMALL, engine=JOINT)
     assert model.phones is toy_model.phones
     assert len(report.used) == 5
     assert "no transcripts in the corpus: its phones are recognised by the shipped model" in caplog.text
@@ -150,7 +149,12 @@ def test_without_any_transcript_the_shipped_phones_are_used(
 def test_guessed_words_are_reported(toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     names = {"papa": "pahpa", "mama": "mahma"}
     utterances = [replace(u, words=tuple(names.get(w, w) for w in u.words or ())) for u in some(toy_corpus, 4)]
-    train(corpus_of(utterances, tmp_path), recogniser=SMALL, lexicon=Lexicon({"mahma": (("m", "aa", "m", "ax"),)}))
+    train(
+        corpus_of(utterances, tmp_path),
+        recogniser=SMALL,
+        engine=JOINT,
+        lexicon=Lexicon({"mahma": (("m", "aa", "m", "ax"),)}),
+    )
     assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
 
 
@@ -218,12 +222,12 @@ def test_other_engines_have_no_use_for_voices(toy_corpus: Corpus) -> None:
 
 
 def test_the_training_list_is_used_and_gives_the_same_model(
-    toy_corpus: Corpus, toy_model_file: Path, tmp_path: Path
+    toy_corpus: Corpus, joint_model: Model, tmp_path: Path
 ) -> None:
-    engine = engine_named("trajectory", {"articulation": False})
-    model, report = train(toy_corpus, recogniser=SMALL, engine=engine)
-    save_model(model, tmp_path / "again.lipmotion")
-    assert (tmp_path / "again.lipmotion").read_bytes() == toy_model_file.read_bytes()
+    model, report = train(toy_corpus, recogniser=SMALL, engine=JOINT)
+    for name, each in (("first", joint_model), ("again", model)):
+        save_model(each, tmp_path / f"{name}.lipmotion")
+    assert (tmp_path / "again.lipmotion").read_bytes() == (tmp_path / "first.lipmotion").read_bytes()
     assert (report.used, report.skipped) == (TRAINED, {})
     assert report.figures["frames"] > 1500
     assert (model.about["split"], model.about["utterances"]) == ("train", 8)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion import Corpus, train
+from lipmotion.engines import engine_named
 from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training import labels as module
@@ -15,7 +16,6 @@ from lipmotion.pipeline.training.labels import (
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
-from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Timeline, Unit, Utterance
@@ -44,7 +44,7 @@ def test_training_names_the_transcripts_of_something_else_and_what_has_none(
     changed = {2: ("squash", "six", "fish", "chefs"), 4: None, 5: ()}
     for number, utterance in enumerate(toy_utterances(12)):
         corpus.add(replace(utterance, words=changed.get(number, utterance.words), phones=None))
-    train(corpus, recogniser=SMALL)
+    train(corpus, recogniser=SMALL, engine=engine_named("joint", {}))
     missing, wrong = (text for text in messages(caplog) if "transcript" in text)
     assert missing.startswith("2 of 8 recordings have no transcript, or an empty one (toy04, toy05): their phones are")
     assert wrong.startswith("1 of 6 transcripts seem not to be what is said (toy02): the model learns wrong lips")

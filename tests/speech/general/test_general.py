@@ -115,8 +115,8 @@ def test_another_pocketsphinx_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path
 
 def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
     """Its decoder, with its own features and search, puts the phones of a sentence where our densities do."""
+    from lipmotion import load_model
     from lipmotion.hmm.align import align_units
-    from lipmotion.pipeline.model import load_model
     from lipmotion.speech.recognition.combined_phones import combine_phones, combined_log_likelihoods
 
     sample = (toy_sentence.audio.samples * 32767).astype("<i2").tobytes()

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import Model
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
-from lipmotion.pipeline.model import Model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.noise import noisy_audio
