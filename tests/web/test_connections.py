@@ -172,7 +172,7 @@ def test_who_takes_a_reply_drop_by_drop_is_closed(
     transport.get_write_buffer_size = lambda: transport.left
     config = uvicorn.Config(lambda *_: None, log_level="error")
     config.load()
-    client = connections.PunctualConnection(config, uvicorn.server.ServerState(), {}, clock)  # type: ignore[arg-type]
+    client = connections.PunctualConnection(config, uvicorn.server.ServerState(), {}, clock)
     client.connection_made(transport)
     client._stop_waiting()  # the time of headers is another limit
     is_paused = False

@@ -12,13 +12,13 @@ import pytest
 
 from lipmotion import Model, SpeechRequest, animate, write
 from lipmotion.errors import ExportError, InputError, ModelFormatError
-from lipmotion.pipeline.outputs.output import OutputSettings
+from lipmotion.pipeline.outputs.output import FilmOptions, OutputSettings
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.film import filmed_video as module
 from lipmotion_faces.film.background import stored_sequence
-from lipmotion_faces.film.filmed_video import FilmOptions, face_codes, film_of, write_film
+from lipmotion_faces.film.filmed_video import face_codes, film_of, write_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptions
 from lipmotion_faces.outputs.shown_faces import shown_face
