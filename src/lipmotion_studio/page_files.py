@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from lipmotion.export.web_page import coloured
+from lipmotion.formats.web_page import coloured
 
 FIRST = "studio.html"
 """The page itself."""

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from lipmotion.export.web_page import SHARED_COLOURS, Html, coloured, element, joined, whole_page
+from lipmotion.formats.web_page import SHARED_COLOURS, Html, coloured, element, joined, whole_page
 
 
 def test_every_text_is_escaped_and_html_is_not() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.export.web_page import Html, element, joined
+from lipmotion.formats.web_page import Html, element, joined
 
 WIDTH, LEFT, RIGHT = 360, 8, 12
 """Width of a drawing, and its margins: on a telephone a unit is about a pixel."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-from lipmotion.export.web_page import Html, element, joined, whole_page
+from lipmotion.formats.web_page import Html, element, joined, whole_page
 from lipmotion_lab.report.section import Section
 from lipmotion_lab.report.shown_clip import curves
 

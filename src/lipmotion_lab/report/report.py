@@ -14,7 +14,7 @@ from lipmotion.corpora.splits import SPLITS
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
-from lipmotion.export.web_page import GENERATOR
+from lipmotion.formats.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training.channels import GEOMETRY
 from lipmotion.pipeline.training.fingerprint import fingerprint

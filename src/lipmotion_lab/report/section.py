@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from lipmotion.export.web_page import Html
+from lipmotion.formats.web_page import Html
 from lipmotion_lab.report.table import Table
 
 FEW_CLIPS = 10

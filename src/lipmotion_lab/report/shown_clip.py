@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.export.web_page import Html
+from lipmotion.formats.web_page import Html
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion.storage.files import whole_file
 from lipmotion.storage.json_text import as_json, from_json

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lipmotion.export.web_page import Html, element, joined
+from lipmotion.formats.web_page import Html, element, joined
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.text_table import as_field
 from lipmotion_lab.comparison import significance_mark

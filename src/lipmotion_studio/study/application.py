@@ -23,7 +23,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from lipmotion.errors import InputError
-from lipmotion.export.web_page import coloured
+from lipmotion.formats.web_page import coloured
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED
 from lipmotion_studio.study.limits import RateLimit
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial

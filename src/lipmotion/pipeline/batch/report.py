@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from lipmotion.export.web_page import coloured
+from lipmotion.formats.web_page import coloured
 from lipmotion.pipeline.batch.ledger import Ledger
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.marks import APPROVE, Mark, is_due
