@@ -19,7 +19,7 @@ from lipmotion import adapt, animate, load_model
 from lipmotion.corpora.layouts import words_of_name
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
@@ -117,7 +117,7 @@ def grid_others(folder: Path, model: Model) -> None:
         for kind in ("auto", "own"):
             for when, one in (("before", model), ("after", adapted)):
                 for condition, text in (("audio only", None), ("with transcript", words)):
-                    motion = animate(SpeechRequest(clip, transcript=text, recogniser=kind), model=one).motion
+                    motion = animate(Request(clip, transcript=text, recogniser=kind), model=one).motion
                     generated = np.interp(tracked.motion.time_s, motion.time_s, motion["opening"])[tracked.seen]
                     seen = tracked.motion["opening"][tracked.seen]
                     row = figures.setdefault(f"{kind}, {condition}, {when}", {})

@@ -26,7 +26,7 @@ from scipy.stats import spearmanr
 from lipmotion import Corpus, animate, load_model
 from lipmotion.motion.rest import speech_intervals
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation, Track
 
@@ -60,7 +60,7 @@ def main() -> None:
     parser.add_argument("--tracks", type=Path, help="where tracks of videos are kept; default: they are not")
     options = parser.parse_args()
     found = [
-        seconds_of(kind, animate(SpeechRequest(audio, pauses="natural"), model=model), track, lag_s)
+        seconds_of(kind, animate(Request(audio, pauses="natural"), model=model), track, lag_s)
         for kind, audio, track, model, lag_s in recordings(options)
     ]
     for kind in dict.fromkeys(each.kind for each in found):

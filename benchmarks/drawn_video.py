@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.prosody import prosody_of
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation
@@ -64,7 +64,7 @@ def main() -> None:
         for figure in whole_processes(options):
             print(json.dumps(figure), flush=True)
     if {"frame", "likeness"} & {*chosen}:
-        generation = lipmotion.animate(SpeechRequest(options.speech, recogniser="fast"))
+        generation = lipmotion.animate(Request(options.speech, recogniser="fast"))
         if "frame" in chosen:
             print(json.dumps({"frame": options.face, **frame_times(options, generation)}), flush=True)
         if "likeness" in chosen:

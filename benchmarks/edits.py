@@ -52,8 +52,8 @@ def sentences(session: Session, duration_s: float) -> dict[str, list[str]]:
 def measured(audio: Audio) -> dict[str, float]:
     """Return milliseconds of the first motion, and of each kind of edit."""
     model = lipmotion.load_model()
-    lipmotion.animate(lipmotion.SpeechRequest(audio, recogniser="fast"), model=model)  # kernels are loaded
-    session = Session(lipmotion.SpeechRequest(audio), model=model)
+    lipmotion.animate(lipmotion.Request(audio, recogniser="fast"), model=model)  # kernels are loaded
+    session = Session(lipmotion.Request(audio), model=model)
     pictures = lipmotion.SessionPictures(session)
     found = {"first motion": timed(session.generated)}
     warm = [timed(lambda n=n: session.generated(lipmotion.Edits().then(f"pin width 1 at {n + 1}"))) for n in range(4)]

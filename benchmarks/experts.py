@@ -22,7 +22,7 @@ from anyone import best_lag, compared, conditions, pieces
 from lipmotion import Corpus, load_model
 from lipmotion.measures.closures import closed_threshold, closure_figures
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.types import Audio, Motion, Track
 from lipmotion_faces.tracking.track import track
@@ -50,7 +50,7 @@ def main() -> None:
 
 def generated(model: Model, recording: Audio | Path) -> Iterator[tuple[float, Motion]]:
     """Yield the motion of a recording at each weight of the network, audio only."""
-    speech = understand(model, SpeechRequest(recording))
+    speech = understand(model, Request(recording))
     for share in SHARES:
         yield share, model.engine.generate(replace(model.learned, network_share=share), speech).motion
 

@@ -51,8 +51,8 @@ from lipmotion.motion.modulation_filter import (
 from lipmotion.motion.resample import to_model_frames
 from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.train import phones_of
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Audio, Motion, Timeline, Track, Unit
@@ -135,7 +135,7 @@ def clips_of(model: Model, corpus: Corpus, names: Sequence[str]) -> list[Clip]:
 def clip_of(model: Model, recording: Audio | Path, track: Track, reference: Timeline[Unit] | None = None) -> Clip:
     """Return one clip, understood audio only; without given phones, with those that were recognised."""
     given: dict[str, Any] = {}
-    speech = understand(model, SpeechRequest(recording))
+    speech = understand(model, Request(recording))
     with spied(given):
         model.engine.generate(model.learned, speech)
     original = given["motion"].space.reduce(np.asarray(track.motion.values, float))

@@ -112,7 +112,7 @@ def of_language(language: str, recogniser: str, *, chart: bool) -> Iterator[dict
         opened, widths = defaultdict(list), defaultdict(list)
         closed = []
         for audio, units, labels in sentences:
-            request = lipmotion.SpeechRequest(
+            request = lipmotion.Request(
                 audio, units=None if kind else units, recogniser=kind or "auto", language=language
             )
             motion = lipmotion.animate(request).motion
@@ -183,7 +183,7 @@ def shared(sentences: list[Said]) -> float:
 def of_captures(folder: Path, recogniser: str) -> dict[str, object]:
     """Return the correlations with the captured jaw of the recording held out."""
     (audio, jaw), trained = captured(folder, HELD_OUT), [captured(folder, name) for name in TRAINED]
-    request = lipmotion.SpeechRequest(audio, recogniser=recogniser, language="zh")
+    request = lipmotion.Request(audio, recogniser=recogniser, language="zh")
     generation = lipmotion.animate(request)
     curve = curves_of(generation.motion, generation.units, "arkit")["jawOpen"]
     inputs, outputs = zip(*((contexts(sound), values) for sound, values in trained), strict=True)

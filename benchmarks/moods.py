@@ -42,7 +42,7 @@ Picture = NDArray[np.uint8]
 @cache
 def spoken() -> lipmotion.Generation:
     """Return the motion of the example."""
-    said = lipmotion.SpeechRequest(EXAMPLES / "welcome.flac", transcript=EXAMPLES / "welcome.txt")
+    said = lipmotion.Request(EXAMPLES / "welcome.flac", transcript=EXAMPLES / "welcome.txt")
     return lipmotion.animate(said)
 
 

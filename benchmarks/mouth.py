@@ -52,7 +52,7 @@ from lipmotion.motion.reliability import phone_reliability
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import understood_speech
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation, Motion, Speech, Timeline, Track, Unit
@@ -159,7 +159,7 @@ def takes(folder: Path, tracks: Path | None, model: Model, recogniser: str) -> d
 
 def take(audio: Audio, tracked: Track, model: Model, recogniser: str) -> Take:
     """Return a recording with what is generated for its sound."""
-    speech = understood_speech(model, SpeechRequest(audio, recogniser=recogniser)).speech
+    speech = understood_speech(model, Request(audio, recogniser=recogniser)).speech
     generation = generate_for(None, model.engine, model.learned, speech)
     generation = replace(generation, motion=symmetrical(generation.motion))
     lag_s = lag_of(generation.motion, tracked, LAG_S)

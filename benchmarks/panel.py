@@ -145,7 +145,7 @@ def make_videos(
         frames, rate_hz = untracked_frames(clip)
         sound = read_audio(clip, SOUND_HZ, warn=False)
         write_mp4(recording, frames, fps=rate_hz, audio=sound)
-        request = lipmotion.SpeechRequest(corpus.utterance(name).audio, onto=face)
+        request = lipmotion.Request(corpus.utterance(name).audio, onto=face)
         result = lipmotion.animate(request, model=model)
         film = lipmotion.FilmOptions(background=clip if footage[name] == OWN else options.clips / f"{other}.mkv")
         target = folder / FILMED / f"{name}.mp4"

@@ -27,8 +27,8 @@ from lipmotion import Corpus, animate, load_model, save_model
 from lipmotion.corpora.store import Selection
 from lipmotion.engines import engine_from_settings
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion_lab.evaluation.evaluate import evaluate
 
 MAIN = "s1"
@@ -110,7 +110,7 @@ def voice(corpus: Corpus, speaker: str) -> NDArray[np.float64]:
 def of_person(corpus: Corpus, model: Model, person: str, whose: str) -> dict[str, Any]:
     """Return the figures of a person's first clip, from audio only, in the motion of another person of the model."""
     utterance = corpus.utterance(corpus.names(None, [person])[0])
-    motion = animate(SpeechRequest(utterance.audio, speaker=whose), model=model).motion
+    motion = animate(Request(utterance.audio, speaker=whose), model=model).motion
     generated, recorded = compared(motion, utterance.track)
     distance = float(np.abs(generated - recorded).mean(axis=0).sum())
     return {**best_lag(motion, utterance.track, 0.06), "distance": round(distance, 4)}

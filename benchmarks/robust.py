@@ -33,7 +33,7 @@ import numpy as np
 from lipmotion import animate, load_model
 from lipmotion.corpora.layouts import words_of_name
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
@@ -78,7 +78,7 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
                 ("audio only", None),
                 ("with transcript", " ".join(words_of_name(clip.stem) or ())),
             ):
-                motion = animate(SpeechRequest(clip, transcript=words, recogniser=kind), model=model).motion
+                motion = animate(Request(clip, transcript=words, recogniser=kind), model=model).motion
                 seen, recorded = tracks[clip].seen, tracks[clip].motion
                 generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])
                 found[condition].append(float(np.corrcoef(generated[seen], recorded["opening"][seen])[0, 1]))

@@ -19,7 +19,7 @@ from lipmotion.export import read_motion, write_motion
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.motion_files import in_format
 from lipmotion.pipeline.outputs.motion_input import read_generation
-from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.pipeline.understand.read_request import read_units
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio, Generation, Motion, Timeline
@@ -53,11 +53,11 @@ def print_generated_again(folder: Path, speech: Path, transcript: Path) -> None:
     audio = read_audio(speech)
     repeated = Audio(np.resize(audio.samples, round(LONG_S * audio.rate_hz)), audio.rate_hz)
     requests = {
-        "transcript": lipmotion.SpeechRequest(audio, transcript=transcript),
-        "recognised (auto)": lipmotion.SpeechRequest(audio),
-        "recognised (fast)": lipmotion.SpeechRequest(audio, recogniser="fast"),
-        "white noise of 15 dB": lipmotion.SpeechRequest(noisy_audio(audio, "white", 15.0)),
-        f"{LONG_S:.0f} s, recognised (fast)": lipmotion.SpeechRequest(repeated, recogniser="fast"),
+        "transcript": lipmotion.Request(audio, transcript=transcript),
+        "recognised (auto)": lipmotion.Request(audio),
+        "recognised (fast)": lipmotion.Request(audio, recogniser="fast"),
+        "white noise of 15 dB": lipmotion.Request(noisy_audio(audio, "white", 15.0)),
+        f"{LONG_S:.0f} s, recognised (fast)": lipmotion.Request(repeated, recogniser="fast"),
     }
     kinds = {name: (request.recording, lipmotion.animate(request)) for name, request in requests.items()}
     sound, said = lipmotion.speak(TEXT)
@@ -67,14 +67,14 @@ def print_generated_again(folder: Path, speech: Path, transcript: Path) -> None:
         found = []
         for suffix in ("TextGrid", "json", "npz"):
             lipmotion.write(result, folder / f"b.{suffix}")
-            request = lipmotion.SpeechRequest(recording, units=read_units(folder / f"b.{suffix}"))
+            request = lipmotion.Request(recording, units=read_units(folder / f"b.{suffix}"))
             found.append(again(result.motion, lipmotion.animate(request).motion))
         print(f"| {name} | {' | '.join(found)} |")
 
 
 def print_moved_boundary(folder: Path, speech: Path) -> None:
     """Print how far a boundary that is moved by 30 ms in a TextGrid changes the motion."""
-    result = lipmotion.animate(lipmotion.SpeechRequest(speech, recogniser="fast"))
+    result = lipmotion.animate(lipmotion.Request(speech, recogniser="fast"))
     lipmotion.write(result, folder / "c.TextGrid")
     units = list(read_units(folder / "c.TextGrid"))
     loud = [not is_silent(span.label.phone) for span in units]
@@ -86,7 +86,7 @@ def print_moved_boundary(folder: Path, speech: Path) -> None:
     (folder / "c.TextGrid").write_text(edited + mark + rest, encoding="utf-8")
     given = read_units(folder / "c.TextGrid")
     assert sum(a.end_s != b.end_s for a, b in zip(Timeline(tuple(units)), given, strict=True)) == 1
-    other = lipmotion.animate(lipmotion.SpeechRequest(speech, units=given)).motion
+    other = lipmotion.animate(lipmotion.Request(speech, units=given)).motion
     away_s = np.abs(result.motion.time_s - moved_s)
     error = np.abs(other.values - result.motion.values).max(axis=1)
     near, far = error[away_s < 0.2].max(), error[away_s > 1].max()

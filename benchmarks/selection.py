@@ -37,7 +37,7 @@ from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.types import Features, Speech, Timeline, Utterance
 from lipmotion.units import PHONES
@@ -79,7 +79,7 @@ def main() -> None:
     options = parser.parse_args()
     model, corpus = load_model(options.model), Corpus.open(options.corpus)
     utterances = [corpus.utterance(name) for name in corpus.names(options.split)]
-    speech = [understand(model, SpeechRequest(u.audio, transcript=" ".join(u.words or ()))) for u in utterances]
+    speech = [understand(model, Request(u.audio, transcript=" ".join(u.words or ()))) for u in utterances]
     for name in options.only or PARTS:
         for figure in PARTS[name](model, corpus, list(zip(utterances, speech, strict=True))):
             print(json.dumps({"part": name, **figure}), flush=True)
@@ -146,7 +146,7 @@ def inventory(model: Model, corpus: Corpus, _: Spoken) -> Iterator[dict[str, Any
     own, errors = [], []
     for name in names:
         utterance = corpus.utterance(name)
-        speech = understand(model, SpeechRequest(utterance.audio, transcript=" ".join(utterance.words or ())))
+        speech = understand(model, Request(utterance.audio, transcript=" ".join(utterance.words or ())))
         result = engine.generate(learned, speech)
         inside = [span for span in result.units if span.label.phone not in ("sil", "sp")]
         own += [span.label.unit.split(" ")[0] == name for span in inside]

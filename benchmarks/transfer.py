@@ -25,7 +25,7 @@ import numpy as np
 from kept_tracks import kept_track
 from numpy.typing import NDArray
 
-from lipmotion import Model, SpeechRequest, load_model
+from lipmotion import Model, Request, load_model
 from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.speaker_maps import FAR_FROM_SPEECH_S, RANGE_PERCENTILES, SpeakerMap, restfulness
@@ -106,7 +106,7 @@ def cuts_at_pauses(audio: Audio) -> list[float]:
 
 def pairs_of(model: Model, audio: Audio, track: Track) -> list[Pair]:
     """Return what a model generates for a piece, and the person's own motion."""
-    return [measured_pair(model, None, "piece", SpeechRequest(audio), track, "the video")]
+    return [measured_pair(model, None, "piece", Request(audio), track, "the video")]
 
 
 def halves(pair: Pair) -> list[Pair]:

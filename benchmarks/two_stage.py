@@ -36,6 +36,7 @@ from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.motion.resample import model_motion
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.other_speakers import (
     VoiceExample,
     is_held_out_speaker,
@@ -45,7 +46,6 @@ from lipmotion.pipeline.training.other_speakers import (
 )
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.training.train import examples_without_motion
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
@@ -141,7 +141,7 @@ def recognised(path: Path) -> Iterator[VoiceExample]:
     audio = Audio(audio.samples[: round(SOUND_S * audio.rate_hz)], audio.rate_hz)
     for first_s, last_s in pairwise(cuts_at_pauses(audio)):
         samples = audio.samples[round(first_s * audio.rate_hz) : round(last_s * audio.rate_hz)]
-        speech = understand(model, SpeechRequest(Audio(samples, audio.rate_hz)))
+        speech = understand(model, Request(Audio(samples, audio.rate_hz)))
         yield VoiceExample(speech.features, speech.units, path.stem)
 
 

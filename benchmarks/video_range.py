@@ -41,7 +41,7 @@ from lipmotion import Corpus, animate, load_model
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion_faces.appearance import lower_face as region
 from lipmotion_faces.film.filmed_video import FilmOptions, film_of
@@ -90,7 +90,7 @@ def main() -> None:
         with one_thread():
             for name in names:
                 clip = recorded_clip(corpus, name, video_of(options.clips, name))
-                made = animate(SpeechRequest(clip.utterance.audio), model=model)
+                made = animate(Request(clip.utterance.audio), model=model)
                 motion = clip.utterance.track.motion if options.tracked else made.motion
                 seen.append(shown(face, clip, motion, made.units))
         print(json.dumps({"face": path.name, **figures(seen, spoken, threshold)}), flush=True)

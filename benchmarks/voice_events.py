@@ -25,7 +25,7 @@ import numpy as np
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.spectrum import band_centres, log_bands
 from lipmotion.speech.features.voice_events import voice_events
@@ -134,7 +134,7 @@ def acc(corpus: Corpus, names: list[str], model: Path, manner: str) -> float:
     for name in names:
         utterance = corpus.utterance(name)
         track = utterance.track.motion
-        made = animate(SpeechRequest(utterance.audio, manner=manner), model=loaded).motion
+        made = animate(Request(utterance.audio, manner=manner), model=loaded).motion
         generated = np.interp(track.time_s, made.time_s, made["opening"])
         found.append(np.corrcoef(generated, track["opening"])[0, 1])
     return round(float(np.mean(found)), 4)

@@ -23,15 +23,16 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.generate.explain import explain
     from lipmotion.pipeline.generate.speak import speak
     from lipmotion.pipeline.generate.state_runs import state_runs
-    from lipmotion.pipeline.job import Job, Outputs, Request
+    from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.model import Model, load_model, save_model, with_person
     from lipmotion.pipeline.outputs.cues import cues, write_cues
     from lipmotion.pipeline.outputs.output import FilmOptions
     from lipmotion.pipeline.outputs.write import write
+    from lipmotion.pipeline.request import Outputs, Request
+    from lipmotion.pipeline.request import Request as SpeechRequest
     from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.pipeline.understand.request import SpeechRequest
     from lipmotion.types import (
         Audio,
         Constraints,
@@ -96,13 +97,13 @@ _HOMES = {
     "Edits": "lipmotion.pipeline.edits",
     "Run": "lipmotion.pipeline.training.train",
     "Session": "lipmotion.pipeline.session",
-    "SpeechRequest": "lipmotion.pipeline.understand.request",
+    "SpeechRequest": "lipmotion.pipeline.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
     "CueSheet": "lipmotion.export.cues.sheet",
     "Job": "lipmotion.pipeline.job",
-    "Outputs": "lipmotion.pipeline.job",
-    "Request": "lipmotion.pipeline.job",
+    "Outputs": "lipmotion.pipeline.request",
+    "Request": "lipmotion.pipeline.request",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",
@@ -129,6 +130,8 @@ _ADDED = (
     *("map_onto", "prepare", "save_face"),
 )
 """Names that the packages of faces, studio and lab provide (entry points of the group ``lipmotion.names``)."""
+_RENAMED = {"SpeechRequest": "Request"}
+"""Former names, for older scripts."""
 
 
 def __getattr__(name: str) -> Any:
@@ -141,7 +144,7 @@ def __getattr__(name: str) -> Any:
 
         value = provided(name)
     else:
-        value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), name)
+        value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), _RENAMED.get(name, name))
     globals()[name] = value
     return value
 

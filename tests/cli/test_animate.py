@@ -13,7 +13,7 @@ from lipmotion.export.base import read_motion
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_one_of_several_people(
     assert any("anna; ben" in line for line in run("info", "m").out)
     done = run("animate", toy_speech, "--model", "m", "--recogniser", "own", "--speaker", "ben", "-o", "ben.json")
     assert (done.code, done.out) == (0, ["ben.json"])
-    request = SpeechRequest(toy_speech, recogniser="own", speaker="ben")
+    request = Request(toy_speech, recogniser="own", speaker="ben")
     written, expected = read_motion(here / "ben.json")[0], animate(request, model="m").motion
     assert written["opening"].tolist() == pytest.approx(expected["opening"].tolist(), abs=1e-5)
     done = run("animate", toy_speech, "--model", "m", "--speaker", "cleo", "-o", "cleo.json")

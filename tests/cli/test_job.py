@@ -14,7 +14,8 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import part_of
-from lipmotion.pipeline.job import DETAILS, Job, Outputs, Request
+from lipmotion.pipeline.job import DETAILS, Job
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.types import Delivery, Staging
 
 LINE = """animate a.wav --transcript t.txt --model m.lipmotion --pauses natural -o a.json b.mp4 -o c.vtt --channels

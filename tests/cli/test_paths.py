@@ -18,8 +18,8 @@ from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model, shipped_path
 from lipmotion.pipeline.outputs.cues import cues, write_cues
 from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.train import Run, train
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion_faces.corpus.prepare import prepare
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
@@ -171,7 +171,7 @@ def _verbs(found: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
 def test_from_python(laid: Path, toy_speech: Path, toy_model_file: Path) -> None:
     speech = laid / "speech.json"
     shutil.copy(toy_speech, speech)
-    made = animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model_file)
+    made = animate(Request(toy_speech, recogniser="own"), model=toy_model_file)
     corpus = Corpus.open(laid / "c")
     calls: list[Callable[[], object]] = [
         lambda: write(made, speech, speech=speech),

@@ -16,12 +16,14 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speaker_maps import speaker_arrays
+from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.explain import explain
-from lipmotion.pipeline.generate.posteriors import animate_with_posteriors
+from lipmotion.pipeline.generate.posteriors import chain_posteriors
 from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
 from lipmotion_lab.evaluation.evaluate import evaluate
@@ -64,8 +66,8 @@ def model(people: Corpus) -> Model:
     return train(people, recogniser=SMALL)[0]
 
 
-def request(sentence: ToySentence, speaker: str = "") -> SpeechRequest:
-    return SpeechRequest(sentence.audio, units=sentence.units, speaker=speaker, pauses="natural")
+def request(sentence: ToySentence, speaker: str = "") -> Request:
+    return Request(sentence.audio, units=sentence.units, speaker=speaker, pauses="natural")
 
 
 def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarray:
@@ -200,7 +202,7 @@ def test_other_engines(people: Corpus, toy_sentence: ToySentence, engine: str) -
     (explanation,) = explain(request(toy_sentence, "ben"), at=0.9, model=model)
     assert explanation.motion["opening"].value == pytest.approx(ben[90], abs=1e-9)
     if engine == "coupled":
-        generation, _ = animate_with_posteriors(request(toy_sentence, "ben"), model=model)
+        generation, _ = chain_posteriors(Session(request(toy_sentence, "ben"), model=model), Edits())
         np.testing.assert_allclose(generation.motion["opening"], ben, atol=1e-12)
 
 
@@ -224,7 +226,7 @@ def test_channels_that_all_have_are_trained_on(
     assert len(report.used) == 9
     assert model.speakers is not None
     assert model.speakers.names == ("anna", "ben", "captured")
-    generated = animate(SpeechRequest(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
+    generated = animate(Request(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
     assert generated.motion.names == ("width", "opening")
 
 

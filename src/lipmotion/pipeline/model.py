@@ -221,7 +221,7 @@ _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser", "prio
 
 
 def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
-    """Return a model that also knows another person, so that a map is fitted once: ``SpeechRequest(speaker=name)``.
+    """Return a model that also knows another person, so that a map is fitted once: ``Request(speaker=name)``.
 
     name   : of the person; the model must not know another one of this name
     person : from ``map_onto``, without a speaker: the map from the motion of the model's mean or only person

@@ -56,8 +56,9 @@ from lipmotion.pipeline.generate.generation_for import generate_for, person_of
 from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.request import Request, SpeechInput, request_of
 from lipmotion.pipeline.understand.language import in_language
-from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
+from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.understood_speech import (
     UnderstoodSpeech,
     aligned_within,
@@ -178,8 +179,8 @@ class Session:
         lasts_s: float | None = None,
         audio: AnalysedAudio | None = None,
     ) -> None:
-        self.request: SpeechRequest = in_language(request_of(speech))
-        self.model = model if isinstance(model, Model) else load_model(model)
+        self.request: Request = in_language(read_request(request_of(speech), is_typed=False))
+        self.model = model if isinstance(model, Model) else load_model(model or self.request.model)
         self._work = map_in_processes(workers, self._prepare)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
         self._meanwhile = meanwhile
@@ -475,7 +476,7 @@ def own_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
 
 
 def generation_of(
-    request: SpeechRequest,
+    request: Request,
     person: SpeakerMap | None,
     model: Model,
     understood: UnderstoodSpeech,

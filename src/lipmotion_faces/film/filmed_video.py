@@ -15,9 +15,9 @@ from lipmotion.articulation.contact import FULL_DEFICIT_GAP, closed_lips, gap_in
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.eigenlips import Eigenlips
-from lipmotion.pipeline.job import Mark
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import FILM, FilmOptions
+from lipmotion.pipeline.request import Mark
 from lipmotion.speech.sound.pauses import levels_db_at
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import has_video

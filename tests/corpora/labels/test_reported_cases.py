@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion.corpora.labels import read_labels, read_phones, read_transcript, speakers_in
 from lipmotion.errors import InputError
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.types import TimedTranscript
 from lipmotion.units import UNKNOWN_PHONES

@@ -25,7 +25,7 @@ from corpora.labels.timing_samples import (
 )
 from lipmotion.corpora.labels import holds_timings, labels_beside, read_labels, read_phones, read_transcript
 from lipmotion.errors import InputError
-from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.pipeline.understand.read_request import read_units
 from lipmotion.types import TimedTranscript
 
 

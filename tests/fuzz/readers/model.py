@@ -8,7 +8,7 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, short_speech
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 
 
 def seeds(good: Good) -> list[Files]:
@@ -20,4 +20,4 @@ def read(folder: Path, good: Good) -> None:
     """Load a model; animate short speech, without and with a transcript."""
     model = load_model(folder / "a.lipmotion")
     for text in (None, "baby"):
-        check_generation(animate(SpeechRequest(short_speech(good), transcript=text, recogniser="own"), model=model))
+        check_generation(animate(Request(short_speech(good), transcript=text, recogniser="own"), model=model))

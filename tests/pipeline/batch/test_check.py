@@ -21,7 +21,8 @@ from lipmotion.pipeline.batch.check import (
     letters_of,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.job import Job, Request
+from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.request import Request
 
 pytest.importorskip("joblib")
 RATE_HZ = 16_000

@@ -22,7 +22,8 @@ from lipmotion.pipeline.batch.settings import (
     input_files,
     line_fingerprint,
 )
-from lipmotion.pipeline.job import Job, Outputs, Request
+from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.storage.files import LOCK
 
 CONTENT = b"motion"

@@ -15,7 +15,7 @@ from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import FilmOptions, OutputSettings
 from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from lipmotion_faces.appearance.person import Appearance
@@ -222,7 +222,7 @@ def test_eigenlips_become_the_person(
     filmed_face: FilmedFace, pictured_model: Model, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
     """A model of mouth pictures drives the mouth by its pictures, and the jaw by points where it has them."""
-    request = SpeechRequest(toy_sentence.audio, units=toy_sentence.units)
+    request = Request(toy_sentence.audio, units=toy_sentence.units)
     result = animate(request, model=pictured_model)
     eigenlips = pictured_model.eigenlips
     assert eigenlips is not None
@@ -252,7 +252,7 @@ def test_another_persons_motion_is_mapped_onto_the_face(
     )
     other = replace(filmed_face, about=filmed_face.about | {"corpus": ["someone/else"]}, takes=takes)
     own, mapped = (
-        animate(SpeechRequest(toy_sentence.audio, units=toy_sentence.units, onto=onto), model=toy_model).motion
+        animate(Request(toy_sentence.audio, units=toy_sentence.units, onto=onto), model=toy_model).motion
         for onto in (None, other)
     )
     ratio = np.percentile(mapped["opening"], 95) / np.percentile(own["opening"], 95)
@@ -260,7 +260,7 @@ def test_another_persons_motion_is_mapped_onto_the_face(
     assert np.corrcoef(own["opening"], mapped["opening"])[0, 1] > 0.95
     mute = replace(other, takes=())
     with pytest.raises(InputError, match=r"the face: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
-        animate(SpeechRequest(toy_sentence.audio, onto=mute), model=toy_model)
+        animate(Request(toy_sentence.audio, onto=mute), model=toy_model)
 
 
 def test_writing_is_whole_or_not_at_all(

@@ -15,9 +15,8 @@ from lipmotion.export.sound import write_sound
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, Edits, MoodStep, step_of
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
@@ -156,7 +155,7 @@ def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Pa
     path, edits = tmp_path / "a.json", Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
     write_edits(replace(begun(asked), edits=edits), path)
     read = read_edits(path)
-    plain = animate(SpeechRequest(toy_speech, recogniser="own"), model=load_model(toy_model_file), edits=edits)
+    plain = animate(Request(toy_speech, recogniser="own"), model=load_model(toy_model_file), edits=edits)
     replayed = read.session().generated(read.edits)
     assert np.array_equal(replayed.motion.values, plain.motion.values)
     assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)

@@ -12,8 +12,8 @@ from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, excerpt_of_change
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Generation, Pin, Span, Timeline, Unit
@@ -25,13 +25,13 @@ UNSEEN = 0.01
 
 
 @pytest.fixture(scope="module")
-def long_request(toy_sentence: ToySentence, toy_model: Model) -> SpeechRequest:
-    units = Session(SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words)), model=toy_model).units()
+def long_request(toy_sentence: ToySentence, toy_model: Model) -> Request:
+    units = Session(Request(toy_sentence.audio, " ".join(toy_sentence.words)), model=toy_model).units()
     each_s = toy_sentence.audio.duration_s
     spans = [span for n in range(TIMES) for span in units.shifted(n * each_s)]
     sound = Audio(np.tile(toy_sentence.audio.samples, TIMES), toy_sentence.audio.rate_hz)
     spans[-1] = replace(spans[-1], end_s=sound.duration_s)
-    return SpeechRequest(sound, units=Timeline(tuple(spans)))
+    return Request(sound, units=Timeline(tuple(spans)))
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def number_of(units: Timeline[Unit], phone: str, after_s: float) -> int:
 
 @pytest.mark.long
 def test_around_an_edit_the_motion_is_that_of_the_whole(
-    long_request: SpeechRequest, toy_model: Model, made_s: list[float]
+    long_request: Request, toy_model: Model, made_s: list[float]
 ) -> None:
     """At the first phone, in the middle, at the last one, of a pause, with pins; one edit after another."""
     session, other = Session(long_request, model=toy_model), Session(long_request, model=toy_model)

@@ -23,8 +23,8 @@ from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
 from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion_faces.outputs.drawn_video import sound_track
@@ -34,12 +34,12 @@ from lipmotion_faces.registry import staged_face
 
 
 @pytest.fixture
-def request_(toy_sentence: ToySentence) -> SpeechRequest:
-    return SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words))
+def request_(toy_sentence: ToySentence) -> Request:
+    return Request(toy_sentence.audio, " ".join(toy_sentence.words))
 
 
 @pytest.fixture
-def session(request_: SpeechRequest, toy_model: Model) -> Session:
+def session(request_: Request, toy_model: Model) -> Session:
     return Session(request_, model=toy_model)
 
 
@@ -51,7 +51,7 @@ def edited(*sentences: str) -> Edits:
     return Edits().then(*sentences)
 
 
-def test_a_session_gives_what_one_pass_gives(session: Session, request_: SpeechRequest, toy_model: Model) -> None:
+def test_a_session_gives_what_one_pass_gives(session: Session, request_: Request, toy_model: Model) -> None:
     """Whatever was asked for before; with phones edited in a session, or given."""
     place = phones(session.units()).index("iy") + 1
     edits = edited(f"phone {place} is aa", "pin opening 0.05 at 1.0")
@@ -245,11 +245,11 @@ def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.Monke
     assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
 
 
-def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: SpeechRequest) -> None:
+def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: Request) -> None:
     file = EditFile(edited("phone 3 is p"), units=session.units())
     half = Audio(request_.recording.samples[:16_000], 16_000)  # type: ignore[union-attr]
     with pytest.raises(InputError, match=r"the recording lasts 1\.00 s, the edited one .* of another recording"):
-        animate(SpeechRequest(half), model=toy_model, edits=file)
+        animate(Request(half), model=toy_model, edits=file)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +274,7 @@ def test_edits_that_are_not_possible(session: Session, sentence: str, message: s
         session.generated(edited(sentence))
 
 
-def test_single_pictures_are_those_of_the_video(session: Session, request_: SpeechRequest) -> None:
+def test_single_pictures_are_those_of_the_video(session: Session, request_: Request) -> None:
     """Any frame, before and after an edit; what is not at that time is refused."""
     pictures = SessionPictures(session)
     for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
@@ -293,7 +293,7 @@ def test_single_pictures_are_those_of_the_video(session: Session, request_: Spee
 
 def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy_sentence: ToySentence) -> None:
     """Each alone and both at once give the same bits; the matrix products of one do not change those of the other."""
-    requests = [SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words)), SpeechRequest(toy_sentence.audio)]
+    requests = [Request(toy_sentence.audio, " ".join(toy_sentence.words)), Request(toy_sentence.audio)]
     edits = [edited("phone 3 is p"), edited("pin opening 0.05 at 1.0")]
     alone = [
         Session(request, model=toy_model).generated(edit).motion.values
@@ -312,7 +312,7 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy
 
 @pytest.mark.long
 def test_what_comes_next_is_prepared_while_processes_work(
-    request_: SpeechRequest, toy_model: Model, monkeypatch: pytest.MonkeyPatch
+    request_: Request, toy_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prepared: list[object] = []
     monkeypatch.setattr(session_module, "prepare_search", prepared.append)

@@ -102,7 +102,7 @@ def batch(
         check_names(lines, job.outputs.kinds)
     _check_outside(lines, place)
     chosen = _chosen_marks(Path(place.out), marks, lines)
-    check_line_job(job)
+    check_line_job(job, place.run)
     of_settings = fingerprint_of(job)
     with opened_ledger(place, lines) as ledger:
         if marks is not None:

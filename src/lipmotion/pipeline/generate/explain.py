@@ -14,8 +14,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.generation_for import explanation_for
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.session import NO_EDITS, Session
-from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.printable import printable
 from lipmotion.types import (
     FRAME_RATE_HZ,

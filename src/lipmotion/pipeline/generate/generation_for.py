@@ -19,7 +19,7 @@ from lipmotion.motion.generation import BLOCK_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
 from lipmotion.pipeline.generate.passages import REACH_FRAMES, generate_passages
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChannelValue,
@@ -52,7 +52,7 @@ def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
     return maps.of(speaker)
 
 
-def person_of(model: Model, request: SpeechRequest) -> SpeakerMap | None:
+def person_of(model: Model, request: Request) -> SpeakerMap | None:
     """Return the map of the motion that a model generates to that of the person of a request; None: it is not mapped.
 
     Raises as ``speaker_map`` and ``map_onto``.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.spoken_language import confidence_of
 from lipmotion.pipeline.understand.transcribe import is_other_language
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
@@ -21,7 +21,7 @@ WHOLE_TRANSCRIPT = "a transcript of all that is said, and of nothing else"
 LESS_NOISE = "a recording with less noise"
 
 
-def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
+def outlook_of(request: Request, understood: UnderstoodSpeech) -> Outlook:
     """Return what to expect of the motion of some speech."""
     found, speech = understood.recognition, understood.speech
     if understood.is_without_speech:
@@ -38,7 +38,7 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
     return Outlook(words, confidence_of(found), voice, understood.range_db, _advice(understood))
 
 
-def _known_share(request: SpeechRequest, understood: UnderstoodSpeech) -> float:
+def _known_share(request: Request, understood: UnderstoodSpeech) -> float:
     """Return how sure the phones of a transcript are, 0 to 1: 1 for English, less for what is mapped to English."""
     if request.language != ENGLISH:
         return MAPPED_CONFIDENCE

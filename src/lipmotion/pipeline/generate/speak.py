@@ -20,9 +20,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.pipeline.generate.generation_for import speaker_map
-from lipmotion.pipeline.job import ASKED
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand.request import Onto, SpeechRequest
+from lipmotion.pipeline.request import ASKED, Onto, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import at_speech_rate
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
@@ -79,7 +78,7 @@ def speak(  # noqa: PLR0913
     constraints : values that the motion must take exactly, in the units of the speaker
     lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
     speaker     : whose motion is generated, of the people whom the model was trained on; empty: the mean person
-    onto, onto_speaker, pauses, asymmetry : as of ``SpeechRequest``
+    onto, onto_speaker, pauses, asymmetry : as of ``Request``
     The phones and their times are the synthesiser's, so nothing is recognised. The sound is one of 16 bits, at the
     synthesiser's rate or 16 kHz if that is less; ``animate`` of a ``.wav`` or ``.flac`` of it, with the units, returns
     the same motion.
@@ -117,7 +116,7 @@ def speak(  # noqa: PLR0913
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
     sound, units = _said(sentences, chosen, lexicon)
     sound = quantise(_with_floor(sound, units))
-    request = SpeechRequest(
+    request = Request(
         at_speech_rate(sound),
         units=units,
         speaker=speaker,

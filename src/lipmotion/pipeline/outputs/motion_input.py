@@ -14,7 +14,7 @@ from lipmotion.export.base import read_motion
 from lipmotion.export.cues.cue_motion import read_cue_motion
 from lipmotion.meshes.files.steady_rate import rate_in_step
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.pipeline.understand.read_request import read_units
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace
 
 LOG = logging.getLogger("lipmotion")

@@ -16,7 +16,7 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.pipeline.job import RATE, Jaw, Mark, Overlay, Refinement
+from lipmotion.pipeline.request import RATE, Jaw, Mark, Overlay, Refinement
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.staging import Staging
