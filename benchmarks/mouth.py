@@ -49,7 +49,7 @@ from lipmotion.meshes.model.scene import Scene
 from lipmotion.meshes.model.surface import mesh_surface
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.reliability import phone_reliability
-from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.generation import generate_for
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.request import Request

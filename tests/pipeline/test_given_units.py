@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generate.outlook import outlook_of
+from lipmotion.pipeline.generation import outlook_of
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.read_request import read_units

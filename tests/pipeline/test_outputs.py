@@ -69,8 +69,9 @@ def test_a_name_asks_for_a_kind(name: str, kind: type[Output], settings: OutputS
 
 def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path) -> None:
     for name in ("a.xyz", "a.png", "a"):
-        with pytest.raises(ExportError, match=r"required one of: \.json .*\.mp4 .*\.glb .*\.wav .*%05d\.png \.cues"):
+        with pytest.raises(ExportError, match="required one of") as error:
             plan(name, settings)
+        assert {".json", ".mp4", ".glb", ".wav", "%05d.png", ".cues.tsv"} <= {*str(error.value).split()}
     with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
         plan("a.wav", replace(settings, sounded=False))
     with pytest.raises(InputError, match="the frame rate is 101"):

@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generate.outlook import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, outlook_of
+from lipmotion.pipeline.generation import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, outlook_of
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request, request_of
 from lipmotion.pipeline.understand import understood_speech as pipeline_understand

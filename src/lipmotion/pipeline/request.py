@@ -186,7 +186,7 @@ class Request(Configuration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.units is not None and not isinstance(self.units, Path):
+        if not isinstance(self.units, str | Path | None):
             from lipmotion.types import Unit
 
             for span in self.units:

@@ -15,7 +15,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures.evaluation_table import figures_table
-from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.generation import generate_for
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import NO_WEIGHT_SCORE, OWN_VOICE_SCORE, cached_recogniser
 from lipmotion.testing.toy import toy_motion, toy_sentences

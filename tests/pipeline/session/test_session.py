@@ -69,7 +69,7 @@ def test_a_session_gives_what_one_pass_gives(session: Session, request_: Request
 
 def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
-    for name in ("understood_speech", "generate_for"):
+    for name in ("understood_speech", "generation_of"):
         plain = getattr(session_module, name)
 
         def counted(*given: object, name: str = name, plain: object = plain, **more: object) -> object:
@@ -82,7 +82,7 @@ def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pyte
     session.generated(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
     session.delivered(edited("phone 3 is p", "set intensity 1.5"))
     assert session.generated() is first  # undone
-    assert calls == ["understood_speech", "generate_for", "generate_for"]
+    assert calls == ["understood_speech", "generation_of", "generation_of"]
 
 
 def test_edits_of_phones(session: Session) -> None:
@@ -237,7 +237,7 @@ def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.Monke
     made: list[int] = []
     generation_of = session_module.generation_of
     monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
-    monkeypatch.setattr(session_module, "KEPT_FRAMES", len(session.generated().motion.values))
+    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generated().motion.values))
     found = [session.generated(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
     assert session.generated(edited("pin opening 0.1 at 0.5")) is found[1]
     assert len(made) == 4

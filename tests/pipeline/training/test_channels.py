@@ -18,9 +18,9 @@ from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.model import BOTH, EIGENLIPS, GEOMETRY, Model, load_model, save_model
 from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, train_eigenlips, with_visual_channels
+from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_utterances

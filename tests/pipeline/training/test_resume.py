@@ -16,11 +16,10 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
-from lipmotion.pipeline.model import Model, save_model
+from lipmotion.pipeline.model import BOTH, GEOMETRY, Model, save_model
 from lipmotion.pipeline.training import fingerprint as fingerprints
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.channels import BOTH, GEOMETRY
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.types import Item, Monitor, Progress, silent_monitor

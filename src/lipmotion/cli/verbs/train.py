@@ -77,8 +77,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings, preset_visual
-    from lipmotion.pipeline.model import save_model
-    from lipmotion.pipeline.training.channels import GEOMETRY
+    from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.storage.files import unfinished_work

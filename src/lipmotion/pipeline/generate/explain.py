@@ -12,7 +12,7 @@ from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.generate.generation_for import explanation_for
+from lipmotion.pipeline.generation import explanation_for
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.session import NO_EDITS, Session

@@ -19,7 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
-from lipmotion.pipeline.generate.generation_for import speaker_map
+from lipmotion.pipeline.generation import speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import ASKED, Onto, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ

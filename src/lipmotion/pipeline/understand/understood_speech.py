@@ -16,8 +16,7 @@ import numpy as np
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.pipeline.generate.prior import with_prior
-from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.model import Model, with_prior
 from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.spoken_language import warn_of_another_language

@@ -1,4 +1,4 @@
-"""Generation for one of several people: constraints in, motion out, in this person's own units."""
+"""Motion of understood speech: of one of several people, in this person's own units, and what to expect of it."""
 
 from __future__ import annotations
 
@@ -11,28 +11,76 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.curve_edits import bend_through_pins
+from lipmotion.articulation.pauses import with_pauses
+from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.extensions import provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
-from lipmotion.pipeline.generate.passages import REACH_FRAMES, generate_passages
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.passages import REACH_FRAMES, generate_passages
 from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.understand.spoken_language import confidence_of
+from lipmotion.pipeline.understand.transcribe import is_other_language
+from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
+from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
+from lipmotion.speech.recognition.recognised_speech import NOISY_DB
+from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
+from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChannelValue,
     Constraints,
     Explanation,
     Generation,
+    Outlook,
     Pin,
     ReducedVariance,
     Speech,
+    SpeechKnowledge,
     frame_of,
 )
+from lipmotion.types.generation import SURE_CONFIDENCE
+from lipmotion.types.languages import ENGLISH
+from lipmotion.units import Lexicon, words_in_time
+from lipmotion.units.mood_tags import moods_in_time
 
 ModelT = TypeVar("ModelT")
+TRANSCRIPT = "the words that are spoken (--transcript)"
+OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lipmotion train with video)"
+WHOLE_TRANSCRIPT = "a transcript of all that is said, and of nothing else"
+LESS_NOISE = "a recording with less noise"
+
+
+def generation_of(
+    request: Request,
+    person: SpeakerMap | None,
+    model: Model,
+    understood: UnderstoodSpeech,
+    constraints: Constraints | None = None,
+) -> Generation:
+    """Return the motion of understood speech, with pauses and asymmetry as asked for, and what to expect of it.
+
+    person : of ``person_of``
+    Raises InputError: a constraint is not usable.
+    """
+
+    def finish(generation: Generation, start_s: float) -> Generation:
+        pinned_s = [pin.time_s - start_s for pin in constraints.pins] if constraints else []
+        if request.onto is None:
+            generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
+        events = [event.shifted(-start_s) for event in understood.events]
+        return with_pauses(generation, request.pauses, pinned_s, events)
+
+    paused = generate_for(person, model.engine, model.learned, understood.speech, constraints, finish)
+    speech, fit = understood.speech, understood.fit
+    fits = fit.of_frames(len(speech.features.values)) if fit else 1.0
+    knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits)
+    moods = moods_in_time(understood.tags, speech.units)
+    told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
+    return replace(told, outlook=outlook_of(request, understood))
 
 
 def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
@@ -172,3 +220,43 @@ def _spread(
     if isinstance(spread, ReducedVariance):
         return replace(spread, mixing=(spread.mixing * factors).astype(spread.mixing.dtype))
     return spread * factors
+
+
+def outlook_of(request: Request, understood: UnderstoodSpeech) -> Outlook:
+    """Return what to expect of the motion of some speech."""
+    found, speech = understood.recognition, understood.speech
+    if understood.is_without_speech:
+        return Outlook("no speech", 0.0, None, understood.range_db, ())
+    if found is None:
+        is_used = speech.units_known if understood.fit is None else not understood.fit.is_doubtful
+        words = "given units" if request.units is not None else "transcript" if is_used else "own model"
+        share = understood.fit.share if understood.fit else 1.0
+        if words == "transcript" and (known := _known_share(request, understood)) < 1:
+            words, share = "mapped transcript", share * known
+        return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
+    words = "words" if found.word_s > found.phone_s else "phones"
+    voice = own_model_weight(found.similarity) if found.similarity is not None else None
+    return Outlook(words, confidence_of(found), voice, understood.range_db, _advice(understood))
+
+
+def _known_share(request: Request, understood: UnderstoodSpeech) -> float:
+    """Return how sure the phones of a transcript are, 0 to 1: 1 for English, less for what is mapped to English."""
+    if request.language != ENGLISH:
+        return MAPPED_CONFIDENCE
+    said, lexicon = [span.label for span in words_in_time(understood.speech.units)], request.lexicon or Lexicon()
+    words = [word for word in said if word]
+    return sum(map(lexicon.known, words)) / len(words) if is_other_language(words, lexicon) else 1.0
+
+
+def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
+    """Return what would help, the most helpful first: before all else the words, where they are not sure."""
+    found, advice = understood.recognition, []
+    if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
+        advice.append(WHOLE_TRANSCRIPT)
+    if found is not None and confidence_of(found) < SURE_CONFIDENCE:
+        advice.append(TRANSCRIPT)
+    if understood.range_db < NOISY_DB:
+        advice.append(LESS_NOISE)
+    if found is not None and (found.similarity is None or found.similarity < FULL_WEIGHT_SCORE):
+        advice.append(OWN_MODEL)
+    return tuple(advice)
