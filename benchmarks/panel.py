@@ -147,7 +147,7 @@ def make_videos(
         write_mp4(recording, frames, fps=rate_hz, audio=sound)
         request = lipmotion.Request(corpus.utterance(name).audio, onto=face)
         result = lipmotion.animate(request, model=model)
-        film = lipmotion.FilmOptions(background=clip if footage[name] == OWN else options.clips / f"{other}.mkv")
+        film = lipmotion.Outputs(background=clip if footage[name] == OWN else options.clips / f"{other}.mkv")
         target = folder / FILMED / f"{name}.mp4"
         lipmotion.write(result, target, speech=recording, model=model, face=face, film=film)
         size = next(iter(untracked_frames(clip)[0])).shape[:2]

@@ -41,10 +41,10 @@ from lipmotion import Corpus, animate, load_model
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
-from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion_faces.appearance import lower_face as region
-from lipmotion_faces.film.filmed_video import FilmOptions, film_of
+from lipmotion_faces.film.filmed_video import film_of
 from lipmotion_faces.filmed.face import FilmedFace, load_face
 from lipmotion_lab.evaluation.figures import BILABIAL
 
@@ -98,7 +98,7 @@ def main() -> None:
 
 def shown(face: FilmedFace, clip: RecordedClip, motion: Motion, units: Timeline[Unit]) -> Seen:
     """Return what one face shows of a clip."""
-    film = film_of(face, motion, units=units, options=FilmOptions(background=clip.path))
+    film = film_of(face, motion, units=units, options=Outputs(background=clip.path))
     frames, tracked = stored(film.frames, clip, mp4=False)
     true = clip.utterance.track
     assert tracked is not None

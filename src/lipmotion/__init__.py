@@ -26,10 +26,8 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.model import Model, load_model, save_model, with_person
     from lipmotion.pipeline.outputs.cues import cues, write_cues
-    from lipmotion.pipeline.outputs.output import FilmOptions
     from lipmotion.pipeline.outputs.write import write
     from lipmotion.pipeline.request import Outputs, Request
-    from lipmotion.pipeline.request import Request as SpeechRequest
     from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
@@ -58,7 +56,6 @@ __all__ = [
     "Delivery",
     "Edits",
     "Explanation",
-    "FilmOptions",
     "Gain",
     "Generation",
     "Job",
@@ -72,7 +69,6 @@ __all__ = [
     "Selection",
     "Session",
     "Span",
-    "SpeechRequest",
     "SpokenText",
     "Staging",
     "Timeline",
@@ -97,7 +93,6 @@ _HOMES = {
     "Edits": "lipmotion.pipeline.edits",
     "Run": "lipmotion.pipeline.training.train",
     "Session": "lipmotion.pipeline.session",
-    "SpeechRequest": "lipmotion.pipeline.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
     "CueSheet": "lipmotion.export.cues.sheet",
@@ -107,7 +102,6 @@ _HOMES = {
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",
-    "FilmOptions": "lipmotion.pipeline.outputs.output",
     "animate": "lipmotion.pipeline.generate.animate",
     "cues": "lipmotion.pipeline.outputs.cues",
     "engine_named": "lipmotion.engines",
@@ -130,12 +124,13 @@ _ADDED = (
     *("map_onto", "prepare", "save_face"),
 )
 """Names that the packages of faces, studio and lab provide (entry points of the group ``lipmotion.names``)."""
-_RENAMED = {"SpeechRequest": "Request"}
+_RENAMED = {"FilmOptions": "Outputs", "SpeechRequest": "Request"}
 """Former names, for older scripts."""
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__ and name not in _ADDED:
+    present = _RENAMED.get(name, name)
+    if present not in __all__ and present not in _ADDED:
         raise AttributeError(f"module 'lipmotion' has no attribute {name!r}")
     from importlib import import_module
 
@@ -144,7 +139,7 @@ def __getattr__(name: str) -> Any:
 
         value = provided(name)
     else:
-        value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), _RENAMED.get(name, name))
+        value = getattr(import_module(_HOMES.get(present, "lipmotion.types")), present)
     globals()[name] = value
     return value
 

@@ -273,7 +273,7 @@ class OpenLine:
         film = person.film(performance)
         frames, sound = self._stretch(start_s, end_s, film.count, film.rate_hz)
         part = replace(film, frames=islice(film.frames, frames.start, frames.stop), count=len(frames))
-        write_film(path, part, sound, mark=performance.settings.film.mark)
+        write_film(path, part, sound, mark=performance.settings.outputs.mark)
 
     def _stretch(self, start_s: float, end_s: float, count: int, rate_hz: float) -> tuple[range, Audio]:
         """Return which frames of a video show a stretch, and their sound. Raises InputError: too long, or none."""

@@ -17,6 +17,7 @@ from lipmotion.pipeline.outputs.cues import CueOutput, cues, write_cues
 from lipmotion.pipeline.outputs.motion_files import MotionOutput
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, plan
 from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput, write
+from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Generation
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion_faces.outputs.scenes import SceneOutput
@@ -75,7 +76,7 @@ def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path
     with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
         plan("a.wav", replace(settings, sounded=False))
     with pytest.raises(InputError, match="the frame rate is 101"):
-        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, fps=101.0))
+        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, outputs=Outputs(fps=101.0)))
 
 
 def test_cues_beside_other_outputs_are_those_of_the_function(result: Generation, tmp_path: Path) -> None:
@@ -107,5 +108,5 @@ def test_outputs_share_what_is_made_once(result: Generation, settings: OutputSet
         made.append(1)
         return made
 
-    assert performance.once(make) is performance.once(make)
+    assert performance.cached(make) is performance.cached(make)
     assert made == [1]

@@ -100,7 +100,7 @@ def test_nothing_is_written_unless_everything_can_be(
         (result, "missing/a.json", {}, ExportError, r"the folder .*missing does not exist; create it first"),
         (result, "folder.json", {}, ExportError, r"folder.json: is a folder"),
         (result, "a.mp4", {"speech": None}, ExportError, r"a video needs the recording: write\(..., speech=FILE\)"),
-        (result, "a.json", {"rate_hz": 0.0}, InputError, r"frame rate is 0.0, required 1 to 1000 a second"),
+        (result, "a.json", {"rate_hz": 0.0}, InputError, r"frame rate is 0 a second, required 1 to 1000"),
         (result, "a.json", {"rate_hz": float("nan")}, InputError, r"frame rate is nan"),
         (result, "a.mp4", {"fps": -25.0}, InputError, r"frame rate is -25.0"),
         (result, "a.mp4", {"fps": 1e-5}, InputError, r"frame rate is 1e-05"),

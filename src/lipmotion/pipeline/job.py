@@ -181,25 +181,14 @@ def output_settings(job: Job, face: ShownFace, speech: str | Path | Audio | None
 
     speech : the recording, or the sound; None: there will be a sound that is in no file
     """
-    from lipmotion.pipeline.outputs.output import FilmOptions, OutputSettings
+    from lipmotion.pipeline.outputs.output import OutputSettings
 
-    outputs, staging = job.outputs, job.staging
-    footage = outputs.background if face.has_own_background else None
-    if outputs.background and not footage:
-        staging = replace(staging, background=outputs.background)
+    outputs, staging = replace(job.outputs, rate_hz=job.outputs.motion_hz), job.staging
+    if outputs.background and not face.has_own_background:
+        staging, outputs = replace(staging, background=outputs.background), replace(outputs, background=None)
     recording = Path(speech) if isinstance(speech, str | Path) else None
-    return OutputSettings(
-        face,
-        recording,
-        recording is None,
-        outputs.channels or None,
-        curves_of(outputs, face),
-        outputs.motion_hz,
-        outputs.fps,
-        FilmOptions(Path(footage) if footage else None, outputs.jaw, outputs.overlay, outputs.mark, outputs.refinement),
-        staging,
-        job.delivery,
-    )
+    curves = curves_of(outputs, face)
+    return OutputSettings(face, recording, recording is None, outputs, curves, staging, job.delivery)
 
 
 def check_outputs(job: Job, face: ShownFace, speech: str | Path | Audio | None = None) -> list[Output]:

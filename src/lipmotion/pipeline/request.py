@@ -253,9 +253,10 @@ class Outputs(Configuration):
         help="face that videos show: woman, man, head, cartoon, a drawing, a filmed face, or a folder of one drawing a "
         "mouth shape (default: portrait, the woman)",
     )
-    background: str | None = option(
+    background: str | Path | None = option(
         None,
         kind=str,
+        values={"Path": "a Path of a file"},
         reads="background",
         metavar="VIDEO|COLOUR",
         help="footage of the same person (default: that in its file); of a drawn face: transparent, or as #40a0ff",
