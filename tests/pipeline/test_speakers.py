@@ -18,8 +18,7 @@ from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speaker_maps import speaker_arrays
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.explain import explain
-from lipmotion.pipeline.generate.posteriors import chain_posteriors
+from lipmotion.pipeline.generate.explain import chain_posteriors, explain
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session

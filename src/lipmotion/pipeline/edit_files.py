@@ -114,9 +114,11 @@ def begun(asked: Request) -> EditFile:
 def begun_with(asked: Request, session: Session) -> tuple[EditFile, Generation]:
     """Return the file of ``begun`` for a session of a request, and its motion."""
     named = Request(**{name: getattr(asked, name) for name in HELD})
+    if not (isinstance(named.recording, Path | None) and isinstance(named.lexicon, Path | None)):
+        raise InputError("a file of edits names its recording and lexicon, required paths of files, not values")
     generation = session.generated()
     moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not held
-    digest = sha256_of(asked.recording) if asked.recording else ""
+    digest = sha256_of(named.recording) if named.recording else ""
     return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook, sha256=digest), generation
 
 

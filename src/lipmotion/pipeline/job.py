@@ -107,7 +107,7 @@ def run(  # noqa: PLR0913
     Raises InputError, ExportError and more: as ``animate`` and ``write``, or there is no recording.
     """
     from lipmotion.pipeline.edit_files import edit_file
-    from lipmotion.pipeline.generate.posteriors import chain_posteriors, check_picture, write_posteriors
+    from lipmotion.pipeline.generate.explain import chain_posteriors, check_picture, write_posteriors
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.curve_sets import curve_names
     from lipmotion.pipeline.understand.read_request import read_request
@@ -185,7 +185,7 @@ def output_settings(job: Job, face: ShownFace, speech: str | Path | Audio | None
 
     outputs, staging = replace(job.outputs, rate_hz=job.outputs.motion_hz), job.staging
     if outputs.background and not face.has_own_background:
-        staging, outputs = replace(staging, background=outputs.background), replace(outputs, background=None)
+        staging, outputs = replace(staging, background=str(outputs.background)), replace(outputs, background=None)
     recording = Path(speech) if isinstance(speech, str | Path) else None
     curves = curves_of(outputs, face)
     return OutputSettings(face, recording, recording is None, outputs, curves, staging, job.delivery)

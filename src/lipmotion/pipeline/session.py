@@ -52,7 +52,7 @@ from lipmotion.pipeline.generation import generation_of, person_of
 from lipmotion.pipeline.model import Model, load_model, with_prior
 from lipmotion.pipeline.request import Request, SpeechInput, request_of
 from lipmotion.pipeline.understand.language import in_language
-from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.pipeline.understand.understood_speech import (
     UnderstoodSpeech,
     aligned_within,
@@ -82,7 +82,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
-from lipmotion.units import Lexicon, Pronunciation, words_in_time, words_of
+from lipmotion.units import Pronunciation, words_in_time, words_of
 
 ResultT = TypeVar("ResultT")
 
@@ -309,7 +309,7 @@ class Session:
         """Return the phones in time of words that a step says. Raises AlignmentError: they do not fit in there."""
         request, pauses = self.request, isinstance(step, WordsSaid)
         if own := own_pronunciations(step):
-            lexicon = request.lexicon or Lexicon()
+            lexicon = lexicon_of(request)
             request = replace(request, lexicon=replace(lexicon, user=lexicon.user | own))
         return aligned_within(self.model, request, self._audio, said, start_s, end_s, pauses=pauses)
 

@@ -11,6 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, excerpt_of_change
+from lipmotion.pipeline.generation import generation_of
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
@@ -38,12 +39,11 @@ def long_request(toy_sentence: ToySentence, toy_model: Model) -> Request:
 def made_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The seconds of each motion that a session makes from now on."""
     lengths: list[float] = []
-    make = session_module.generation_of
 
     def counted(*given: object) -> Generation:
         (understood,) = (each for each in given if isinstance(each, UnderstoodSpeech))
         lengths.append(understood.speech.features.duration_s)
-        return make(*given)  # type: ignore[arg-type]
+        return generation_of(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(session_module, "generation_of", counted)
     return lengths

@@ -17,6 +17,7 @@ from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edit_files import EditFile
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.generation import generation_of
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.delivered import shown
@@ -222,7 +223,6 @@ def test_a_locked_span_keeps_channels_that_are_added_later(session: Session) -> 
 
 def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    generation_of = session_module.generation_of
     monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
     steps = [
         each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
@@ -235,7 +235,6 @@ def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pyt
 
 def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    generation_of = session_module.generation_of
     monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
     monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generated().motion.values))
     found = [session.generated(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]

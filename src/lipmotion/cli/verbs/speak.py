@@ -55,13 +55,13 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora.store import Corpus
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model
-    from lipmotion.units import Lexicon
+    from lipmotion.pipeline.understand.read_request import lexicon_of
 
     job = part_of(options, Job())
     face = open_face(job.outputs)
     check_outputs(job, face)
     asked, text = job.request, read_text(options.text) if options.text else options.words
-    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+    lexicon = lexicon_of(asked) if asked.lexicon else None
     model, corpus = load_model(asked.model), Corpus.open(options.corpus) if options.corpus else None
     sound, result = speak(
         text,

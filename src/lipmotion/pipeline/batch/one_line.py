@@ -24,21 +24,23 @@ from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.batch.ledger import (
+    DONE,
+    FAILED,
     Place,
+    Record,
     are_in_place,
     is_in_place,
     read_receipt,
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.settings import CUES, input_files, line_fingerprint
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import (
     check_target,
@@ -260,8 +262,7 @@ class _Shared:
 @lru_cache(maxsize=1)
 def _cached(job: Job, of_run: str) -> _Shared:  # noqa: ARG001 (files may change between two runs)
     """Return what the lines of a run share. Raises as ``open_face``, ``Lexicon.from_file`` and ``load_model``."""
-    lexicon = job.request.lexicon
-    lexicon = Lexicon.from_file(lexicon) if isinstance(lexicon, Path) else lexicon
+    lexicon = None if job.request.lexicon is None else lexicon_of(job.request)
     return _Shared(load_model(job.request.model), open_face(job.outputs), lexicon)
 
 

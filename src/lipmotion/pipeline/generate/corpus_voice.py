@@ -8,14 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.request import Pauses, Request
 from lipmotion.speech.sound.overlap_add import JoinedPieces, overlapped
 from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import SILENCE, Lexicon, words_of
@@ -39,7 +38,7 @@ def speak_from_corpus(  # noqa: PLR0913
     constraints: Constraints | None = None,
     lexicon: Lexicon | None = None,
     speaker: str = "",
-    pauses: str = REST,
+    pauses: Pauses = "rest",
     asymmetry: float = 0.0,
 ) -> SpokenText:
     """Return a text as the joined sound of recordings, and the motion that was recorded with it.

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.entry import quantise
 from lipmotion.corpora.labels import is_subtitles, subtitle_words
 from lipmotion.corpora.store import Corpus
@@ -21,7 +20,7 @@ from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.pipeline.generation import speaker_map
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.request import ASKED, Onto, Request
+from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import at_speech_rate
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
@@ -64,7 +63,7 @@ def speak(  # noqa: PLR0913
     speaker: str = "",
     onto: Onto | None = None,
     onto_speaker: str = "",
-    pauses: str = REST,
+    pauses: Pauses = "rest",
     asymmetry: float = 0.0,
 ) -> SpokenText:
     """Return a text as sound of a synthetic voice, and the lip motion for it, with 0.25 s of rest at both ends.

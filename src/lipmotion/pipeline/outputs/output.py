@@ -7,7 +7,7 @@ A new kind is a class of ``Output`` in a module of its own, and a line in ``OUTP
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -159,10 +159,6 @@ class Output(ABC):
         outputs cannot be.
         """
 
-    def write(self, performance: Performance) -> None:
-        """Write the file. Raises ExportError: it cannot be written, or the motion does not suit it."""
-        self.prepared(performance)()
-
 
 _HERE = "lipmotion.pipeline.outputs"
 OUTPUTS: Registry[type[Output]] = Registry(
@@ -206,12 +202,6 @@ def checked_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> li
         check_target(output.path, settings.recording)
         output.check()
     return planned
-
-
-def perform(performance: Performance, planned: Sequence[Output]) -> None:
-    """Write outputs; nothing, if the motion does not suit one of them. Raises ExportError: one cannot be written."""
-    for write_file in [output.prepared(performance) for output in planned]:
-        write_file()
 
 
 def _kinds() -> list[type[Output]]:

@@ -20,7 +20,6 @@ from lipmotion.pipeline.outputs.output import (
     OutputSettings,
     Performance,
     checked_outputs,
-    perform,
 )
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
@@ -140,4 +139,6 @@ def write_planned(
     """
     sounds = (output.path for output in planned if isinstance(output, SoundOutput))
     sound_file = next(sounds, None) if settings.recording is None or temporary else settings.recording
-    perform(Performance(generation, settings, sound, sound_file, model, monitor), planned)
+    performance = Performance(generation, settings, sound, sound_file, model, monitor)
+    for write_file in [output.prepared(performance) for output in planned]:  # nothing, if the motion does not suit one
+        write_file()

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from typing import cast
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.understand.read_request import lexicon_of
 from lipmotion.pipeline.understand.spoken_language import english_spoken
 from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
@@ -28,13 +30,13 @@ def in_language(request: Request) -> Request:
     """
     if request.language == ENGLISH:
         return request
-    transcript = request.transcript
+    transcript = cast("str | TimedTranscript | None", request.transcript)
     if isinstance(transcript, str):
         transcript = _plain_transcript(transcript)
     language = request.language if request.language != AUTO else _told(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)
-    lexicon = LanguageLexicon(request.lexicon.user if request.lexicon else {}, language)
+    lexicon = LanguageLexicon(lexicon_of(request).user, language)
     if transcript is not None and request.units is None:
         transcript = transcript.with_words(lambda word: written_words(word) if any(map(str.isalnum, word)) else ())
         lexicon = lexicon.with_words(transcript.words)

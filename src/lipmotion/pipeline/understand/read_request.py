@@ -32,7 +32,7 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
     """
     if request.recording is None:
         raise InputError("the job names no recording; required: [request] recording = 'FILE'")
-    transcript, units, lexicon = request.transcript, request.units, request.lexicon
+    transcript, units = request.transcript, request.units
     spoken_by = _speaker_of_labels(request)
     if is_typed and isinstance(transcript, str):
         transcript = text_or_file_content(transcript, request.tier, spoken_by)
@@ -50,9 +50,18 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
         request,
         transcript=transcript,
         units=units,
-        lexicon=Lexicon.from_file(lexicon) if isinstance(lexicon, Path) else lexicon,
+        lexicon=None if request.lexicon is None else lexicon_of(request),
         speaker="" if spoken_by else request.speaker,
     )
+
+
+def lexicon_of(request: Request) -> Lexicon:
+    """Return the pronunciations of a request; those of the dictionary alone, where it has none.
+
+    Raises InputError: its file cannot be read.
+    """
+    lexicon = request.lexicon
+    return Lexicon.from_file(lexicon) if isinstance(lexicon, str | Path) else lexicon or Lexicon()
 
 
 def _speaker_of_labels(request: Request) -> str:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model, with_prior
 from lipmotion.pipeline.request import DETECTED, Request
-from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.pipeline.understand.spoken_language import warn_of_another_language
 from lipmotion.pipeline.understand.transcribe import (
     heard_phones,
@@ -78,7 +78,6 @@ from lipmotion.types.moods import MoodTag
 from lipmotion.units import (
     SILENCE,
     UNKNOWN_PHONES,
-    Lexicon,
     check_phones,
     check_text,
     is_silent,
@@ -253,7 +252,7 @@ def aligned_within(
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
     (first, stop), lexicon = (
         (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
-        request.lexicon or Lexicon(),
+        lexicon_of(request),
     )
     words = checked_tokens(word)
     warn_of_guesses(words, lexicon)
@@ -315,12 +314,11 @@ def _understood(model: Model, request: Request, audio: AnalysedAudio, each: Para
         units, fit = _followed(model, request, audio, phones.kind, lambda: recognised().units)
         speech = speech_of(model.engine, audio, features, units, phones.kind, each)
         return UnderstoodSpeech(replace(speech, times_given=True), None, range_db, fit)
-    words = _words(request.transcript, audio.duration_s)
+    words = _words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     if words is not None:
-        lexicon = request.lexicon or Lexicon()
-        said, fit = transcribe(phones, audio, features, words, lexicon, lambda: recognised().units)
+        said, fit = transcribe(phones, audio, features, words, lexicon_of(request), lambda: recognised().units)
         if said is not None:
             speech = speech_of(model.engine, audio, features, said, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
@@ -469,7 +467,7 @@ def _followed(
     Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
     else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
     """
-    given = request.units or Timeline(())
+    given = cast("Timeline[Unit]", request.units)  # of ``read_request``
     _check_units(given, audio.duration_s)
     spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
     for span in (span for span in given if span.start_s < audio.duration_s):
