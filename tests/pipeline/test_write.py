@@ -102,7 +102,7 @@ def test_nothing_is_written_unless_everything_can_be(
         (result, "a.mp4", {"speech": None}, ExportError, r"a video needs the recording: write\(..., speech=FILE\)"),
         (result, "a.json", {"rate_hz": 0.0}, InputError, r"frame rate is 0 a second, required 1 to 1000"),
         (result, "a.json", {"rate_hz": float("nan")}, InputError, r"frame rate is nan"),
-        (result, "a.mp4", {"fps": -25.0}, InputError, r"frame rate is -25.0"),
+        (result, "a.mp4", {"fps": -25.0}, InputError, r"frame rate is -25 "),
         (result, "a.mp4", {"fps": 1e-5}, InputError, r"frame rate is 1e-05"),
         (result, "a.mp4", {"staging": CLEAR}, ExportError, "cannot be transparent"),
         (result, "a.json", {"face": "nobody"}, InputError, "face"),
