@@ -33,7 +33,7 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
     if request.recording is None:
         raise InputError("the job names no recording; required: [request] recording = 'FILE'")
     transcript, units = request.transcript, request.units
-    spoken_by = _speaker_of_labels(request)
+    spoken_by = _speaker_of_labels(request, is_typed=is_typed)
     if is_typed and isinstance(transcript, str):
         transcript = text_or_file_content(transcript, request.tier, spoken_by)
     elif isinstance(transcript, Path) or (isinstance(transcript, str) and ":" in transcript):  # perhaps subtitles
@@ -64,10 +64,11 @@ def lexicon_of(request: Request) -> Lexicon:
     return Lexicon.from_file(lexicon) if isinstance(lexicon, str | Path) else lexicon or Lexicon()
 
 
-def _speaker_of_labels(request: Request) -> str:
+def _speaker_of_labels(request: Request, *, is_typed: bool) -> str:
     """Return the speaker of a request if its labels have one of that name: it then is whose words are read."""
     named = (request.transcript, request.units) if request.speaker else ()
-    files = [Path(name) for name in named if isinstance(name, str | Path) and _file_exists(Path(name))]
+    kinds = (str, Path) if is_typed else Path
+    files = [Path(name) for name in named if isinstance(name, kinds) and _file_exists(Path(name))]
     if not files:
         return ""
     from lipmotion.corpora.labels import speakers_in
