@@ -39,7 +39,7 @@ LINE = 110
 SHOWN_CHANNELS = 6
 """Largest number of channels in a text; points are left out if there are other channels."""
 SUFFIX = ".png"
-"""Of pictures of posteriors."""
+"""Pictures of posteriors end so."""
 
 
 def explain(
