@@ -89,11 +89,11 @@ def test_the_face_of_another_person_is_mapped_onto_once(
     filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mapped: list[str] = []
-    monkeypatch.setattr(one_line, "map_onto", lambda *_, speaker: mapped.append(speaker) or "a map")
+    monkeypatch.setattr(one_line, "provided", lambda _: lambda *_, speaker: mapped.append(speaker) or Path("a map"))
     other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
     shared = one_line._Shared(other, shown_face(filmed_face), None)
-    assert [one_line._request(line, Request(), shared).onto for line in lines] == ["a map", "a map"]
+    assert [one_line._request(line, Request(), shared).onto for line in lines] == [Path("a map")] * 2
     assert mapped == [""]
     assert one_line._request(lines[0], Request(), replace(shared, model=toy_model)).onto is None
 
