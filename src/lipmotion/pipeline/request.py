@@ -182,7 +182,7 @@ class Request(Configuration):
     onto_speaker: str = option(
         "", metavar="NAME", help="which person, if the corpus or the model of --onto has several"
     )
-    spoken_so: bool = option(False)
+    spoken_so: bool = option(False, later=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
