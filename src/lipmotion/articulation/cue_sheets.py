@@ -346,6 +346,7 @@ PHONES = {"rest": REST, "hh": "C"} | {
 OCULUS = {name.lower(): shape for name, _, shape in (pair.partition(":") for pair in _OCULUS.split())}
 """Shapes by the names of Meta's 15 visemes (``viseme_PP``), old and new."""
 PREFIX = "viseme_"
+CHARTS = (BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES)
 LONGEST_S = 86_400.0
 MOST_CUES = 250_000
 MILLISECONDS = 20.0
@@ -361,6 +362,11 @@ def shape_of(name: str, names: dict[str, str], place: str) -> str:
     return found
 
 
+def is_shape(name: str) -> bool:
+    """Return whether a shape has the name in one of the sets."""
+    return any(name.lower().removeprefix(PREFIX) in chart for chart in CHARTS)
+
+
 def chart_of(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, str]:
     """Return the shapes by the names of one set that programs offer: the first that has all of them.
 
@@ -368,7 +374,7 @@ def chart_of(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, s
     dictionary, with stress or without.
     """
     given = {name.strip().lower().removeprefix(PREFIX) for name in names}
-    return next((chart for chart in (usual, BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES) if given <= {*chart}), usual)
+    return next((chart for chart in (usual, *CHARTS) if given <= {*chart}), usual)
 
 
 def cue_time(text: str, place: str) -> float:

@@ -113,22 +113,23 @@ MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Regi
 OTHER_JSON = {
     b'"lipmotion.motion"': ".json",
     b'"mouthCues"': ".tsv",
-    b'"viseme":': ".tsv",
-    b'"visemes":': ".tsv",
     b'"facsNames"': ".a2f.json",
     b'"weightMat"': ".a2f.json",
     b"lendShapes": ".jsonl",
     b"lendshape": ".jsonl",
     b"ategory": ".jsonl",
     b'awOpen"': ".jsonl",
+    b'"viseme":': ".tsv",
+    b'"visemes":': ".tsv",
 }
 """What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
 JSON_HEAD = 1 << 16
 """How many bytes of a ``.json`` are searched for them."""
 CUE_LINE = re.compile(
-    rb'^"?[0-9][0-9:.,]{0,20}"?(?:[;,]\s?"?[0-9:.,]{1,20}"?)?[;,]\s?"?(?!nan|inf)[A-Za-z_0-9]{0,9}[A-Za-z]"?\s*$', re.M
+    rb'^"?[0-9][0-9:.,]{0,20}"?(?:[;,]\s?"?[0-9:.,]{1,20}"?)?[;,]\s?"?([A-Za-z_0-9]{0,19}[A-Za-z])"?\s*$', re.M
 )
 """A line of a ``.csv`` of cues: one or two times, and the name of a shape."""
+SHAPE_COLUMN = re.compile(rb"\b(?:mouth\w*|shape|viseme|phoneme|value|name|cue)\W*$", re.IGNORECASE)
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -287,7 +288,11 @@ def _named_by_content(path: Path) -> Path:
     except OSError:  # reported when it is read
         return path
     if motion_suffix(path) == ".csv":
-        return Path("a.tsv") if CUE_LINE.search(b"\n".join(head.splitlines()[:2])) else path
+        from lipmotion.articulation.cue_sheets import is_shape
+
+        names, *rows = [*head.splitlines()[:2], b""]
+        cue = CUE_LINE.match(rows[0] if SHAPE_COLUMN.search(names) else names)
+        return Path("a.tsv") if cue and is_shape(cue[1].decode()) else path
     return next((Path(f"a{suffix}") for mark, suffix in OTHER_JSON.items() if mark in head), path)
 
 

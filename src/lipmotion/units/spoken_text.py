@@ -27,8 +27,8 @@ CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]
 """A name in capitals above what is said, as in screenplays."""
 DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
 """A line of a screenplay that is not said."""
-SCRIPT = re.compile(r'[ \t]*(?:([a-z_]\w*)((?:[ \t]+[\w@-]+){0,3})[ \t]+)?"(?:[^"\\\n]|\\.)*"[ \t]*')
-"""A line of a game's script: who speaks, how he looks, and in quotes what is said (``e happy "Hello"``)."""
+SCRIPT = re.compile(r'[ \t]*(?:([a-z_]\w*)((?:[ \t]+[\w@-]+){0,3})[ \t]+)?"(?![a-z])(?:[^"\\\n]|\\.)*"[ \t]*')
+"""A line of a game's script: who speaks, how he looks, and in quotes a sentence (``e happy "Hello"``)."""
 NO_TAGS = frozenset("i he she we they you it and then but so or said says".split())
 """Words that begin a sentence with quotes in it."""
 NO_NAMES = frozenset("note notes warning question answer step tip remember ps p.s example".split())
