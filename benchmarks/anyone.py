@@ -28,7 +28,7 @@ from lipmotion import Corpus, animate, load_model
 from lipmotion.corpora.layouts import words_of_name
 from lipmotion.motion.articulation import articulation_table
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio, Channel, Motion, Track
@@ -118,7 +118,7 @@ def rooms(options: argparse.Namespace, model: Model) -> None:
     for name, condition in conditions(options.corpora).items():
         pairs = []
         for seed, utterance in enumerate(utterances):
-            request = SpeechRequest(condition(utterance.audio, seed), recogniser=options.recogniser, pauses="natural")
+            request = Request(condition(utterance.audio, seed), recogniser=options.recogniser, pauses="natural")
             pairs.append(compared(animate(request, model=model).motion, utterance.track))
         generated, tracked = (np.concatenate(each) for each in zip(*pairs, strict=True))
         show(f"{options.split}, {name}", clips=len(pairs), **correlations(generated, tracked))
@@ -132,7 +132,7 @@ def strangers(options: argparse.Namespace, model: Model) -> None:
         each = {}
         for clip in clips:
             words = " ".join(words_of_name(clip.stem) or ()) if condition == "transcript" else None
-            request = SpeechRequest(clip, transcript=words, recogniser=options.recogniser, pauses="natural")
+            request = Request(clip, transcript=words, recogniser=options.recogniser, pauses="natural")
             each[clip.stem] = best_lag(animate(request, model=model).motion, tracks[clip], 0.06)
         show_means(f"grid-others, {condition}", each)
 
@@ -143,7 +143,7 @@ def phones(options: argparse.Namespace, model: Model) -> None:
     for name in SPOKEN:
         path = options.corpora / "speech-open" / name
         text = path.with_suffix(".txt")
-        request = SpeechRequest(path, transcript=(text if text.exists() else path.with_suffix(".lab")).read_text())
+        request = Request(path, transcript=(text if text.exists() else path.with_suffix(".lab")).read_text())
         result = animate(request, model=model)
         for span in result.units:
             middle = int((span.start_s + span.end_s) / 2 * result.motion.rate_hz)
@@ -179,7 +179,7 @@ def open_english(options: argparse.Namespace, model: Model) -> None:
         if "french" in path.stem:
             continue
         for name, audio, piece in pieces(path, options.tracks, whole=options.whole):
-            request = SpeechRequest(audio, recogniser=options.recogniser, pauses="natural")
+            request = Request(audio, recogniser=options.recogniser, pauses="natural")
             each[name] = best_lag(animate(request, model=model).motion, piece, 0.12)
     show_means("open English, audio only", each)
 

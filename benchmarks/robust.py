@@ -35,7 +35,7 @@ import numpy as np
 from lipmotion import animate, load_model
 from lipmotion.corpora.layouts import words_of_name
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
@@ -81,7 +81,7 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
                 ("audio only", None),
                 ("with transcript", " ".join(words_of_name(clip.stem) or ())),
             ):
-                motion = animate(SpeechRequest(clip, transcript=words, recogniser=kind), model=model).motion
+                motion = animate(Request(clip, transcript=words, recogniser=kind), model=model).motion
                 seen, recorded = tracks[clip].seen, tracks[clip].motion
                 generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])
                 found[condition].append(float(np.corrcoef(generated[seen], recorded["opening"][seen])[0, 1]))
@@ -108,7 +108,7 @@ def conditions(corpora: Path, model: Model, _: Path | None) -> None:
             for kind, db in (("white", 20), ("white", 10), ("babble", 20), ("babble", 10)):
                 sounds[f"{kind}, {db} dB"] = noisy_audio(clean, kind, db, voices, number).samples
             for condition, sound in sounds.items():
-                motion = animate(SpeechRequest(Audio(sound.astype(np.float32), RATE_HZ)), model=model).motion
+                motion = animate(Request(Audio(sound.astype(np.float32), RATE_HZ)), model=model).motion
                 pair = np.interp(tracked.motion.time_s, motion.time_s, motion["opening"]), tracked.motion["opening"]
                 found.setdefault(condition, []).append(np.corrcoef(*(each[tracked.seen] for each in pair))[0, 1])
         show(f"{name}: ACC opening", **{condition: round(float(np.mean(each)), 3) for condition, each in found.items()})

@@ -44,8 +44,8 @@ from lipmotion.kernels.compiler import numba_works  # noqa: E402
 from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import step_of  # noqa: E402
-from lipmotion.pipeline.job import Request  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
+from lipmotion.pipeline.request import Request  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
 from lipmotion.storage.json_text import as_json  # noqa: E402
 from lipmotion.testing.toy import toy_sentences  # noqa: E402

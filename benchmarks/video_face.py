@@ -63,8 +63,8 @@ from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closed_threshold, phone_closures
 from lipmotion.measures.curves import pooled_correlation
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.train import phones_of
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Audio, Motion, Track
@@ -211,7 +211,7 @@ def judge(job: Job) -> dict[str, Judged]:
     ways = all_ways(setting)
     for file in setting.engines:
         if any(way.motion == file.stem for way in ways):
-            motions[file.stem] = animate(SpeechRequest(clip.utterance.audio), model=engine(file)).motion
+            motions[file.stem] = animate(Request(clip.utterance.audio), model=engine(file)).motion
     found = {}
     true = lower_face(clip, clip.frames)
     for way in ways:

@@ -15,6 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.request import Outputs
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
@@ -23,7 +24,7 @@ from lipmotion_faces.appearance.candidates import squared_distances
 from lipmotion_faces.appearance.placing import inverse_map, place
 from lipmotion_faces.film import filmed_video
 from lipmotion_faces.film.background import open_background, placed_maps
-from lipmotion_faces.film.filmed_video import FILM, FilmOptions, film_of
+from lipmotion_faces.film.filmed_video import FILM, film_of
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion_faces.registry import face_named
@@ -286,7 +287,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
     """
     filmed_video.open_background = lru_cache(maxsize=1)(open_background)  # every clip is tracked once, not once a way
 
-    def way(name: str, source: str, options: FilmOptions, eigenlips: Eigenlips | None = None) -> Way:
+    def way(name: str, source: str, options: Outputs, eigenlips: Eigenlips | None = None) -> Way:
         def render(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
             shown = motion
             if eigenlips is not None:
@@ -304,12 +305,12 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
     ways = [way("own eigenlips", "tracked", FILM, mouths.eigenlips)]
     ways += [way(source, source, FILM) for source in ("tracked", *engines, CROSSED)]
     options = {
-        "no jaw": FilmOptions(jaw="none"),
-        "jaw by energy": FilmOptions(jaw="energy"),
-        "no refinement": FilmOptions(stitching=replace(STITCHING, mouth=None)),
-        "refinement of the paper": FilmOptions(stitching=AS_PRINTED),
-        "refinement of the paper, no mean": FilmOptions(stitching=replace(AS_PRINTED, average=1)),
-        "no noise": FilmOptions(stitching=replace(STITCHING, noise=False)),
+        "no jaw": Outputs(jaw="none"),
+        "jaw by energy": Outputs(jaw="energy"),
+        "no refinement": Outputs(stitching=replace(STITCHING, mouth=None)),
+        "refinement of the paper": Outputs(stitching=AS_PRINTED),
+        "refinement of the paper, no mean": Outputs(stitching=replace(AS_PRINTED, average=1)),
+        "no noise": Outputs(stitching=replace(STITCHING, noise=False)),
     }
     ways += [
         way(f"{source}, {name}", source, option)

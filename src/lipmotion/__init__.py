@@ -23,15 +23,14 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.generate.explain import explain
     from lipmotion.pipeline.generate.speak import speak
     from lipmotion.pipeline.generate.state_runs import state_runs
-    from lipmotion.pipeline.job import Job, Outputs, Request
+    from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.model import Model, load_model, save_model, with_person
     from lipmotion.pipeline.outputs.cues import cues, write_cues
-    from lipmotion.pipeline.outputs.output import FilmOptions
     from lipmotion.pipeline.outputs.write import write
+    from lipmotion.pipeline.request import Outputs, Request
     from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.pipeline.understand.request import SpeechRequest
     from lipmotion.types import (
         Audio,
         Constraints,
@@ -57,7 +56,6 @@ __all__ = [
     "Delivery",
     "Edits",
     "Explanation",
-    "FilmOptions",
     "Gain",
     "Generation",
     "Job",
@@ -71,7 +69,6 @@ __all__ = [
     "Selection",
     "Session",
     "Span",
-    "SpeechRequest",
     "SpokenText",
     "Staging",
     "Timeline",
@@ -96,17 +93,15 @@ _HOMES = {
     "Edits": "lipmotion.pipeline.edits",
     "Run": "lipmotion.pipeline.training.train",
     "Session": "lipmotion.pipeline.session",
-    "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
     "CueSheet": "lipmotion.articulation.cue_sheets",
     "Job": "lipmotion.pipeline.job",
-    "Outputs": "lipmotion.pipeline.job",
-    "Request": "lipmotion.pipeline.job",
+    "Outputs": "lipmotion.pipeline.request",
+    "Request": "lipmotion.pipeline.request",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",
-    "FilmOptions": "lipmotion.pipeline.outputs.output",
     "animate": "lipmotion.pipeline.generate.animate",
     "cues": "lipmotion.pipeline.outputs.cues",
     "engine_named": "lipmotion.engines",
@@ -129,10 +124,13 @@ _ADDED = (
     *("map_onto", "prepare", "save_face"),
 )
 """Names that the packages of faces, studio and lab provide (entry points of the group ``lipmotion.names``)."""
+_RENAMED = {"FilmOptions": "Outputs", "SpeechRequest": "Request"}
+"""Former names, for older scripts."""
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__ and name not in _ADDED:
+    present = _RENAMED.get(name, name)
+    if present not in __all__ and present not in _ADDED:
         raise AttributeError(f"module 'lipmotion' has no attribute {name!r}")
     from importlib import import_module
 
@@ -141,7 +139,7 @@ def __getattr__(name: str) -> Any:
 
         value = provided(name)
     else:
-        value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), name)
+        value = getattr(import_module(_HOMES.get(present, "lipmotion.types")), present)
     globals()[name] = value
     return value
 

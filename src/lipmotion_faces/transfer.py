@@ -17,9 +17,9 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import model_motion
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.motion.transfer_map import measured_speech_s, transfer_map, with_channels
-from lipmotion.pipeline.generate.generation_for import generate_for, speaker_map
+from lipmotion.pipeline.generation import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand.request import Onto, SpeechRequest
+from lipmotion.pipeline.request import Onto, Request
 from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.pca import evenly_spaced
@@ -43,15 +43,15 @@ def map_onto(
     speaker: str = "",
     onto_speaker: str = "",
     recogniser: str = "auto",
-    speech: SpeechRequest | None = None,
+    speech: Request | None = None,
 ) -> SpeakerMap:
-    """Return the map from the motion that a model generates to that of another person; ``SpeechRequest.onto`` takes it.
+    """Return the map from the motion that a model generates to that of another person; ``Request.onto`` takes it.
 
     model        : whose motion is mapped
     onto         : the person: a video, a prepared corpus, another model, or a filmed face
     speaker      : whose motion is mapped, of the people whom ``model`` was trained on; empty: the mean person
     onto_speaker : onto whose motion, where a corpus or another model has several people
-    recogniser   : how the person's recordings without a transcript are recognised, as of ``SpeechRequest``; best the
+    recogniser   : how the person's recordings without a transcript are recognised, as of ``Request``; best the
                    one of the speech that is animated, for motion of doubtful phones is smaller
     speech       : another model's person is measured in this speech; not used for videos and corpora
     The model generates motion for the person's own recordings, and the person's motion is measured in the same frames,
@@ -61,7 +61,7 @@ def map_onto(
 
     >>> import lipmotion
     >>> person = lipmotion.map_onto(lipmotion.load_model(), "person.mp4")  # doctest: +SKIP
-    >>> lipmotion.animate(lipmotion.SpeechRequest("speech.wav", onto=person))  # doctest: +SKIP
+    >>> lipmotion.animate(lipmotion.Request("speech.wav", onto=person))  # doctest: +SKIP
     """
     if isinstance(onto, SpeakerMap):
         return onto
@@ -86,7 +86,7 @@ def measured_pair(
     model: Model,
     person: SpeakerMap | None,
     name: str,
-    request: SpeechRequest,
+    request: Request,
     measured: Track | Model,
     where: str,
     speaker: str = "",
@@ -129,8 +129,8 @@ def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, st
 
 
 def _takes(
-    opened: _Opened, where: str, speaker: str, speech: SpeechRequest | None
-) -> Iterator[tuple[str, SpeechRequest, Track | Model]]:
+    opened: _Opened, where: str, speaker: str, speech: Request | None
+) -> Iterator[tuple[str, Request, Track | Model]]:
     """Yield recordings of a person: name, request, and the tracked motion, or the model that generates it.
 
     Raises InputError: several people, or no such speaker; no speech for a model.
@@ -141,20 +141,20 @@ def _takes(
         yield where, replace(speech, speaker="", onto=None), opened
     elif isinstance(opened, FilmedFace):
         for number, take in enumerate(opened.takes):
-            yield f"take {number + 1}", SpeechRequest(take.sound), Track(take.motion, take.seen)
+            yield f"take {number + 1}", Request(take.sound), Track(take.motion, take.seen)
     elif isinstance(opened, Corpus):
         names = _names(opened, where, speaker)
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
         for index in evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
             utterance = opened.utterance(names[index])
             words = " ".join(utterance.words) if utterance.words else None
-            yield utterance.name, SpeechRequest(utterance.audio, words, utterance.phones), utterance.track
+            yield utterance.name, Request(utterance.audio, words, units=utterance.phones), utterance.track
     else:
         if speaker:
             raise InputError(f"{where}: a video has no speaker {speaker!r} by name; leave the name out")
         audio = read_audio(opened)
         first = Audio(audio.samples[: round(MOST_FOOTAGE_S * audio.rate_hz)], audio.rate_hz)
-        yield where, SpeechRequest(first), track(opened, crops=False, span=VideoSpan(0.0, MOST_FOOTAGE_S))
+        yield where, Request(first), track(opened, crops=False, span=VideoSpan(0.0, MOST_FOOTAGE_S))
 
 
 def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
@@ -173,7 +173,7 @@ def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
     return names
 
 
-def _understood(model: Model, request: SpeechRequest) -> Speech:
+def _understood(model: Model, request: Request) -> Speech:
     """Return the speech of a recording; without its transcript where that cannot be aligned."""
     try:
         return understand(model, request)
@@ -182,12 +182,12 @@ def _understood(model: Model, request: SpeechRequest) -> Speech:
 
 
 def _measured(
-    measured: Track | Model, request: SpeechRequest, speech: Speech, speaker: str
+    measured: Track | Model, request: Request, speech: Speech, speaker: str
 ) -> tuple[Motion, NDArray[np.bool_]]:
     """Return the motion of a person in speech at 100 Hz, and the frames in which it is valid [shape=(T,)]."""
     if isinstance(measured, Track):
         return model_motion(measured, len(speech.features.values))
-    same = SpeechRequest(audio_of(request), units=speech.units)
+    same = Request(audio_of(request), units=speech.units)
     other = generate_for(
         speaker_map(measured.speakers, speaker), measured.engine, measured.learned, understand(measured, same)
     )

@@ -17,8 +17,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser

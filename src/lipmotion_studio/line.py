@@ -20,11 +20,11 @@ from lipmotion.pipeline.generate.explain import explain_session, explanation_tex
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
 from lipmotion.pipeline.session import own_pronunciations
-from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
-from lipmotion.units import Lexicon, Pronunciation, is_silent, words_in_time, words_of
+from lipmotion.units import Pronunciation, is_silent, words_in_time, words_of
 from lipmotion_faces.base import Face
 from lipmotion_faces.film.filmed_video import write_film
 from lipmotion_faces.filmed.face import FilmedFace
@@ -150,7 +150,7 @@ class OpenLine:
 
     def _guessed(self, steps: tuple[str | Step, ...]) -> list[dict[str, Any]]:
         """Return the words of edits whose pronunciation is a guess, with it, as objects of JSON."""
-        lexicon = self.session.request.lexicon or Lexicon()
+        lexicon = lexicon_of(self.session.request)
         found: dict[str, Pronunciation] = {}
         for step in map(step_of, map(str, steps)):
             if isinstance(step, WordStep):
@@ -272,7 +272,7 @@ class OpenLine:
         film = person.film(performance)
         frames, sound = self._stretch(start_s, end_s, film.count, film.rate_hz)
         part = replace(film, frames=islice(film.frames, frames.start, frames.stop), count=len(frames))
-        write_film(path, part, sound, mark=performance.settings.film.mark)
+        write_film(path, part, sound, mark=performance.settings.outputs.mark)
 
     def _stretch(self, start_s: float, end_s: float, count: int, rate_hz: float) -> tuple[range, Audio]:
         """Return which frames of a video show a stretch, and their sound. Raises InputError: too long, or none."""

@@ -139,7 +139,7 @@ class Project:
     """The lines that are worked on, by their numbers.
 
     model      : path of the model from the folder of the project; empty: the one that ships
-    language, recogniser : of new lines, as of ``SpeechRequest``
+    language, recogniser : of new lines, as of ``Request``
     preset     : that was used last for an export
     characters : paths of characters, by their names
     recordings : path of a folder of recordings that a voice or a face can be made of; empty: none

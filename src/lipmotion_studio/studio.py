@@ -19,9 +19,9 @@ from lipmotion.extensions import installed_version
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
 from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
-from lipmotion.pipeline.job import Job, Outputs
-from lipmotion.pipeline.opened_job import opened
+from lipmotion.pipeline.job import Job, check_outputs, open_face, run
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
+from lipmotion.pipeline.request import Outputs
 from lipmotion.storage.files import TEMPORARY, made_folders, remove, sha256_of, temporary_folder
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
@@ -378,10 +378,10 @@ class Studio:
             write_edits(file, copy)
             request = replace(file.named, recording=self.folder.checked_sound(line), edits=copy)
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
-            job = opened(Job(request, outputs))
-            if face and any(isinstance(output, VideoOutput) for output in job.checked(request.recording)):
-                job = replace(job, face=self.faces.shown(face))
-            job.run(lambda: self.used.model)
+            job, shown = Job(request, outputs), open_face(outputs)
+            if face and any(isinstance(each, VideoOutput) for each in check_outputs(job, shown, request.recording)):
+                shown = self.faces.shown(face)
+            run(job, face=shown, model=self.used.model)
         digests = {Path(path).relative_to(self.folder.path).as_posix(): sha256_of(Path(path)) for path in files}
         record = ExportRecord(
             preset.name,

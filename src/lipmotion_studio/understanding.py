@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lipmotion.pipeline.edit_files import begun_with
-from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed

@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus, SpeechRequest, animate, load_model, read_motion, write
+from lipmotion import Corpus, animate, load_model, read_motion, write
+from lipmotion.pipeline.request import Request
 
 
 @pytest.fixture
@@ -157,7 +158,7 @@ def test_one_of_several_people(
     assert any("anna; ben" in line for line in run("info", "m").out)
     done = run("animate", toy_speech, "--model", "m", "--recogniser", "own", "--speaker", "ben", "-o", "ben.json")
     assert (done.code, done.out) == (0, ["ben.json"])
-    request = SpeechRequest(toy_speech, recogniser="own", speaker="ben")
+    request = Request(toy_speech, recogniser="own", speaker="ben")
     written, expected = read_motion(here / "ben.json")[0], animate(request, model="m").motion
     assert written["opening"].tolist() == pytest.approx(expected["opening"].tolist(), abs=1e-5)
     done = run("animate", toy_speech, "--model", "m", "--speaker", "cleo", "-o", "cleo.json")

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus, Run, SpeechRequest, animate, cues, load_model, prepare, train, write, write_cues
+from lipmotion import Corpus, Run, animate, cues, load_model, prepare, train, write, write_cues
 from lipmotion.cli.command_line import parser
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.request import Request
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
 FIGURES = "c --lexicon l.txt"
@@ -165,7 +166,7 @@ def _verbs(found: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
 def test_from_python(laid: Path, toy_speech: Path, toy_model_file: Path) -> None:
     speech = laid / "speech.json"
     shutil.copy(toy_speech, speech)
-    made = animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model_file)
+    made = animate(Request(toy_speech, recogniser="own"), model=toy_model_file)
     corpus = Corpus.open(laid / "c")
     calls: list[Callable[[], object]] = [
         lambda: write(made, speech, speech=speech),

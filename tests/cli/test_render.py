@@ -113,7 +113,7 @@ def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.Mo
 
 def test_files_without_sound_get_no_silence(run: RunCommand, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sounds = []
-    monkeypatch.setattr("lipmotion.pipeline.opened_job.OpenedJob.write", lambda *given, **_: sounds.append(given[2]))
+    monkeypatch.setattr("lipmotion.cli.verbs.render.write_outputs", lambda *given, **_: sounds.append(given[3]))
     (here / "rig.csv").write_text("time_s,opening\n0,0\n0.1,0.1\n")
     for name in ("a.json", "a.mp4"):
         assert run("render", "rig.csv", "-o", name).code == 0

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import SpeechRequest, load_model
+from lipmotion import load_model
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import read_units
-from lipmotion.pipeline.generate.outlook import outlook_of
+from lipmotion.pipeline.generation import outlook_of
+from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.understand.read_request import read_units
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech, understood_speech
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
@@ -98,12 +99,12 @@ def audio() -> AnalysedAudio:
 def right(audio: AnalysedAudio) -> Timeline[Unit]:
     """Its phones in time."""
     words = WELCOME.with_suffix(".txt").read_text()
-    return understood_speech(load_model(), SpeechRequest(audio, transcript=words)).speech.units
+    return understood_speech(load_model(), Request(audio, transcript=words)).speech.units
 
 
 def followed(audio: Audio, units: Timeline[Unit]) -> tuple[UnderstoodSpeech, float]:
     """Return speech of given phones, and the confidence in the outlook."""
-    request = SpeechRequest(audio, units=units)
+    request = Request(audio, units=units)
     understood = understood_speech(load_model(), request)
     return understood, outlook_of(request, understood).confidence
 

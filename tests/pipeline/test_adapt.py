@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Model, SpeechRequest, adapt, animate, load_model, save_model
+from lipmotion import Model, adapt, animate, load_model, save_model
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.pipeline.model import read_header
+from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 from pipeline.test_model import npy, rewritten
@@ -42,9 +43,9 @@ def test_it_is_used_from_then_on(toy_model: Model, adapted: Model, toy_speech: P
     plain = kind.own_features
     monkeypatch.setattr(kind, "own_features", lambda one, *given: used.append(one) or plain(one, *given))
     for words in (None, "ba"):
-        animate(SpeechRequest(toy_speech, transcript=words, recogniser="own"), model=adapted)
+        animate(Request(toy_speech, transcript=words, recogniser="own"), model=adapted)
     assert used == [adapted.adaptation] * 2
-    animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model)
+    animate(Request(toy_speech, recogniser="own"), model=toy_model)
     assert len(used) == 2
 
 
@@ -56,7 +57,7 @@ def test_a_saved_and_loaded_adaptation_gives_the_same_phones(
     assert np.array_equal(again.adaptation.own, adapted.adaptation.own)
     assert np.array_equal(again.adaptation.general, adapted.adaptation.general)
     assert read_header(adapted_file)["adapted"] == adapted.about["adapted"]
-    request = SpeechRequest(toy_speech, recogniser="fast")
+    request = Request(toy_speech, recogniser="fast")
     before, after = (animate(request, model=model).units for model in (adapted, again))
     assert [span.label.phone for span in before] == [span.label.phone for span in after]
 

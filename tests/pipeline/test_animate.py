@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from lipmotion import Model, SpeechRequest, animate, write
+from lipmotion import Model, animate, write
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
@@ -24,7 +25,7 @@ Animate = Callable[..., Generation]
 def move(toy_model: Model, toy_sentence: ToySentence) -> Animate:
     """Animates the toy sentence with the toy model."""
     return lambda *, constraints=None, **known: animate(
-        SpeechRequest(toy_sentence.audio, **known), model=toy_model, constraints=constraints
+        Request(toy_sentence.audio, **known), model=toy_model, constraints=constraints
     )
 
 
@@ -157,10 +158,10 @@ def test_constraints_and_units_that_are_none(move: Animate, toy_sentence: ToySen
     pins = Pin(0.5, "opening", 0.1), Pin(0.502, "opening", 0.2)
     with pytest.raises(InputError, match="the constraints are a tuple, required Constraints"):
         move(constraints=pins)
-    with pytest.raises(InputError, match="the units are a list, required a Timeline"):
-        SpeechRequest(toy_sentence.audio, units=[])
+    with pytest.raises(InputError, match="units: found a list, required a path, or a Timeline"):
+        Request(toy_sentence.audio, units=[])
     with pytest.raises(InputError, match="a unit is 'p', required a Unit"):
-        SpeechRequest(toy_sentence.audio, units=Timeline((Span(0, 1, "p"),)))
+        Request(toy_sentence.audio, units=Timeline((Span(0, 1, "p"),)))
     for start_s, end_s in ((-math.inf, 0.5), (0.5, 1e308), (1e308, math.inf)):
         with pytest.raises(InputError, match=r"the units last from .* s, required times of this recording"):
             move(units=Timeline((Span(start_s, end_s, Unit("p")),)))
@@ -189,7 +190,7 @@ def test_speech_that_cannot_be_used(toy_model: Model, tmp_path: Path) -> None:
         animate(tmp_path / "speech.wav", model=toy_model)
     with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
         animate(Audio(np.zeros(44_100, np.float32), 44_100), model=toy_model)
-    with pytest.raises(InputError, match="ndarray, required a path, or samples as lipmotion"):
+    with pytest.raises(InputError, match="ndarray, required a path, or samples"):
         animate(np.zeros(16_000, np.float32), model=toy_model)  # type: ignore[arg-type]
 
 
@@ -216,7 +217,7 @@ def test_text_beyond_the_recording_is_refused_before_it_is_split(
 def test_units_beyond_the_recording_are_refused(toy_model: Model, toy_sentence: ToySentence) -> None:
     units = Timeline(tuple(Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000)))
     with pytest.raises(InputError, match=r"2000 units in time, required at most 1276 for 2.76 s of sound"):
-        animate(SpeechRequest(toy_sentence.audio, units=units), model=toy_model)
+        animate(Request(toy_sentence.audio, units=units), model=toy_model)
 
 
 def test_the_same_bytes_again_whatever_the_number_of_threads(toy_model, toy_speech, tmp_path):

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from lipmotion import Model, SpeechRequest
+from lipmotion import Model
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_arrays
 from lipmotion.motion.eigenlips import eigenlips_arrays
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
 from lipmotion.testing.toy import ToySentence
@@ -30,7 +31,7 @@ def quiet() -> Iterator[None]:
 
 def absurd(model: Model, sentence: ToySentence, damages: tuple[str, ...]) -> tuple[list[str], int, int]:
     """Return what gave absurd motion, or was not noticed; how much was refused, and how much was harmless."""
-    speech = understand(model, SpeechRequest(sentence.audio, recogniser="own"))
+    speech = understand(model, Request(sentence.audio, recogniser="own"))
     arrays = model.engine.to_arrays(model.learned)
     whole = animated(model, arrays, speech)
     assert whole is not None

@@ -17,6 +17,7 @@ from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody
+from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey
 from lipmotion_faces import Face, Staging
@@ -44,7 +45,7 @@ def test_files_say_when_the_sound_begins(
     assert json.loads(paths[0].read_text())["source"] == {"file": toy_speech.name, "start_s": f"{offset_ms / 1000:g}"}
     assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
     scene = delivered_scene(
-        Performance(generation, OutputSettings(shown_face("head"), rate_hz=12.0, delivery=delivery))
+        Performance(generation, OutputSettings(shown_face("head"), outputs=Outputs(rate_hz=12.0), delivery=delivery))
     )
     assert scene.sound_s == pytest.approx(offset_ms / 1000)
 

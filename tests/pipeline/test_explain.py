@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Model, SpeechRequest
+from lipmotion import Model
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate.explain import explanation_document, explanation_text
+from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import ToySentence
 
 WORDS = "See Bob, papa & mama!"
@@ -26,7 +27,7 @@ def test_it_explains_what_animate_makes(coupled_model: Model, toy_speech: Path) 
     assert one.span in result.units.spans
     assert result.confidence is not None
     assert [one.confidence, other.confidence] == pytest.approx(result.confidence[[80, 100]].tolist(), abs=1e-6)
-    (same,) = lipmotion.explain(SpeechRequest(toy_speech, units=result.units), at=0.8, model=coupled_model)
+    (same,) = lipmotion.explain(Request(toy_speech, units=result.units), at=0.8, model=coupled_model)
     assert same.state == one.state
     assert [chain.name for chain in one.chains] == ["sVis", "2vis"]
     assert sum(one.chains[1].lead.values()) == pytest.approx(1, abs=1e-4)

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import re
 import sys
-from dataclasses import fields
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Delivery, Job, Outputs, Request, SpeechRequest, Staging, animate, load_model, write
+from lipmotion import Delivery, Job, Outputs, Request, Staging, animate, load_model, write
 from lipmotion.errors import InputError
-from lipmotion.pipeline.job import located
+from lipmotion.formats.label_files import write_labels
+from lipmotion.pipeline.request import located
 from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.testing.toy import ToySentence
+from lipmotion.types import Timeline
+from lipmotion.units import Lexicon
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8").partition("\n## Jobs, and files of them")[2]
@@ -97,19 +103,39 @@ def test_a_job_writes_what_animate_and_write_do(toy_speech: Path, toy_model_file
     outputs = Outputs((str(made[0]),), fps=30, channels=("width", "tongue"))
     delivery = Delivery(anticipation_ms=40)
     Job(Request(toy_speech, recogniser="own", model=toy_model_file), outputs, delivery).run()
-    alone = animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model_file)
+    alone = animate(Request(toy_speech, recogniser="own"), model=toy_model_file)
     model = load_model(toy_model_file)
     how = {"rate_hz": 30, "channels": ("width", "tongue"), "delivery": delivery}
     write(alone, made[1], speech=toy_speech, model=model, **how)
     assert made[0].read_bytes() == made[1].read_bytes()
 
 
-def test_a_request_is_read_as_it_is(toy_speech: Path) -> None:
-    """What a request and a ``SpeechRequest`` both say has the same names, and the same defaults."""
-    read, usual = read_request(Request(toy_speech)), SpeechRequest(toy_speech)
-    assert all(getattr(read, each.name) == getattr(usual, each.name) for each in fields(SpeechRequest))
+def test_a_field_is_a_file_or_what_it_holds(toy_sentence: ToySentence, toy_speech: Path, tmp_path: Path) -> None:
+    (tmp_path / "words.txt").write_text("see bob")
+    (tmp_path / "own.dict").write_text("SEE  S IY\n")
+    write_labels(tmp_path / "phones.TextGrid", toy_sentence.units)
+    files = Request(toy_speech, tmp_path / "words.txt", tmp_path / "own.dict", units=tmp_path / "phones.TextGrid")
+    read = read_request(files)
+    assert (read.transcript, read.recording) == ("see bob", toy_speech)
+    assert isinstance(read.lexicon, Lexicon)
+    assert isinstance(read.units, Timeline)
+    assert [span.label.phone for span in read.units] == [span.label.phone for span in toy_sentence.units]
+    assert read_request(read) == read
+    named = replace(files, transcript=str(tmp_path / "words.txt"))
+    assert read_request(named).transcript == "see bob"
+    assert read_request(named, is_typed=False).transcript == str(tmp_path / "words.txt")
+    with pytest.raises(InputError, match="lexicon: found a dict, required a path, or a Lexicon"):
+        Request(toy_speech, lexicon={})  # type: ignore[arg-type]
     with pytest.raises(InputError, match="names no recording"):
         read_request(Request())
+
+
+def test_a_job_of_a_sound_writes_it(toy_sentence: ToySentence, toy_model_file: Path, tmp_path: Path) -> None:
+    request = Request(toy_sentence.audio, units=toy_sentence.units, model=toy_model_file)
+    files = (str(tmp_path / "a.wav"), str(tmp_path / "a.csv"))
+    made = Job(request, Outputs(files)).run()
+    assert len(read_audio(tmp_path / "a.wav").samples) == len(toy_sentence.audio.samples)
+    np.testing.assert_array_equal(made.motion.values, animate(request).motion.values)
 
 
 def test_a_background_is_of_a_drawn_face_or_of_a_filmed_one(toy_speech: Path) -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Model, Request, SpeechRequest
+from lipmotion import Model, Request
 from lipmotion.errors import InputError
+from lipmotion.pipeline.request import request_of
 from lipmotion.pipeline.understand import language as told
 from lipmotion.pipeline.understand.language import in_language
 from lipmotion.pipeline.understand.read_request import read_request
-from lipmotion.pipeline.understand.request import request_of
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE, LanguageLexicon
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine
@@ -24,14 +24,14 @@ USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
 
 
 def test_english_stays_as_it_is() -> None:
-    request = SpeechRequest(SILENCE, "two papas")
+    request = Request(SILENCE, "two papas")
     assert in_language(request) is request
 
 
 def test_another_language_has_its_own_words_and_lexicon(tmp_path: Path) -> None:
     (tmp_path / "words.txt").write_text("¡Papa, 2!", encoding="utf-8")
     for transcript in ("¡Papa, 2!", tmp_path / "words.txt"):
-        request = in_language(SpeechRequest(SILENCE, transcript, lexicon=USER, language="es"))
+        request = in_language(read_request(Request(SILENCE, transcript, lexicon=USER, language="es"), is_typed=False))
         assert isinstance(request.transcript, TimedTranscript)
         assert request.transcript.words == ("papa", "2")
         assert isinstance(request.lexicon, LanguageLexicon)
@@ -41,9 +41,7 @@ def test_another_language_has_its_own_words_and_lexicon(tmp_path: Path) -> None:
 def test_written_forms_in_subtitles_are_not_read_as_english() -> None:
     written = tuple(map(TimedWord, ("perro", "$20M", "&", "St.", "21")))
     user = Lexicon(dict.fromkeys(("perro", "20m", "st", "21"), (("m", "aa"),)))
-    request = in_language(
-        SpeechRequest(SILENCE, TimedTranscript((TranscriptLine(written),)), lexicon=user, language="es")
-    )
+    request = in_language(Request(SILENCE, TimedTranscript((TranscriptLine(written),)), lexicon=user, language="es"))
     assert isinstance(request.transcript, TimedTranscript)
     assert request.transcript.words == ("perro", "20m", "st", "21")
     assert request.lexicon is not None
@@ -54,16 +52,16 @@ def test_unknown_languages_are_refused() -> None:
     with pytest.raises(InputError, match="language is 'xx', required one of: en, es, fr, "):
         request_of(SILENCE, language="xx")
     with pytest.raises(InputError, match="the language of the transcript is not known; give it, one of: en, es"):
-        in_language(SpeechRequest(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
+        in_language(Request(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
 
 
 def test_auto_says_what_it_takes_the_speech_for(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert in_language(SpeechRequest(SILENCE, "bin blue at f two now", language="auto")).language == "en"
+    assert in_language(Request(SILENCE, "bin blue at f two now", language="auto")).language == "en"
     for english, language in ((True, "en"), (False, "auto"), (None, "en")):
         monkeypatch.setattr(told, "english_spoken", lambda _, english=english: english)
-        assert in_language(SpeechRequest(SILENCE, language="auto")).language == language
+        assert in_language(Request(SILENCE, language="auto")).language == language
     said = [record.getMessage().partition(";")[0] for record in caplog.records]
     assert said == [
         "the transcript is taken for English",
@@ -76,13 +74,13 @@ def test_auto_says_what_it_takes_the_speech_for(
 def test_mapped_phones_are_not_called_sure(toy_model: Model, toy_sentence: ToySentence) -> None:
     words = " ".join(toy_sentence.words)
     lexicon = Lexicon({word: Lexicon().pronunciations(word) for word in toy_sentence.words})
-    request = SpeechRequest(toy_sentence.audio, words, lexicon=lexicon, recogniser="own", language="es")
+    request = Request(toy_sentence.audio, words, lexicon=lexicon, recogniser="own", language="es")
     outlook = lipmotion.animate(request, model=toy_model).outlook
     assert outlook is not None
     assert (outlook.words, outlook.confidence) == ("mapped transcript", MAPPED_CONFIDENCE)
     assert "mapped to English phones, confidence 0.80" in outlook.text
     foreign = " ".join(["sisa mapama bisi", *toy_sentence.words[:1]])
-    outlook = lipmotion.animate(SpeechRequest(toy_sentence.audio, foreign, recogniser="own"), model=toy_model).outlook
+    outlook = lipmotion.animate(Request(toy_sentence.audio, foreign, recogniser="own"), model=toy_model).outlook
     assert outlook is not None
     assert outlook.words == "mapped transcript"
     assert outlook.confidence == pytest.approx(0.25)
@@ -90,5 +88,5 @@ def test_mapped_phones_are_not_called_sure(toy_model: Model, toy_sentence: ToySe
 
 def test_the_option_reaches_the_request() -> None:
     assert read_request(Request("a.wav", language="ko")).language == "ko"
-    assert request_of(SpeechRequest(SILENCE, language="ko"), language="fr").language == "fr"
-    assert request_of(SpeechRequest(SILENCE, language="ko")).language == "ko"
+    assert request_of(Request(SILENCE, language="ko"), language="fr").language == "fr"
+    assert request_of(Request(SILENCE, language="ko")).language == "ko"

@@ -16,6 +16,7 @@ from lipmotion.pipeline.outputs.cues import CueOutput
 from lipmotion.pipeline.outputs.motion_files import MotionOutput
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, plan
 from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput
+from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Generation
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion_faces.outputs.scenes import SceneOutput
@@ -68,12 +69,13 @@ def test_a_name_asks_for_a_kind(name: str, kind: type[Output], settings: OutputS
 
 def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path) -> None:
     for name in ("a.xyz", "a.png", "a"):
-        with pytest.raises(ExportError, match=r"required one of: \.json .*\.mp4 .*\.glb .*\.wav .*%05d\.png \.cues"):
+        with pytest.raises(ExportError, match="required one of") as error:
             plan(name, settings)
+        assert {".json", ".mp4", ".glb", ".wav", "%05d.png", ".cues.tsv"} <= {*str(error.value).split()}
     with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
         plan("a.wav", replace(settings, sounded=False))
     with pytest.raises(InputError, match="the frame rate is 101"):
-        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, fps=101.0))
+        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, outputs=Outputs(fps=101.0)))
 
 
 def test_cues_beside_other_outputs_are_those_of_the_function(result: Generation, tmp_path: Path) -> None:
@@ -105,5 +107,5 @@ def test_outputs_share_what_is_made_once(result: Generation, settings: OutputSet
         made.append(1)
         return made
 
-    assert performance.once(make) is performance.once(make)
+    assert performance.cached(make) is performance.cached(make)
     assert made == [1]

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Model, SpeechRequest, animate, cues, read_motion, speak, write
-from lipmotion.formats.label_files import read_units
+from lipmotion import Model, animate, cues, read_motion, speak, write
 from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.understand.read_request import read_units
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.testing.toy import ToySentence
@@ -38,7 +39,7 @@ def test_spoken_text_and_its_phones_give_the_motion_of_speak(
     sound, said = speak("Papa, see Bob. Mama!", model=toy_model)
     write(said, [tmp_path / name for name in ("a.wav", "a.flac", *PHONE_FILES)], speech=sound)
     for recording, phones in (("a.wav", "a.TextGrid"), ("a.flac", "a.json"), ("a.wav", "a.npz")):
-        request = SpeechRequest(tmp_path / recording, units=read_units(tmp_path / phones))
+        request = Request(tmp_path / recording, units=read_units(tmp_path / phones))
         again = animate(request, model=toy_model)
         assert np.array_equal(again.motion.values, said.motion.values)
         assert again.units == said.units
@@ -51,11 +52,11 @@ def test_phones_of_a_recording_say_what_is_known_of_them(
     toy_model: Model, toy_sentence: ToySentence, tmp_path: Path, words: str | None, name: str
 ) -> None:
     transcript = " ".join(toy_sentence.words) if words else None
-    request = SpeechRequest(toy_sentence.audio, transcript=transcript, recogniser="own")
+    request = Request(toy_sentence.audio, transcript=transcript, recogniser="own")
     first = understand(toy_model, request)
     result = animate(request, model=toy_model)
     write(result, tmp_path / name)
-    given = SpeechRequest(toy_sentence.audio, units=read_units(tmp_path / name), recogniser="own")
+    given = Request(toy_sentence.audio, units=read_units(tmp_path / name), recogniser="own")
     again = understand(toy_model, given)
     assert (
         (again.units_known, again.confidence)
@@ -80,7 +81,7 @@ def test_corrected_phones_are_known_and_all_others_as_doubtful_as_before(
     spans[at + 1] = replace(spans[at + 1], start_s=border_s)
     edited = tmp_path / f"b{Path(name).suffix}"
     write_as_edited(edited, Timeline(tuple(spans)), found, generation)
-    speech = understand(toy_model, SpeechRequest(toy_sentence.audio, units=read_units(edited)))
+    speech = understand(toy_model, Request(toy_sentence.audio, units=read_units(edited)))
     assert [span.label.confidence for span in speech.units].count(None) == 2
     confidence = np.asarray(speech.confidence)
     known = np.flatnonzero(confidence == 1) / 100

@@ -10,13 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, Model, Selection, SpeechRequest, animate, evaluate, explain, load_model, save_model, train
+from lipmotion import Corpus, Model, Selection, animate, evaluate, explain, load_model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speaker_maps import speaker_arrays
-from lipmotion.pipeline.generate.posteriors import animate_with_posteriors
+from lipmotion.pipeline.edits import Edits
+from lipmotion.pipeline.generate.explain import chain_posteriors
+from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.session import Session
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
 
@@ -58,8 +61,8 @@ def model(people: Corpus) -> Model:
     return train(people, recogniser=SMALL)[0]
 
 
-def request(sentence: ToySentence, speaker: str = "") -> SpeechRequest:
-    return SpeechRequest(sentence.audio, units=sentence.units, speaker=speaker, pauses="natural")
+def request(sentence: ToySentence, speaker: str = "") -> Request:
+    return Request(sentence.audio, units=sentence.units, speaker=speaker, pauses="natural")
 
 
 def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarray:
@@ -197,7 +200,7 @@ def test_other_engines(people: Corpus, toy_sentence: ToySentence, engine: str) -
     (explanation,) = explain(request(toy_sentence, "ben"), at=0.9, model=model)
     assert explanation.motion["opening"].value == pytest.approx(ben[90], abs=1e-9)
     if engine == "coupled":
-        generation, _ = animate_with_posteriors(request(toy_sentence, "ben"), model=model)
+        generation, _ = chain_posteriors(Session(request(toy_sentence, "ben"), model=model), Edits())
         np.testing.assert_allclose(generation.motion["opening"], ben, atol=1e-12)
 
 
@@ -221,7 +224,7 @@ def test_channels_that_all_have_are_trained_on(
     assert len(report.used) == 9
     assert model.speakers is not None
     assert model.speakers.names == ("anna", "ben", "captured")
-    generated = animate(SpeechRequest(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
+    generated = animate(Request(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
     assert generated.motion.names == ("width", "opening")
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Model, SpeechRequest, state_runs
+from lipmotion import Model, state_runs
 from lipmotion.pipeline.generate.state_runs import StateRun, run_lines, runs_of
+from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
@@ -45,7 +46,7 @@ def test_runs_are_the_trace_of_what_animate_makes(
     name: str, toy_sentence: ToySentence, request: pytest.FixtureRequest
 ) -> None:
     model: Model = request.getfixturevalue(name)
-    speech = SpeechRequest(toy_sentence.audio, units=toy_sentence.units)
+    speech = Request(toy_sentence.audio, units=toy_sentence.units)
     trace = lipmotion.animate(speech, model=model).trace
     runs = state_runs(speech, model=model)
     assert all(a.end_s == pytest.approx(b.start_s) for a, b in pairwise(runs))

@@ -13,7 +13,6 @@ import lipmotion
 from lipmotion import (
     Corpus,
     Model,
-    SpeechRequest,
     animate,
     explain,
     load_model,
@@ -26,7 +25,7 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
-from lipmotion.pipeline.understand.request import Onto
+from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
@@ -69,8 +68,8 @@ def two_model(of_two: Corpus) -> Model:
     return train(of_two, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
 
 
-def request(sentence: ToySentence, onto: Onto | None = None, **more: str) -> SpeechRequest:
-    return SpeechRequest(sentence.audio, units=sentence.units, onto=onto, pauses="natural", **more)
+def request(sentence: ToySentence, onto: Onto | None = None, **more: str) -> Request:
+    return Request(sentence.audio, units=sentence.units, onto=onto, pauses="natural", **more)
 
 
 def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) -> None:
@@ -243,6 +242,6 @@ def test_onto_a_real_person(recordings: Path) -> None:
     sound = read_audio(video)  # after a second of its room: before speech the mouth opens
     audio = Audio(np.concatenate([np.resize(sound.samples[:1600], sound.rate_hz), sound.samples]), sound.rate_hz)
     own, mapped = (
-        lipmotion.animate(SpeechRequest(audio, onto=onto, pauses="natural")).motion["opening"] for onto in (None, video)
+        lipmotion.animate(Request(audio, onto=onto, pauses="natural")).motion["opening"] for onto in (None, video)
     )
     assert abs(np.median(mapped[:20]) - rest) < 0.7 * abs(np.median(own[:20]) - rest)

@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lipmotion import Model, SpeechRequest
+from lipmotion import Model
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generate.outlook import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, outlook_of
+from lipmotion.pipeline.generation import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, outlook_of
+from lipmotion.pipeline.request import Request, request_of
 from lipmotion.pipeline.understand import understood_speech as pipeline_understand
-from lipmotion.pipeline.understand.request import request_of
 from lipmotion.pipeline.understand.understood_speech import (
     recognised_speech,
     speech_of,
@@ -110,7 +110,7 @@ def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> N
 
 def test_the_name_of_a_file_is_no_transcript(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
     (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
-    request = SpeechRequest(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
+    request = Request(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
     with pytest.raises(InputError, match="is the name of a file; give Path"):
         understand(toy_model, request)
 
@@ -130,7 +130,7 @@ def test_subtitles_are_aligned_within_their_times(toy_model: Model, toy_sentence
     (tmp_path / "said.srt").write_text(
         f"00:00:00,300 --> 00:00:02,600\n<i>{' '.join(toy_sentence.words)}</i>\n", encoding="utf-8"
     )
-    plain = SpeechRequest(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
+    plain = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
     wanted = understand(toy_model, plain)
     text = (tmp_path / "said.srt").read_text(encoding="utf-8")
     for transcript in (tmp_path / "said.srt", text, words_in_time(toy_sentence), words_in_time(toy_sentence, 0.4)):
@@ -143,7 +143,7 @@ def test_times_decide_where_words_alone_do_not(toy_model: Model, toy_sentence: T
     """The sentence twice, and a transcript of the second time alone."""
     twice = Audio(np.tile(toy_sentence.audio.samples, 2), 16_000)
     second = words_in_time(toy_sentence, toy_sentence.audio.duration_s)
-    found = understand(toy_model, SpeechRequest(twice, transcript=second, recogniser="own")).units
+    found = understand(toy_model, Request(twice, transcript=second, recogniser="own")).units
     starts_s = [span.start_s for span in found if span.label.word]
     true_s = [span.start_s + toy_sentence.audio.duration_s for span in toy_sentence.units if span.label.word]
     assert starts_s == pytest.approx(true_s, abs=0.06)
@@ -154,7 +154,7 @@ def test_words_of_an_installed_recogniser_are_aligned(
 ) -> None:
     said = [words_in_time(toy_sentence), None]
     monkeypatch.setattr(pipeline_understand, "recognise_words", lambda _, kind: said.pop(0) if kind == "vosk" else None)
-    request = SpeechRequest(toy_sentence.audio, recogniser="vosk")
+    request = Request(toy_sentence.audio, recogniser="vosk")
     found = understand(toy_model, request)
     words = tuple(span.label.word for span in found.units if span.label.word)
     assert tuple(word for word, _ in groupby(words)) == toy_sentence.words
@@ -167,22 +167,22 @@ def test_words_of_an_installed_recogniser_are_aligned(
 
 
 def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other() -> None:
-    assert request_of(SpeechRequest("a.wav"), "papa").transcript == "papa"
+    assert request_of(Request("a.wav"), "papa").transcript == "papa"
     assert request_of("a.wav", "papa").transcript == "papa"
     with pytest.raises(InputError, match="give one"):
-        request_of(SpeechRequest("a.wav", "mama"), "papa")
+        request_of(Request("a.wav", "mama"), "papa")
 
 
 def test_every_recogniser_is_named(toy_model: Model, toy_sentence: ToySentence) -> None:
     with pytest.raises(InputError) as refused:
-        understand(toy_model, SpeechRequest(toy_sentence.audio, recogniser="best"))
+        understand(toy_model, Request(toy_sentence.audio, recogniser="best"))
     required = "required one of: auto, words, fast, own, general, whisper, vosk"
     assert str(refused.value) == f"unknown recogniser 'best'; {required}"
 
 
 @pytest.mark.parametrize("kind", ["own", "auto"])
 def test_a_recording_without_speech(toy_model: Model, kind: str, caplog: pytest.LogCaptureFixture) -> None:
-    request = SpeechRequest(Audio(np.zeros(16_000, np.float32), 16_000), recogniser=kind)
+    request = Request(Audio(np.zeros(16_000, np.float32), 16_000), recogniser=kind)
     understood = understood_speech(toy_model, request)
     (text,) = caplog.messages
     assert text.startswith("no speech found in the recording: the mouth rests; give a recording in which something")
@@ -194,7 +194,7 @@ def test_a_recording_without_speech(toy_model: Model, kind: str, caplog: pytest.
 def test_a_transcript_beside_units_is_not_used(
     toy_model: Model, toy_sentence: ToySentence, caplog: pytest.LogCaptureFixture
 ) -> None:
-    request = SpeechRequest(toy_sentence.audio, transcript="hello", units=toy_sentence.units)
+    request = Request(toy_sentence.audio, transcript="hello", units=toy_sentence.units)
     assert understand(toy_model, request).units == toy_sentence.units
     assert caplog.messages == [
         "the transcript is not used: the units already say what is spoken; leave one of them out"
@@ -213,7 +213,7 @@ def test_a_transcript_beside_units_is_not_used(
 def test_unsure_words_are_asked_for_first(
     toy_model: Model, toy_sentence: ToySentence, confidence: float, word_s: float, range_db: float, advice: tuple
 ) -> None:
-    request = SpeechRequest(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
+    request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
     words = Timeline((Span(0.0, 1.0, RecognisedWord("papa", confidence)),))
     recognition = Recognition(RECOGNISED, words, word_s, 3.0 - word_s, -60.0)
     understood = replace(understood_speech(toy_model, request), recognition=recognition, range_db=range_db, fit=None)
@@ -223,7 +223,7 @@ def test_unsure_words_are_asked_for_first(
 
 
 def test_the_outlook_says_how_much_of_the_speech_a_transcript_fits(toy_model: Model, toy_sentence: ToySentence) -> None:
-    request = SpeechRequest(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
+    request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
     understood = replace(understood_speech(toy_model, request), range_db=30.0)
     assert understood.fit is not None
     whole = outlook_of(request, understood)

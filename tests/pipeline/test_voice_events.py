@@ -7,21 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion import Model, SpeechRequest, animate
+from lipmotion import Model, animate
 from lipmotion.articulation.pauses import LAUGH_GAP
 from lipmotion.pipeline.outputs.delivered import delivered
+from lipmotion.pipeline.request import Request
 from lipmotion.types import Delivery
 from lipmotion.types.voice_event import LAUGHTER
 from speech.made_voices import laugh, pulses, recording, said, vowels
 
 
 @pytest.fixture(scope="module")
-def request_with_laughter() -> SpeechRequest:
+def request_with_laughter() -> Request:
     audio = recording((0.5, vowels(pulses(1.0, 120))), (2.0, laugh(6)))
-    return SpeechRequest(audio, units=said(audio.duration_s, (0.5, 1.5)))
+    return Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
 
 
-def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with_laughter: SpeechRequest):
+def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with_laughter: Request):
     laughing = animate(request_with_laughter, model=toy_model)
     (event,) = laughing.events
     assert event.kind == LAUGHTER
@@ -34,9 +35,7 @@ def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with
     assert "mood_happy" not in delivered(laughing, Delivery(mood="neutral")).motion.names
 
 
-def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(
-    toy_model: Model, request_with_laughter: SpeechRequest
-):
+def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(toy_model: Model, request_with_laughter: Request):
     plain = animate(replace(request_with_laughter, manner="asked"), model=toy_model)
     laughing = animate(request_with_laughter, model=toy_model)
     assert not plain.events

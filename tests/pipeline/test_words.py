@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion import SpeechRequest, animate, load_model
+from lipmotion import animate, load_model
 from lipmotion.errors import ExportError
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import understand, understood_speech
 from lipmotion.pipeline.understand.words import recognise_words, words_as_text, write_words
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
@@ -68,15 +69,15 @@ def test_files_that_cannot_be_written(found: Recognition, tmp_path: Path) -> Non
 
 
 def test_speech_is_as_reliable_as_its_words(found: Recognition) -> None:
-    request, model = SpeechRequest(WELCOME), load_model()
+    request, model = Request(WELCOME), load_model()
     understood = understood_speech(model, request)
     assert understood.recognition is not None
     assert understood.recognition.units == found.units
     assert understood.speech.confidence == pytest.approx(found.reliability)
     assert understood.speech.units == understand(model, request).units
-    given = understood_speech(model, SpeechRequest(WELCOME, transcript="please speak"))
+    given = understood_speech(model, Request(WELCOME, transcript="please speak"))
     assert given.recognition is None
-    assert understand(model, SpeechRequest(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
+    assert understand(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
 
 
 @pytest.mark.long

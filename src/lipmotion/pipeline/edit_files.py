@@ -12,11 +12,10 @@ from typing import Any
 from lipmotion.errors import InputError
 from lipmotion.formats.motion_document import parse_units, unit_rows
 from lipmotion.pipeline.edits import Edits, MoodStep, Step
-from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.request import Request, located
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
-from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.storage.files import (
     LARGEST_TEXT_BYTES,
     check_source,
@@ -80,7 +79,7 @@ class EditFile:
         """Return the file with some more edits; what was taken back is gone. Raises InputError: as ``Edits.then``."""
         return replace(self, edits=self.edits.then(*edits), undone=()) if edits else self
 
-    def session(self, asked: SpeechRequest | None = None, *, model: Model | None = None, **more: Any) -> Session:
+    def session(self, asked: Request | None = None, *, model: Model | None = None, **more: Any) -> Session:
         """Return a session of the recording; or of a given request, with the phones of the file if it has none.
 
         more : of ``Session``; who gives its ``audio`` has checked whose it is
@@ -114,9 +113,11 @@ def begun(asked: Request) -> EditFile:
 def begun_with(asked: Request, session: Session) -> tuple[EditFile, Generation]:
     """Return the file of ``begun`` for a session of a request, and its motion."""
     named = Request(**{name: getattr(asked, name) for name in HELD})
+    if not (isinstance(named.recording, Path | None) and isinstance(named.lexicon, Path | None)):
+        raise InputError("a file of edits names its recording and lexicon, required paths of files, not values")
     generation = session.generated()
     moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not held
-    digest = sha256_of(asked.recording) if asked.recording else ""
+    digest = sha256_of(named.recording) if named.recording else ""
     return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook, sha256=digest), generation
 
 

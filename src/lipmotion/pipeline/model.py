@@ -15,17 +15,22 @@ from numpy.typing import NDArray
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
+from lipmotion.motion.articulation import ARTICULATORS, measured_articulators
 from lipmotion.motion.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
+from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speaker_arrays, speakers_from_arrays
-from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.storage.schema import arrays_under, refuse_undeclared
+from lipmotion.types import PriorOutput, Speech
 
 FORMAT = "lipmotion.model"
 VERSION = 3
 SHIPPED = "grid-s1.lipmotion"
+GEOMETRY, EIGENLIPS, BOTH = "geometry", "eigenlips", "both"
+VISUALS = (GEOMETRY, EIGENLIPS, BOTH)
+"""Tracked or supplied channels; coefficients of mouth pictures (eigenlips); the former followed by the latter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +226,7 @@ _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser", "prio
 
 
 def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
-    """Return a model that also knows another person, so that a map is fitted once: ``SpeechRequest(speaker=name)``.
+    """Return a model that also knows another person, so that a map is fitted once: ``Request(speaker=name)``.
 
     name   : of the person; the model must not know another one of this name
     person : from ``map_onto``, without a speaker: the map from the motion of the model's mean or only person
@@ -246,3 +251,23 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
     names = (*known, name)
     speakers = SpeakerMaps(person.channels, names, **rows, lips=lips)
     return replace(model, speakers=speakers, about={**model.about, "speakers": list(names)})
+
+
+def with_prior(prior: Model | None, speech: Speech) -> Speech:
+    """Return speech with what another model makes of it; the same speech if there is no other model.
+
+    The closures that the other engine would force are left to the engine that stands on it.
+    """
+    if prior is None:
+        return speech
+    if speech.parts is not None:
+        parts = tuple(part._replace(speech=with_prior(prior, part.speech)) for part in speech.parts)
+        speech = replace(speech, parts=parts)
+    motion = prior.engine.without_closures().generate(prior.learned, speech).motion
+    measured = measured_articulators(motion.values, motion.names)
+    chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]
+    steps = len(motion.values[::STEP])
+    nothing = np.zeros((steps, 0), np.float32), np.zeros(steps)
+    hidden, distortion = prior.engine.hidden(prior.learned, speech) or nothing
+    articulators = np.stack(chosen, axis=1) if chosen else np.zeros((steps, 0))
+    return replace(speech, prior=PriorOutput(articulators, hidden, distortion))

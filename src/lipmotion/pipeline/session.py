@@ -1,7 +1,7 @@
 """Sessions: one recording whose motion is edited; what an edit does not change is not computed again.
 
-A recording is understood (words, phones in time), moved (motion from phones), delivered (intensity, offsets), drawn.
-Each stage is kept by the edits that it depends on.
+A recording is analysed (words, phones in time), moved (motion from phones) and delivered (intensity, offsets).
+Each stage is cached under the edits that it depends on.
 """
 
 from __future__ import annotations
@@ -15,9 +15,7 @@ from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
-from typing import Generic, TypeVar
-
-import numpy as np
+from typing import Any, TypeVar
 
 from lipmotion.articulation.curve_edits import (
     MotionStretch,
@@ -29,9 +27,7 @@ from lipmotion.articulation.curve_edits import (
     with_held,
     with_stretch,
 )
-from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
-from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import AlignmentError, InputError, shortened
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.kernels.threads import one_thread
@@ -52,12 +48,11 @@ from lipmotion.pipeline.edits import (
     with_span,
 )
 from lipmotion.pipeline.excerpts import Excerpt, excerpt_of_change, speech_within, with_excerpt
-from lipmotion.pipeline.generate.generation_for import generate_for, person_of
-from lipmotion.pipeline.generate.outlook import outlook_of
-from lipmotion.pipeline.generate.prior import with_prior
-from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.generation import generation_of, person_of
+from lipmotion.pipeline.model import Model, load_model, with_prior
+from lipmotion.pipeline.request import Request, SpeechInput, request_of
 from lipmotion.pipeline.understand.language import in_language
-from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
+from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.pipeline.understand.understood_speech import (
     UnderstoodSpeech,
     aligned_within,
@@ -83,15 +78,13 @@ from lipmotion.types import (
     Progress,
     Span,
     Speech,
-    SpeechKnowledge,
     Timeline,
     Unit,
     silent_monitor,
 )
-from lipmotion.units import Lexicon, Pronunciation, words_in_time, words_of
-from lipmotion.units.mood_tags import moods_in_time
+from lipmotion.units import Pronunciation, words_in_time, words_of
 
-KeptT = TypeVar("KeptT")
+ResultT = TypeVar("ResultT")
 
 UNDERSTANDING = 0.9
 """The share of the work that is recognition, in reports; the rest is the generation of motion."""
@@ -100,14 +93,13 @@ MODELLED = ("opening", "width", "outer")
 LIP_POINT = re.compile(r"[xyz]_\d+")
 LATE_S = 0.1
 """Seconds by which times of edits may lie after the end; editing programs round times."""
-KEPT, LEAST_KEPT = 4, 2
-"""Results that each stage keeps: the last ones that were asked for; motion of many frames less often."""
-KEPT_FRAMES = 60_000
-"""Frames of motion that a stage keeps together, as long as these are more than ``LEAST_KEPT`` results."""
-ALIGNED = 1000
-"""Words of edits whose phones are kept."""
-LOCKED = 1000
-"""Locked stretches that are kept: each is asked for again after every edit, and needs those before it."""
+USUAL_CACHED, MIN_CACHED = 4, 2
+"""Results of each stage that are cached: the last ones that were used; motion of many frames less often."""
+MAX_CACHED = {"aligned": 1000, "locked": 1000}
+"""Stages of which more is cached: the phones of words in edits, and locked stretches, each of which needs those before
+it and is used again after every edit."""
+MAX_CACHED_FRAMES = 60_000
+"""Frames of motion that a stage holds together, as long as these are more than ``MIN_CACHED`` results."""
 INTERACTIVE = 3
 """A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
 NO_EDITS = Edits()
@@ -117,29 +109,32 @@ UnitStep = PhoneStep | WordStep | LockStep | UnlockStep
 """Edits that change phones, or keep others from changing them."""
 
 
-class Kept(Generic[KeptT]):
-    """The last results of a stage, by what they depend on."""
+class Cache:
+    """The last results of each stage of some work, by what they depend on."""
 
-    def __init__(self, most: int = KEPT) -> None:
-        self._most = most
-        self._results: OrderedDict[Hashable, KeptT] = OrderedDict()
+    def __init__(self) -> None:
+        self._stages: dict[str, OrderedDict[Hashable, Any]] = {}
 
-    def __contains__(self, key: Hashable) -> bool:
-        return key in self._results
+    def has(self, stage: str, key: Hashable) -> bool:
+        """Return whether the result of a stage for a key is cached."""
+        return key in self._stages.get(stage, ())
 
-    def once(self, key: Hashable, make: Callable[[], KeptT]) -> KeptT:
-        """Return the result for a key, made if it is not kept."""
-        if key not in self._results:
-            self._results[key] = make()
-            while len(self._results) > self._most or self._is_heavy():
-                self._results.popitem(last=False)
-        self._results.move_to_end(key)
-        return self._results[key]
+    def cached(self, stage: str, key: Hashable, make: Callable[[], ResultT]) -> ResultT:
+        """Return the result of a stage for a key, made if it is not cached."""
+        results = self._stages.setdefault(stage, OrderedDict())
+        if key not in results:
+            results[key] = make()
+            while len(results) > MAX_CACHED.get(stage, USUAL_CACHED) or _is_heavy(results):
+                results.popitem(last=False)
+        results.move_to_end(key)
+        result: ResultT = results[key]
+        return result
 
-    def _is_heavy(self) -> bool:
-        """Return whether the results hold too much motion together."""
-        frames = sum(len(found.motion.values) for found in self._results.values() if isinstance(found, Generation))
-        return frames > KEPT_FRAMES and len(self._results) > LEAST_KEPT
+
+def _is_heavy(results: OrderedDict[Hashable, Any]) -> bool:
+    """Return whether results hold too much motion together."""
+    frames = sum(len(each.motion.values) for each in results.values() if isinstance(each, Generation))
+    return frames > MAX_CACHED_FRAMES and len(results) > MIN_CACHED
 
 
 class Session:
@@ -178,25 +173,16 @@ class Session:
         lasts_s: float | None = None,
         audio: AnalysedAudio | None = None,
     ) -> None:
-        self.request: SpeechRequest = in_language(request_of(speech))
-        self.model = model if isinstance(model, Model) else load_model(model)
+        self.request: Request = in_language(read_request(request_of(speech), is_typed=False))
+        self.model = model if isinstance(model, Model) else load_model(model or self.request.model)
         self._work = map_in_processes(workers, self._prepare)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
         self._meanwhile = meanwhile
-        self._understood: Kept[UnderstoodSpeech] = Kept()
-        self._units: Kept[Timeline[Unit]] = Kept()
-        self._aligned: Kept[list[Span[Unit]]] = Kept(ALIGNED)
-        self._moved: Kept[Generation] = Kept()
-        self._generated: Kept[Generation] = Kept()
-        self._locks: Kept[MotionStretch] = Kept(LOCKED)
-        self._delivered: Kept[Generation] = Kept()
-        self._lasts_s, self._motions, self._given_audio = lasts_s, 0, audio
+        self._lasts_s, self._motions, self._known_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()
+        self._cache = Cache()
         self.is_sketching = False
         self._last: tuple[MotionKey, Generation] | None = None
-        self._sketches: Kept[Generation | None] = Kept()
-        self._excerpts: Kept[Generation] = Kept()
-        self._parts: Kept[UnderstoodSpeech] = Kept()
 
     @contextmanager
     def sketching(self) -> Iterator[None]:
@@ -237,7 +223,7 @@ class Session:
 
         with self._one_at_a_time, one_thread():
             key = (edits.steps, self.is_sketching)
-            return self._delivered.once(key, lambda: delivered(self.generated(edits), edits.delivery()))
+            return self._cache.cached("delivered", key, lambda: delivered(self.generated(edits), edits.delivery()))
 
     def understood(self, edits: Edits = NO_EDITS) -> UnderstoodSpeech:
         """Return the speech as input of the engine, with the phones of ``units``."""
@@ -260,7 +246,7 @@ class Session:
                 f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
                 "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
             )
-        if self._lasts_s is not None or self._given_audio is not None:
+        if self._lasts_s is not None or self._known_audio is not None:
             request = replace(request, recording=self._audio)
         return understood_speech(self.model, request, self._work, self._monitor)
 
@@ -271,16 +257,16 @@ class Session:
 
     @cached_property
     def _audio(self) -> AnalysedAudio:
-        return self._given_audio or analysed(audio_of(self.request))
+        return self._known_audio or analysed(audio_of(self.request))
 
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
         ours = tuple(step for step in steps if isinstance(step, UnitStep))
-        done = next((count for count in range(len(ours), 0, -1) if ours[:count] in self._units), 0)
-        units = self._units.once(ours[:done], lambda: self._recording.speech.units)
+        done = next((count for count in range(len(ours), 0, -1) if self._cache.has("units", ours[:count])), 0)
+        units = self._cache.cached("units", ours[:done], lambda: self._recording.speech.units)
         for count in range(done + 1, len(ours) + 1):
             units = self._changed_units(units, ours[:count])
-        return self._units.once(ours, lambda: units)
+        return self._cache.cached("units", ours, lambda: units)
 
     def _changed_units(self, before: Timeline[Unit], ours: tuple[UnitStep, ...]) -> Timeline[Unit]:
         """Return phones in time after the last of some edits; ``before``: after the others."""
@@ -310,7 +296,9 @@ class Session:
             where = f"{start_s:.2f} to {end_s:.2f} s, where {there.label!r} was"
         own = tuple(own_pronunciations(step).items())
         try:
-            spans = self._aligned.once((said, own, start_s, end_s), lambda: self._said(step, said, start_s, end_s))
+            spans = self._cache.cached(
+                "aligned", (said, own, start_s, end_s), lambda: self._said(step, said, start_s, end_s)
+            )
         except AlignmentError as error:
             raise InputError(
                 f"{str(step)!r}: does not fit into {where} ({error}); make room with 'phone N ends TIME' first"
@@ -321,7 +309,7 @@ class Session:
         """Return the phones in time of words that a step says. Raises AlignmentError: they do not fit in there."""
         request, pauses = self.request, isinstance(step, WordsSaid)
         if own := own_pronunciations(step):
-            lexicon = request.lexicon or Lexicon()
+            lexicon = lexicon_of(request)
             request = replace(request, lexicon=replace(lexicon, user=lexicon.user | own))
         return aligned_within(self.model, request, self._audio, said, start_s, end_s, pauses=pauses)
 
@@ -329,7 +317,9 @@ class Session:
         plain, units = self._recording, self._edited_units(steps)
         if units is plain.speech.units:
             return plain
-        return self._understood.once(tuple(units), lambda: replace(plain, speech=self._spoken(plain.speech, units)))
+        return self._cache.cached(
+            "analysis", tuple(units), lambda: replace(plain, speech=self._spoken(plain.speech, units))
+        )
 
     def _spoken(self, speech: Speech, units: Timeline[Unit]) -> Speech:
         spoken = with_prior(self.model.prior, with_units(speech, units))
@@ -354,10 +344,10 @@ class Session:
             motion = with_gestures(generation.motion, generation.units, names)
             return locked_stretch(generation.with_motion(motion), lock.start_s, lock.end_s)
 
-        return self._locks.once((before, lock, names, self.is_sketching), stretch)
+        return self._cache.cached("locked", (before, lock, names, self.is_sketching), stretch)
 
     def _after(self, steps: tuple[Step, ...]) -> Generation:
-        return self._generated.once((steps, self.is_sketching), lambda: self._with_locks(steps))
+        return self._cache.cached("edited", (steps, self.is_sketching), lambda: self._with_locks(steps))
 
     def _with_curves(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits without locks: the engine's, then gains and what bends single curves."""
@@ -419,26 +409,26 @@ class Session:
 
     def _with_pins(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         key = (phone_steps, pins)
-        if self.is_sketching and key not in self._moved:
-            sketch = self._sketches.once(key, lambda: self._sketch(phone_steps, pins))
+        if self.is_sketching and not self._cache.has("moved", key):
+            sketch = self._cache.cached("sketch", key, lambda: self._sketch(phone_steps, pins))
             if sketch is not None:
                 return sketch
-        return self._moved.once(key, lambda: self._generation(phone_steps, pins))
+        return self._cache.cached("moved", key, lambda: self._generation(phone_steps, pins))
 
     def _sketch(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation | None:
         """Return the last motion with what has changed since; None: it must be made whole."""
         if self._last is None:
             return None
-        (steps_before, pins_before), whole = self._last
+        (steps_before, pins_before), full = self._last
         units = self._edited_units(steps_before), self._edited_units(phone_steps)
-        excerpt = excerpt_of_change(*units, {*pins} ^ {*pins_before}, len(whole.motion.values))
-        if excerpt is None or len(units[0]) != len(whole.units):
+        excerpt = excerpt_of_change(*units, {*pins} ^ {*pins_before}, len(full.motion.values))
+        if excerpt is None or len(units[0]) != len(full.units):
             return None
         try:
             parts = [self._of_excerpt(excerpt, *held) for held in zip(units, (pins_before, pins), strict=True)]
         except InputError:  # a pin that is refused: the whole says its time
             return None
-        sketch = with_excerpt(whole, parts[0], parts[1], excerpt, units[1])
+        sketch = with_excerpt(full, parts[0], parts[1], excerpt, units[1])
         self._last = (phone_steps, pins), sketch
         return sketch
 
@@ -448,11 +438,11 @@ class Session:
         constraints = excerpt.pinned(pins)
 
         def generation() -> Generation:
-            part = self._parts.once(place, lambda: speech_within(self._recording, excerpt.frames))
+            part = self._cache.cached("segment", place, lambda: speech_within(self._recording, excerpt.frames))
             spoken = replace(part, speech=self._spoken(part.speech, phones))
             return generation_of(self.request, self.speaker, self.model, spoken, constraints)
 
-        return self._excerpts.once((place, phones, constraints), generation)
+        return self._cache.cached("excerpt", (place, phones, constraints), generation)
 
     def _generation(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         understood = self._edited_speech(phone_steps)
@@ -472,32 +462,3 @@ def own_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
     own = step.own if isinstance(step, WordSaid | WordsSaidSo) else {}
     return {word: (phones,) for given, phones in own.items() for word in words_of(given)}
-
-
-def generation_of(
-    request: SpeechRequest,
-    person: SpeakerMap | None,
-    model: Model,
-    understood: UnderstoodSpeech,
-    constraints: Constraints | None = None,
-) -> Generation:
-    """Return the motion of understood speech, with pauses and asymmetry as asked for, and what to expect of it.
-
-    person : of ``person_of``
-    Raises InputError: a constraint is not usable.
-    """
-
-    def finish(generation: Generation, start_s: float) -> Generation:
-        pinned_s = [pin.time_s - start_s for pin in constraints.pins] if constraints else []
-        if request.onto is None:
-            generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
-        events = [event.shifted(-start_s) for event in understood.events]
-        return with_pauses(generation, request.pauses, pinned_s, events)
-
-    paused = generate_for(person, model.engine, model.learned, understood.speech, constraints, finish)
-    speech, fit = understood.speech, understood.fit
-    fits = fit.of_frames(len(speech.features.values)) if fit else 1.0
-    knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits)
-    moods = moods_in_time(understood.tags, speech.units)
-    told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
-    return replace(told, outlook=outlook_of(request, understood))

@@ -69,10 +69,11 @@ def option(default: Any, rule: Rule = ANY, *, later: bool = False, **told: Any) 
     later : the option was added after models were published: a header leaves it out where it has its default value, so
             that earlier versions can read the model
     told  : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
-            ``what``: what messages call it. What the command line shows, of options that are there
-            (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are others than the
-            field's), ``still`` (the option that lists what of several is switched off). Of files: ``reads`` (what it
-            is), ``replaceable``, ``default_path``, ``writes``, all as of ``cli.arguments.paths``
+            ``what``: what messages call it; ``values``: the classes whose values are taken, too, by their names (so
+            they need not be imported), and what messages say of them. What the command line shows, of options that
+            are there (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are not
+            the field's), still (the option that lists what of several is switched off). Of files: reads (what
+            it is), replaceable, default_path, writes, all as of cli.arguments.paths
     """
     return field(default=default, metadata={"rule": rule, "later": later, **told})
 
@@ -173,6 +174,12 @@ def check_value(option_field: Field[Any], value: Any) -> None:
     kind, rule = kind_of(option_field), option_field.metadata.get("rule", ANY)
     if value is None and option_field.default is None:
         return
+    values = option_field.metadata.get("values", {})
+    if any(each.__name__ in values for each in type(value).__mro__):
+        return
+    if values and not isinstance(value, str | Path):
+        required = " or ".join(words for words in values.values() if words)
+        raise InputError(f"{option_field.name}: found a {type(value).__name__}, required {_WORDS[kind]}, or {required}")
     fits = type(value) is kind or (kind in (float, Path) and isinstance(value, kind))
     fits = fits or (kind is float and type(value) is int)
     if kind is tuple:

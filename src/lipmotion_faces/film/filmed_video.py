@@ -15,9 +15,8 @@ from lipmotion.articulation.contact import FULL_DEFICIT_GAP, closed_lips, gap_in
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.eigenlips import Eigenlips
-from lipmotion.pipeline.job import Mark
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outputs.output import FILM, FilmOptions
+from lipmotion.pipeline.request import Mark, Outputs
 from lipmotion.speech.sound.pauses import levels_db_at
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import has_video
@@ -88,6 +87,8 @@ Frames = Iterator[NDArray[np.uint8]]
 RENDERING = "rendering the video"
 """Name of the stage in reports of progress."""
 LOG = logging.getLogger("lipmotion")
+FILM = Outputs()
+"""How a filmed face is shown where nothing is said."""
 ZOOM = 1.3
 """How much larger than the speaker's own the mouth over it is."""
 
@@ -118,7 +119,7 @@ def film_of(  # noqa: PLR0913
     model: Model | None = None,
     units: Timeline[Unit] | None = None,
     fps: float | None = None,
-    options: FilmOptions = FILM,
+    options: Outputs = FILM,
 ) -> Film:
     """Return the video of a filmed face.
 
@@ -158,7 +159,7 @@ def _codes(
     sound: Audio | None,
     rate_hz: float,
     eigenlips: Eigenlips | None,
-    options: FilmOptions,
+    options: Outputs,
 ) -> FaceCodes:
     """Return what the lower face is like in every frame of a video."""
     if not 0 < rate_hz < float("inf"):
@@ -171,16 +172,16 @@ def _codes(
     return codes
 
 
-def _stitching(options: FilmOptions) -> StitchingOptions:
+def _stitching(options: Outputs) -> StitchingOptions:
     return AS_PRINTED if options.refinement == "paper" else STITCHING
 
 
-def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> BackgroundSequence:
+def _background(face: FilmedFace, options: Outputs, speech: Path | None) -> BackgroundSequence:
     if options.overlay is not None and speech is not None:
         return open_background(speech, in_time=True).enlarged(ZOOM)
     if options.background is None:
         return stored_sequence(face.background)
-    return open_background(options.background, face.appearance)
+    return open_background(Path(options.background), face.appearance)
 
 
 def face_codes(
@@ -309,7 +310,7 @@ def write_film(
     write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
 
 
-def refuse_film(options: FilmOptions) -> None:
+def refuse_film(options: Outputs) -> None:
     """Raise InputError if options are given that only a filmed face has."""
     filmed = {
         "a background": options.background,
@@ -323,7 +324,7 @@ def refuse_film(options: FilmOptions) -> None:
         raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
 
 
-def check_film(options: FilmOptions, speech: str | Path | None = None) -> None:
+def check_film(options: Outputs, speech: str | Path | None = None) -> None:
     """Raise InputError if options do not go with the speech; called before long work begins.
 
     speech : the recording; None: it is a sound that is in no file

@@ -42,9 +42,10 @@ class VideoOutput(Output):
 
     def check(self) -> None:  # noqa: D102
         settings = self.settings
-        if settings.fps is not None and settings.fps > FASTEST_HZ:
+        fps = settings.outputs.fps
+        if fps is not None and fps > FASTEST_HZ:
             raise ExportError(
-                f"{self.path}: {settings.fps:g} pictures a second, required {FASTEST_HZ:g} or fewer in a video; the "
+                f"{self.path}: {fps:g} pictures a second, required {FASTEST_HZ:g} or fewer in a video; the "
                 "rate of motion files alone is --rate"
             )
         if settings.delivery.offset_ms and self.has_sound:

@@ -59,7 +59,7 @@ class SceneOutput(Output):
 
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         check_drawable(self.path, performance.generation.motion)
-        return lambda: write_scene(self.path, performance.once(delivered_scene), sound=performance.sound_file)
+        return lambda: write_scene(self.path, performance.cached(delivered_scene), sound=performance.sound_file)
 
 
 def delivered_scene(performance: Performance, frames: slice | None = None) -> Scene:
@@ -71,7 +71,7 @@ def delivered_scene(performance: Performance, frames: slice | None = None) -> Sc
     settings, delivery = performance.settings, performance.settings.delivery
     moved = with_drawn_channels(delivered(performance.generation, delivery))
     part = None if delivery.hold_ms else frames
-    scene = settings.face.scene(moved, settings, performance.once(recorded_prosody), part)
+    scene = settings.face.scene(moved, settings, performance.cached(recorded_prosody), part)
     thinning = Thinning(delivery.key_tolerance, tuple(closed_times(moved)) if delivery.key_tolerance else ())
     scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
     weights = scene.weights

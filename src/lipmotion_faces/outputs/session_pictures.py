@@ -11,7 +11,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
-from lipmotion.pipeline.session import Kept, Session
+from lipmotion.pipeline.session import Cache, Session
 from lipmotion.types import Prosody, frame_of
 from lipmotion_faces.base import DrawnMotion, DrawsSingly, Face, Picture
 from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, read_sound
@@ -32,8 +32,7 @@ class SessionPictures:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._one_at_a_time = RLock()
-        self._faces: Kept[DrawsSingly] = Kept()
-        self._drawn: Kept[DrawnMotion[Any]] = Kept()
+        self._cache = Cache()
 
     def picture(
         self, time_s: float, edits: Edits | None = None, *, face: str | Face = "portrait", fps: float = DRAWN_HZ
@@ -56,10 +55,12 @@ class SessionPictures:
 
         def draw() -> DrawnMotion[Any]:
             seen = shown(self._session.generated(edits), delivery, fps)
-            return self._faces.once((face, staging, delivery), make_face).drawn(seen.motion, seen.units, fps=fps)
+            return self._cache.cached("face", (face, staging, delivery), make_face).drawn(
+                seen.motion, seen.units, fps=fps
+            )
 
         with self._one_at_a_time, one_thread():
-            pictures = self._drawn.once((edits.steps, face, fps, self._session.is_sketching), draw)
+            pictures = self._cache.cached("drawn", (edits.steps, face, fps, self._session.is_sketching), draw)
             frame = frame_of(time_s, len(pictures), fps)
             if frame is None:
                 raise InputError(f"{time_s} s lies outside the video (0 to {(len(pictures) - 1) / fps:.2f} s)")

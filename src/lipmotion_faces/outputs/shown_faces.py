@@ -62,7 +62,9 @@ class _WithHead(ShownFace):
     def scene(
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
     ) -> Scene:
-        return head_scene(generation, settings.rate_hz, staging=settings.staging, prosody=prosody, frames=frames)
+        return head_scene(
+            generation, settings.outputs.rate_hz, staging=settings.staging, prosody=prosody, frames=frames
+        )
 
 
 class ShownDrawing(_WithHead):
@@ -72,18 +74,18 @@ class ShownDrawing(_WithHead):
         self.face = face
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
-        refuse_film(settings.film)
+        refuse_film(settings.outputs)
         staged_face(self.face, settings.staging)
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
         check_background(path, settings.staging)
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
-        settings, played = performance.settings, performance.once(sound_track)
+        settings, played = performance.settings, performance.cached(sound_track)
         if performance.generation.curve_edits and self.character is None:
             named = ", ".join(dict.fromkeys(edit.channel for edit in performance.generation.curve_edits))
             LOG.warning("%s: the face has no curves, so changed %s does not show; pin the opening", path, named)
-        seen, prosody = performance.once(_seen), performance.once(_played_prosody)
+        seen, prosody = performance.cached(_seen), performance.cached(_played_prosody)
         monitor, hertz = performance.monitor, _frame_rate(settings)
         write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
 
@@ -103,7 +105,7 @@ class ShownCharacter(ShownDrawing):
     ) -> Scene:
         staging = settings.staging
         return character_scene(
-            generation, self.character, settings.rate_hz, staging=staging, prosody=prosody, frames=frames
+            generation, self.character, settings.outputs.rate_hz, staging=staging, prosody=prosody, frames=frames
         )
 
 
@@ -114,7 +116,7 @@ class ShownCutOut(_WithHead):
         self.face = face
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
-        refuse_film(settings.film)
+        refuse_film(settings.outputs)
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
         check_background(path, settings.staging)
@@ -133,7 +135,7 @@ class ShownCutOut(_WithHead):
         count = frame_count(generation, fps)
         shown = shown_shapes(sheet)[:count]
         frames = self.face.frames([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
-        sound = performance.once(sound_track)
+        sound = performance.cached(sound_track)
         write_frames(path, with_reports(frames, count, RENDERING, performance.monitor), fps, sound)
 
     @property
@@ -150,7 +152,7 @@ class ShownPerson(_WithHead):
         self.face = face
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
-        check_film(settings.film, settings.recording)
+        check_film(settings.outputs, settings.recording)
         if settings.staging != Staging():
             raise InputError("size, colour of the background and what moves are of drawn faces; leave them out")
 
@@ -174,21 +176,21 @@ class ShownPerson(_WithHead):
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings = performance.settings
-        film, sound = self.film(performance), performance.once(sound_track)
-        write_film(path, film, sound, mark=settings.film.mark, monitor=performance.monitor)
+        film, sound = self.film(performance), performance.cached(sound_track)
+        write_film(path, film, sound, mark=settings.outputs.mark, monitor=performance.monitor)
 
     def film(self, performance: Performance) -> Film:
         """Return the video, which is made while it is read. Raises InputError: the motion lacks channels."""
-        settings, seen = performance.settings, performance.once(_seen)
+        settings, seen = performance.settings, performance.cached(_seen)
         return film_of(
             self.face,
             seen.motion,
             speech=settings.recording,
-            sound=performance.once(sound_track),
+            sound=performance.cached(sound_track),
             model=performance.model,
             units=seen.units,
-            fps=settings.fps,
-            options=settings.film,
+            fps=settings.outputs.fps,
+            options=settings.outputs,
         )
 
     def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: D102
@@ -238,8 +240,8 @@ def _seen(performance: Performance) -> Generation:
 
 def _played_prosody(performance: Performance) -> Prosody:
     """Return loudness and pitch of the sound track, in the time of the motion."""
-    return moved_prosody(prosody_of_speech(performance.once(sound_track)), performance.settings.delivery)
+    return moved_prosody(prosody_of_speech(performance.cached(sound_track)), performance.settings.delivery)
 
 
 def _frame_rate(settings: OutputSettings) -> float:
-    return DRAWN_HZ if settings.fps is None else settings.fps
+    return settings.outputs.fps or DRAWN_HZ

@@ -8,7 +8,7 @@ from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_machine_readable, add_workers
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_error, print_json, print_line
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 
 LINES = 12
 

@@ -41,7 +41,7 @@ def evaluate(
 
     selection  : the utterances to compare; by default those of the list ``test``
     lexicon    : pronunciations of words, ahead of those of the dictionary
-    recogniser : ``own``, ``general`` or ``auto``, as in ``SpeechRequest``
+    recogniser : ``own``, ``general`` or ``auto``, as in ``Request``
     seed       : of the bootstrap interval
     monitor    : called with reports of progress
 

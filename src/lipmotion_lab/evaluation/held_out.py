@@ -16,10 +16,9 @@ from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
-from lipmotion.pipeline.generate.generation_for import generate_for
-from lipmotion.pipeline.generate.prior import with_prior
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
+from lipmotion.pipeline.generation import generate_for
+from lipmotion.pipeline.model import GEOMETRY, Model, with_prior
+from lipmotion.pipeline.training.channels import with_visual_channels
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.pipeline.understand.transcribe import warn_of_guesses
 from lipmotion.pipeline.understand.understood_speech import recognised_speech, speech_of, with_voice

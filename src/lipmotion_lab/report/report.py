@@ -16,7 +16,7 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
 from lipmotion.formats.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.pipeline.model import GEOMETRY
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.storage.files import TEMPORARY, locked, remove_unfinished, unfinished_work, whole_file, whole_folder
 from lipmotion.storage.json_text import as_json, from_json

@@ -9,7 +9,7 @@ from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.figures import add_figures_arguments, report_figures
 from lipmotion.cli.arguments.options import list_or_all
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -18,13 +18,8 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.pipeline.training.channels import (
-    EIGENLIPS,
-    GEOMETRY,
-    check_visual,
-    train_eigenlips,
-    with_visual_channels,
-)
+from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
+from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lipmotion.measures.evaluation_table import figure_text
-from lipmotion.pipeline.training.channels import EIGENLIPS
+from lipmotion.pipeline.model import EIGENLIPS
 from lipmotion.printable import printable
 from lipmotion_lab.comparison import significance_mark
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM

@@ -115,3 +115,16 @@ export function inNextFrame(act) {
   let waiting = 0;
   return () => { waiting ||= requestAnimationFrame(() => { waiting = 0; act(); }); };
 }
+
+/** A part of a panel under a heading. */
+export const section = (title, ...children) => made("section", {}, title && made("h2", { textContent: title }), ...children.filter(Boolean));
+
+export const row = (...children) => made("div", { className: "row" }, ...children.filter(Boolean));
+
+/** Element that shows something at the playhead: `follow` runs when it moves, and now. */
+export function following(element, follow) {
+  element.dataset.follows = "";
+  element.follow = () => follow(element);
+  follow(element);
+  return element;
+}

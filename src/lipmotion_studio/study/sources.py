@@ -10,11 +10,11 @@ from pathlib import Path
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
 from lipmotion.formats.base import readable_suffixes
-from lipmotion.pipeline.job import Job, Outputs, Request
+from lipmotion.pipeline.job import Job, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
-from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
 from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.pipeline.understand.recordings import recordings_of
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
@@ -133,7 +133,7 @@ def _animated(job: Job, made: dict[str, str]) -> Condition:
         return load_model(job.request.model)
 
     def condition(sentence: StudySentence, target: Path) -> MadeVideo:
-        opened(job.of(sentence.recording, (str(target),))).run(load, words_beside=True)
+        run(job.of(sentence.recording, (str(target),)), model=load(), words_beside=True)
         return MadeVideo(target, made)
 
     return condition

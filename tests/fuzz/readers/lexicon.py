@@ -6,7 +6,8 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, require, short_speech
-from lipmotion import SpeechRequest, animate
+from lipmotion import animate
+from lipmotion.pipeline.request import Request
 from lipmotion.units import PHONES, Lexicon
 
 TEXTS = (
@@ -28,5 +29,5 @@ def read(folder: Path, good: Good) -> None:
         require(lexicon.known(word), "a word that is not known")
         require(all(set(phones) <= set(PHONES) for phones in pronunciations), "a phone that is none")
     words = " ".join(list(lexicon.user)[:1])
-    request = SpeechRequest(short_speech(good), words or "baby", lexicon=lexicon, recogniser="own")
+    request = Request(short_speech(good), words or "baby", lexicon=lexicon, recogniser="own")
     check_generation(animate(request, model=good_model(good)))

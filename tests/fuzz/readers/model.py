@@ -6,7 +6,8 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, short_speech
-from lipmotion import SpeechRequest, animate, load_model
+from lipmotion import animate, load_model
+from lipmotion.pipeline.request import Request
 
 
 def seeds(good: Good) -> list[Files]:
@@ -18,4 +19,4 @@ def read(folder: Path, good: Good) -> None:
     """Load a model; animate short speech, without and with a transcript."""
     model = load_model(folder / "a.lipmotion")
     for text in (None, "baby"):
-        check_generation(animate(SpeechRequest(short_speech(good), transcript=text, recogniser="own"), model=model))
+        check_generation(animate(Request(short_speech(good), transcript=text, recogniser="own"), model=model))

@@ -13,7 +13,7 @@ from fuzz.readers.plausible import require
 from lipmotion import Edits, Job, Request
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits
-from lipmotion.pipeline.opened_job import opened
+from lipmotion.pipeline.job import check_outputs, open_face
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion_studio.folder import PROJECT, VOTES, ProjectFolder
@@ -103,7 +103,7 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
         read_answers(path)
     elif name.startswith("job"):
         job = Job.from_file(path) if path.suffix == ".toml" else _job(path)
-        opened(replace(job, outputs=replace(job.outputs, files=("a.csv",))))
+        check_outputs(replace(job, outputs=replace(job.outputs, files=("a.csv",))), open_face(job.outputs))
     else:
         file = read_edits(path)
         with TemporaryDirectory() as kept:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, short_speech
-from lipmotion import SpeechRequest, animate
+from lipmotion import animate
+from lipmotion.pipeline.request import Request
 
 TEXTS = (
     "baby",
@@ -30,6 +31,4 @@ def seeds(_: Good) -> list[Files]:
 def read(folder: Path, good: Good) -> None:
     """Animate short speech with the transcript."""
     path = folder / "said.txt"
-    check_generation(
-        animate(SpeechRequest(short_speech(good), transcript=path, recogniser="own"), model=good_model(good))
-    )
+    check_generation(animate(Request(short_speech(good), transcript=path, recogniser="own"), model=good_model(good)))

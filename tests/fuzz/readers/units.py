@@ -8,14 +8,15 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, short_speech
-from lipmotion import SpeechRequest, animate, read_motion, write
+from lipmotion import animate, read_motion, write
+from lipmotion.pipeline.request import Request
 from robustness.motion_cases import GOOD
 
 
 def seeds(good: Good) -> list[Files]:
     """Return motion files of ``animate``, and a minimal one."""
     found: list[Files] = [{"a.json": json.dumps(GOOD).encode()}]
-    result = animate(SpeechRequest(short_speech(good), recogniser="own"), model=good_model(good))
+    result = animate(Request(short_speech(good), recogniser="own"), model=good_model(good))
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / "a.json", Path(folder) / "a.npz"]
         write(result, paths, channels=["opening"])
@@ -26,4 +27,4 @@ def read(folder: Path, good: Good) -> None:
     """Animate a short sound with these phones."""
     (path,) = folder.iterdir()
     units = read_motion(path)[1]
-    check_generation(animate(SpeechRequest(short_speech(good), units=units, recogniser="own"), model=good_model(good)))
+    check_generation(animate(Request(short_speech(good), units=units, recogniser="own"), model=good_model(good)))

@@ -26,8 +26,6 @@ from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
 from lipmotion.pipeline.batch.pool import WorkerDied
-from lipmotion.pipeline.edit_files import EditFile
-from lipmotion.pipeline.opened_job import OpenedJob
 from lipmotion.types import Item
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -73,9 +71,7 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: Job, tmp_path:
     kinds = ("json", "cues.tsv", "TextGrid")
     assert set(contents(out)) == {f"{name}.{kind}" for name in ("one", "deep/two", "three") for kind in kinds}
     model = lipmotion.load_model(settings.request.model)
-    alone = lipmotion.animate(
-        lipmotion.SpeechRequest(sounds / "one.wav", "see papa mama", recogniser="own"), model=model
-    )
+    alone = lipmotion.animate(lipmotion.Request(sounds / "one.wav", "see papa mama", recogniser="own"), model=model)
     lipmotion.write(alone, tmp_path / "one.json", speech=sounds / "one.wav", model=model)
     assert (out / "one.json").read_bytes() == (tmp_path / "one.json").read_bytes()
     rows = {row["name"]: row for row in ledger_rows(out)}
@@ -90,13 +86,13 @@ def test_the_face_of_another_person_is_mapped_onto_once(
     filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mapped: list[str] = []
-    monkeypatch.setattr(one_line, "map_onto", lambda *_, speaker: mapped.append(speaker) or "a map")
+    monkeypatch.setattr(one_line, "provided", lambda _: lambda *_, speaker: mapped.append(speaker) or Path("a map"))
     other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
-    shown = OpenedJob(Job(), shown_face(filmed_face), None, EditFile())
-    assert [one_line._request(line, shown, other).onto for line in lines] == ["a map", "a map"]
+    shared = one_line._Shared(other, shown_face(filmed_face), None)
+    assert [one_line._request(line, Request(), shared).onto for line in lines] == [Path("a map")] * 2
     assert mapped == [""]
-    assert one_line._request(lines[0], shown, toy_model).onto is None
+    assert one_line._request(lines[0], Request(), replace(shared, model=toy_model)).onto is None
 
 
 def test_what_was_done_is_kept(sounds: Path, settings: Job, tmp_path: Path) -> None:
@@ -182,8 +178,8 @@ def test_a_number_of_processes(sounds: Path, settings: Job, tmp_path: Path, jobs
 def test_silence_can_have_every_form_that_speech_can(settings: Job) -> None:
     kinds = tuple(suffix.removeprefix(".") for suffix in motion_suffixes())
     late = Delivery(offset_ms=-5000, stepped=True)
-    one_line.check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late))
-    one_line.check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)))
+    one_line.check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late), "first")
+    one_line.check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)), "second")
 
 
 @pytest.mark.long

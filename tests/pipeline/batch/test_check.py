@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lipmotion import Job, Request
-from lipmotion.pipeline.batch import BatchLine, check
+from lipmotion.pipeline.batch import check
 from lipmotion.pipeline.batch.check import (
     FEWEST_LINES,
     CheckedLine,
@@ -21,6 +21,7 @@ from lipmotion.pipeline.batch.check import (
     expected_s,
     letters_of,
 )
+from lipmotion.pipeline.batch.lines import BatchLine
 
 pytest.importorskip("joblib")
 RATE_HZ = 16_000

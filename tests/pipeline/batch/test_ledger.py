@@ -12,10 +12,20 @@ import pytest
 
 from lipmotion import Job, Outputs, Request
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.batch import BatchLine, settings
-from lipmotion.pipeline.batch.ledger import RECEIPTS, RUN, WORK, Place, opened_ledger, read_receipt, write_receipt
-from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER
-from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD_BYTES, Record
+from lipmotion.pipeline.batch import settings
+from lipmotion.pipeline.batch.ledger import (
+    DONE,
+    LARGEST_RECORD_BYTES,
+    RECEIPTS,
+    RUN,
+    WORK,
+    Place,
+    Record,
+    opened_ledger,
+    read_receipt,
+    write_receipt,
+)
+from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import (
     check_kinds,

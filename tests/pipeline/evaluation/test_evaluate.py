@@ -16,7 +16,7 @@ from lipmotion import evaluate as evaluated
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures.evaluation_table import figures_table
-from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.generation import generate_for
 from lipmotion.speech.recognition.recogniser import NO_WEIGHT_SCORE, OWN_VOICE_SCORE, cached_recogniser
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance

@@ -10,9 +10,10 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion import Model, SpeechRequest, animate, write
+from lipmotion import Model, animate, write
 from lipmotion.errors import ExportError, InputError, ModelFormatError
-from lipmotion.pipeline.outputs.output import FilmOptions, OutputSettings
+from lipmotion.pipeline.outputs.output import OutputSettings
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from lipmotion_faces.appearance.person import Appearance
@@ -81,7 +82,7 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion,
     closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(brief.values), 1)), 100.0, brief.channels)
     sound = Audio(toy_sentence.audio.samples[16_000 * 4 // 10 :], 16_000)
     films = {
-        jaw: np.stack(list(film_of(filmed_face, closed, sound=sound, options=FilmOptions(jaw=jaw)).frames)).astype(int)
+        jaw: np.stack(list(film_of(filmed_face, closed, sound=sound, options=Outputs(jaw=jaw)).frames)).astype(int)
         for jaw in ("motion", "energy", "none")
     }
     below = (slice(None), slice(212, 240), slice(90, 134))  # the chin
@@ -90,7 +91,7 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion,
     shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))]).astype(int)
     assert np.array_equal(films["none"][:20][:, 225:], shown[:, 225:])  # the background's own jaw
     with pytest.raises(InputError, match="a jaw that follows the energy needs the sound; give the recording"):
-        film_of(filmed_face, brief, options=FilmOptions(jaw="energy"))
+        film_of(filmed_face, brief, options=Outputs(jaw="energy"))
 
 
 def test_lips_close_in_p_b_and_m(filmed_face: FilmedFace) -> None:
@@ -159,13 +160,13 @@ def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_sp
     words = "an overlay shows the video of the speech: give a video as speech, and no background"
     for overlay in ("inset", "mouth"):
         with pytest.raises(InputError, match=words):
-            film_of(filmed_face, motion, options=FilmOptions(overlay=overlay))
+            film_of(filmed_face, motion, options=Outputs(overlay=overlay))
         (tmp_path / "b.mp4").write_text("video")
-        both = FilmOptions(overlay=overlay, background=tmp_path / "b.mp4")
+        both = Outputs(overlay=overlay, background=tmp_path / "b.mp4")
         with pytest.raises(InputError, match=words):
             film_of(filmed_face, motion, speech=toy_speech, options=both)
         with pytest.raises(InputError, match="has no pictures, and an overlay shows them; give a video as speech"):
-            film_of(filmed_face, motion, speech=toy_speech, options=FilmOptions(overlay=overlay))
+            film_of(filmed_face, motion, speech=toy_speech, options=Outputs(overlay=overlay))
 
 
 @pytest.mark.long
@@ -188,22 +189,22 @@ def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None
     video = tmp_path / "a.mp4"
     video.touch()
     for options, words in (
-        (FilmOptions(background=video), "a background"),
-        (FilmOptions(overlay="inset"), "an overlay"),
-        (FilmOptions(jaw="energy"), "another jaw"),
-        (FilmOptions(refinement="paper"), "another refinement"),
-        (FilmOptions(mark="visible"), "a visible mark"),
+        (Outputs(background=video), "a background"),
+        (Outputs(overlay="inset"), "an overlay"),
+        (Outputs(jaw="energy"), "another jaw"),
+        (Outputs(refinement="paper"), "another refinement"),
+        (Outputs(mark="visible"), "a visible mark"),
     ):
         with pytest.raises(InputError, match=rf"{words} is for filmed faces; give one: --face FILE\.face"):
-            drawn.check(OutputSettings(drawn, toy_speech, film=options))
+            drawn.check(OutputSettings(drawn, toy_speech, outputs=options))
     for unmarked in ("metadata", "none"):
-        drawn.check(OutputSettings(drawn, toy_speech, film=FilmOptions(mark=unmarked)))  # a drawn face needs no mark
+        drawn.check(OutputSettings(drawn, toy_speech, outputs=Outputs(mark=unmarked)))  # a drawn face needs no mark
 
 
 def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Motion, tmp_path: Path) -> None:
     """The video is shorter than the speech: as many frames as there are of both."""
     video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
-    film = film_of(filmed_face, motion, speech=video, options=FilmOptions(overlay="inset"))
+    film = film_of(filmed_face, motion, speech=video, options=Outputs(overlay="inset"))
     frames = np.stack(list(film.frames))
     assert frames.shape == (25, 48, 64, 3)
     assert film.rate_hz == pytest.approx(25.0)
@@ -219,7 +220,7 @@ def test_eigenlips_become_the_person(
     filmed_face: FilmedFace, pictured_model: Model, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
     """A model of mouth pictures drives the mouth by its pictures, and the jaw by points where it has them."""
-    request = SpeechRequest(toy_sentence.audio, units=toy_sentence.units)
+    request = Request(toy_sentence.audio, units=toy_sentence.units)
     result = animate(request, model=pictured_model)
     eigenlips = pictured_model.eigenlips
     assert eigenlips is not None
@@ -249,7 +250,7 @@ def test_another_persons_motion_is_mapped_onto_the_face(
     )
     other = replace(filmed_face, about=filmed_face.about | {"corpus": ["someone/else"]}, takes=takes)
     own, mapped = (
-        animate(SpeechRequest(toy_sentence.audio, units=toy_sentence.units, onto=onto), model=toy_model).motion
+        animate(Request(toy_sentence.audio, units=toy_sentence.units, onto=onto), model=toy_model).motion
         for onto in (None, other)
     )
     ratio = np.percentile(mapped["opening"], 95) / np.percentile(own["opening"], 95)
@@ -257,7 +258,7 @@ def test_another_persons_motion_is_mapped_onto_the_face(
     assert np.corrcoef(own["opening"], mapped["opening"])[0, 1] > 0.95
     mute = replace(other, takes=())
     with pytest.raises(InputError, match=r"the face: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
-        animate(SpeechRequest(toy_sentence.audio, onto=mute), model=toy_model)
+        animate(Request(toy_sentence.audio, onto=mute), model=toy_model)
 
 
 def test_writing_is_whole_or_not_at_all(
@@ -298,7 +299,7 @@ def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(
     monkeypatch.setattr(module, "Stitcher", Noted)
     monkeypatch.setattr(module, "open_background", lambda *_, in_time: sequence if in_time else None)
     film_of(filmed_face, brief)
-    film = film_of(filmed_face, brief, speech=video, fps=50.0, options=FilmOptions(overlay="mouth"))
+    film = film_of(filmed_face, brief, speech=video, fps=50.0, options=Outputs(overlay="mouth"))
     assert stitched == [True, False]
     assert film.rate_hz == pytest.approx(25.0)
     assert film.covered == pytest.approx(sequence.enlarged(1.3).face_box)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, here, run
-from lipmotion import SpeechRequest, animate
+from lipmotion import animate
+from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import film_of, write_film
@@ -83,7 +84,7 @@ def test_tracked_motion_of_unseen_speech_is_tracked_again(built: Path, clips: li
 def test_from_sound_to_video(built: Path, clips: list[Path], here: Path, run: RunCommand) -> None:
     done = run("animate", clips[CLIPS], "--face", built, "-o", "a.mp4", "--mark", "visible")
     assert (done.code, done.out) == (0, ["a.mp4"]), done
-    generated = animate(SpeechRequest(clips[CLIPS], onto=load_face(built))).motion
+    generated = animate(Request(clips[CLIPS], onto=load_face(built))).motion
     assert likeness(opening_in(here / "a.mp4"), np.asarray(generated.resampled(25.0)["opening"])) > 0.8
 
 

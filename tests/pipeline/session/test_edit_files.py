@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Delivery, Edits, Request, SpeechRequest, Staging, animate, load_model
+from lipmotion import Delivery, Edits, Request, Staging, animate, load_model
 from lipmotion.errors import InputError
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
@@ -151,7 +151,7 @@ def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Pa
     path, edits = tmp_path / "a.json", Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
     write_edits(replace(begun(asked), edits=edits), path)
     read = read_edits(path)
-    plain = animate(SpeechRequest(toy_speech, recogniser="own"), model=load_model(toy_model_file), edits=edits)
+    plain = animate(Request(toy_speech, recogniser="own"), model=load_model(toy_model_file), edits=edits)
     replayed = read.session().generated(read.edits)
     assert np.array_equal(replayed.motion.values, plain.motion.values)
     assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)

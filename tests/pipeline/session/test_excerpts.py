@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion import Edits, Model, Session, SpeechRequest
+from lipmotion import Edits, Model, Session
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, excerpt_of_change
+from lipmotion.pipeline.generation import generation_of
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Generation, Pin, Span, Timeline, Unit
@@ -22,25 +24,24 @@ UNSEEN = 0.01
 
 
 @pytest.fixture(scope="module")
-def long_request(toy_sentence: ToySentence, toy_model: Model) -> SpeechRequest:
-    units = Session(SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words)), model=toy_model).units()
+def long_request(toy_sentence: ToySentence, toy_model: Model) -> Request:
+    units = Session(Request(toy_sentence.audio, " ".join(toy_sentence.words)), model=toy_model).units()
     each_s = toy_sentence.audio.duration_s
     spans = [span for n in range(TIMES) for span in units.shifted(n * each_s)]
     sound = Audio(np.tile(toy_sentence.audio.samples, TIMES), toy_sentence.audio.rate_hz)
     spans[-1] = replace(spans[-1], end_s=sound.duration_s)
-    return SpeechRequest(sound, units=Timeline(tuple(spans)))
+    return Request(sound, units=Timeline(tuple(spans)))
 
 
 @pytest.fixture
 def made_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The seconds of each motion that a session makes from now on."""
     lengths: list[float] = []
-    make = session_module.generation_of
 
     def counted(*given: object) -> Generation:
         (understood,) = (each for each in given if isinstance(each, UnderstoodSpeech))
         lengths.append(understood.speech.features.duration_s)
-        return make(*given)  # type: ignore[arg-type]
+        return generation_of(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(session_module, "generation_of", counted)
     return lengths
@@ -52,7 +53,7 @@ def number_of(units: Timeline[Unit], phone: str, after_s: float) -> int:
 
 @pytest.mark.long
 def test_around_an_edit_the_motion_is_that_of_the_whole(
-    long_request: SpeechRequest, toy_model: Model, made_s: list[float]
+    long_request: Request, toy_model: Model, made_s: list[float]
 ) -> None:
     """At the first phone, in the middle, at the last one, of a pause, with pins; one edit after another."""
     session, other = Session(long_request, model=toy_model), Session(long_request, model=toy_model)

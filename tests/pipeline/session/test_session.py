@@ -10,15 +10,17 @@ from threading import Barrier
 import numpy as np
 import pytest
 
-from lipmotion import Delivery, Edits, Model, Session, SpeechRequest, animate, write
+from lipmotion import Delivery, Edits, Model, Session, animate, write
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edit_files import EditFile
+from lipmotion.pipeline.generation import generation_of
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion_faces.outputs.drawn_video import sound_track
@@ -28,12 +30,12 @@ from lipmotion_faces.registry import staged_face
 
 
 @pytest.fixture
-def request_(toy_sentence: ToySentence) -> SpeechRequest:
-    return SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words))
+def request_(toy_sentence: ToySentence) -> Request:
+    return Request(toy_sentence.audio, " ".join(toy_sentence.words))
 
 
 @pytest.fixture
-def session(request_: SpeechRequest, toy_model: Model) -> Session:
+def session(request_: Request, toy_model: Model) -> Session:
     return Session(request_, model=toy_model)
 
 
@@ -45,7 +47,7 @@ def edited(*sentences: str) -> Edits:
     return Edits().then(*sentences)
 
 
-def test_a_session_gives_what_one_pass_gives(session: Session, request_: SpeechRequest, toy_model: Model) -> None:
+def test_a_session_gives_what_one_pass_gives(session: Session, request_: Request, toy_model: Model) -> None:
     """Whatever was asked for before; with phones edited in a session, or given."""
     place = phones(session.units()).index("iy") + 1
     edits = edited(f"phone {place} is aa", "pin opening 0.05 at 1.0")
@@ -63,7 +65,7 @@ def test_a_session_gives_what_one_pass_gives(session: Session, request_: SpeechR
 
 def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
-    for name in ("understood_speech", "generate_for"):
+    for name in ("understood_speech", "generation_of"):
         plain = getattr(session_module, name)
 
         def counted(*given: object, name: str = name, plain: object = plain, **more: object) -> object:
@@ -76,7 +78,7 @@ def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pyte
     session.generated(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
     session.delivered(edited("phone 3 is p", "set intensity 1.5"))
     assert session.generated() is first  # undone
-    assert calls == ["understood_speech", "generate_for", "generate_for"]
+    assert calls == ["understood_speech", "generation_of", "generation_of"]
 
 
 def test_edits_of_phones(session: Session) -> None:
@@ -216,7 +218,6 @@ def test_a_locked_span_keeps_channels_that_are_added_later(session: Session) -> 
 
 def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    generation_of = session_module.generation_of
     monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
     steps = [
         each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
@@ -229,9 +230,8 @@ def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pyt
 
 def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    generation_of = session_module.generation_of
     monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
-    monkeypatch.setattr(session_module, "KEPT_FRAMES", len(session.generated().motion.values))
+    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generated().motion.values))
     found = [session.generated(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
     assert session.generated(edited("pin opening 0.1 at 0.5")) is found[1]
     assert len(made) == 4
@@ -239,11 +239,11 @@ def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.Monke
     assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
 
 
-def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: SpeechRequest) -> None:
+def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: Request) -> None:
     file = EditFile(edited("phone 3 is p"), units=session.units())
     half = Audio(request_.recording.samples[:16_000], 16_000)  # type: ignore[union-attr]
     with pytest.raises(InputError, match=r"the recording lasts 1\.00 s, the edited one .* of another recording"):
-        animate(SpeechRequest(half), model=toy_model, edits=file)
+        animate(Request(half), model=toy_model, edits=file)
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_edits_that_are_not_possible(session: Session, sentence: str, message: s
         session.generated(edited(sentence))
 
 
-def test_single_pictures_are_those_of_the_video(session: Session, request_: SpeechRequest) -> None:
+def test_single_pictures_are_those_of_the_video(session: Session, request_: Request) -> None:
     """Any frame, before and after an edit; what is not at that time is refused."""
     pictures = SessionPictures(session)
     for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
@@ -287,7 +287,7 @@ def test_single_pictures_are_those_of_the_video(session: Session, request_: Spee
 
 def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy_sentence: ToySentence) -> None:
     """Each alone and both at once give the same bits; the matrix products of one do not change those of the other."""
-    requests = [SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words)), SpeechRequest(toy_sentence.audio)]
+    requests = [Request(toy_sentence.audio, " ".join(toy_sentence.words)), Request(toy_sentence.audio)]
     edits = [edited("phone 3 is p"), edited("pin opening 0.05 at 1.0")]
     alone = [
         Session(request, model=toy_model).generated(edit).motion.values
@@ -306,7 +306,7 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy
 
 @pytest.mark.long
 def test_what_comes_next_is_prepared_while_processes_work(
-    request_: SpeechRequest, toy_model: Model, monkeypatch: pytest.MonkeyPatch
+    request_: Request, toy_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prepared: list[object] = []
     monkeypatch.setattr(session_module, "prepare_search", prepared.append)

@@ -16,7 +16,8 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, train_eigenlips, with_visual_channels
+from lipmotion.pipeline.model import BOTH, EIGENLIPS, GEOMETRY
+from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance

@@ -16,10 +16,10 @@ from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
+from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import fingerprint as fingerprints
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.channels import BOTH, GEOMETRY
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon

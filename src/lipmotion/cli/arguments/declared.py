@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.errors import InputError
-from lipmotion.pipeline.job import DETAILS, Job, Outputs
+from lipmotion.pipeline.job import DETAILS, Job
+from lipmotion.pipeline.request import Outputs
 from lipmotion.types.configuration import Configuration, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.staging import Staging

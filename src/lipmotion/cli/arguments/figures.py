@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_output
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 
 if TYPE_CHECKING:
     from lipmotion.types import Monitor

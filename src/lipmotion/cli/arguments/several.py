@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,8 +17,7 @@ from lipmotion.printable import printable
 if TYPE_CHECKING:
     from lipmotion.cli.terminal.progress import Report
     from lipmotion.pipeline.job import Job
-    from lipmotion.pipeline.model import Model
-    from lipmotion.pipeline.opened_job import OpenedJob
+    from lipmotion.pipeline.outputs.output import ShownFace
 
 
 def animated_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
@@ -36,7 +34,7 @@ def animated_one_by_one(job: Job, given: Sequence[Path], options: argparse.Names
     if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
     _check_named(given)
-    _animate_each(_one_by_one(job, recordings_of(given)), options, report)
+    _animate_each(*_one_by_one(job, recordings_of(given)), options, report)
     return True
 
 
@@ -73,13 +71,13 @@ def _check_named(recordings: Sequence[Path]) -> None:
             )
 
 
-def _one_by_one(job: Job, recordings: Sequence[Path]) -> list[OpenedJob]:
-    """Return the job of each recording, its outputs instead of folders and templates; make the folders.
+def _one_by_one(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownFace]:
+    """Return the job of each recording, its outputs instead of folders and templates, and their face; make the folders.
 
     Faces and characters are opened once, for all recordings. What cannot be leaves no new folders.
     """
     from lipmotion.errors import InputError
-    from lipmotion.pipeline.opened_job import opened
+    from lipmotion.pipeline.job import check_outputs, open_face
     from lipmotion.pipeline.understand.recordings import planned_outputs
     from lipmotion.storage.files import made_folders
 
@@ -89,33 +87,30 @@ def _one_by_one(job: Job, recordings: Sequence[Path]) -> list[OpenedJob]:
         if value is not None and len(recordings) > 1:
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
     planned = planned_outputs(recordings, job.outputs.files, job.outputs.kinds)
-    shared = opened(job)
-    jobs = [shared.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
+    face = open_face(job.outputs)
+    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
     with made_folders({Path(file).parent for files in planned for file in files}):
         for each, recording in zip(jobs, recordings, strict=True):
-            each.checked(recording)
-    return jobs
+            check_outputs(each, face, recording)
+    return jobs, face
 
 
-def _animate_each(jobs: Sequence[OpenedJob], options: argparse.Namespace, report: Report) -> None:
+def _animate_each(jobs: Sequence[Job], face: ShownFace, options: argparse.Namespace, report: Report) -> None:
     """Run the jobs, with the words and phones in files beside the recordings, as a corpus and a batch use them."""
     from lipmotion.errors import LipMotionError
+    from lipmotion.pipeline.job import run
+    from lipmotion.pipeline.model import load_model
     from lipmotion.types.progress import Item, sub_monitor
 
-    @cache
-    def load() -> Model:
-        from lipmotion.pipeline.model import load_model
-
-        return load_model(jobs[0].job.request.model)
-
+    model = load_model(jobs[0].request.model)
     written: list[str] = []
     failures: list[tuple[int, str, Exception]] = []
     for number, each in enumerate(jobs):
-        name = str(each.job.request.recording)
+        name = str(each.request.recording)
         part = sub_monitor(report.receive, number / len(jobs), (number + 1) / len(jobs))
         try:
-            each.run(load, words_beside=True, workers=worker_count(options), monitor=part)
-            written += each.job.outputs.files
+            run(each, face=face, model=model, words_beside=True, workers=worker_count(options), monitor=part)
+            written += each.outputs.files
             report.receive(Item(name, "animated"))
         except Exception as error:
             known = outcome(error)

@@ -265,7 +265,8 @@ def _current_folder() -> str:
 def _main_path() -> str:
     """Animate the made-up speech, and write motion, cues and video; return what came out."""
     from lipmotion.formats.sound import write_sound
-    from lipmotion.pipeline.job import Job, Outputs, Request
+    from lipmotion.pipeline.job import Job
+    from lipmotion.pipeline.request import Outputs, Request
     from lipmotion.storage.files import temporary_folder
     from lipmotion.testing.formant_synthesiser import synthesise
     from lipmotion.types.staging import Staging

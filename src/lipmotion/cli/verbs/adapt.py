@@ -8,7 +8,7 @@ from typing import Any
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

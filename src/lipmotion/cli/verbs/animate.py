@@ -9,7 +9,8 @@ from lipmotion.cli.arguments.options import add_execution, worker_count
 from lipmotion.cli.arguments.pipes import add_pipe_format, is_pipe, read_pipe, written_pipe
 from lipmotion.cli.arguments.several import animated_one_by_one
 from lipmotion.cli.terminal.printing import print_note
-from lipmotion.pipeline.job import Outputs, Request
+from lipmotion.pipeline.job import run as run_job
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
 
 
@@ -28,7 +29,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the job of each recording; print the paths that were written."""
     from lipmotion.cli.terminal.progress import reporting
-    from lipmotion.pipeline.opened_job import opened
 
     note = ""
     recordings = options.speech if isinstance(options.speech, list) else [options.speech]
@@ -39,8 +39,8 @@ def run(options: argparse.Namespace) -> None:
             return
         piped = is_pipe(recordings[0])
         with read_pipe(recordings[0]) as speech, written_pipe(options) as (files, pipe):
-            work = opened(job.of(speech, files))
-            done = work.run(temporary=piped, workers=worker_count(options), monitor=report.receive)
+            job = job.of(speech, files)
+            done = run_job(job, temporary=piped, workers=worker_count(options), monitor=report.receive)
             note = done.outlook.text if done.outlook is not None else ""
         written = [str(path) for path in (*files, job.outputs.posteriors) if path and not pipe]
         report.finish("\n".join(map(printable, written)), files=written)

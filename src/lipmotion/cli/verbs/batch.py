@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from lipmotion.cli.arguments.declared import add_detail, add_job_file, add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.pipeline.job import Job, Outputs, Request
+from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.staging import Staging

@@ -9,7 +9,7 @@ from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.errors import InputError, shortened
-from lipmotion.pipeline.job import Outputs
+from lipmotion.pipeline.request import Outputs
 from lipmotion.types.values import number_of
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
     from lipmotion.extensions import provided
     from lipmotion.meshes.files.binding_files import save_binding, write_points, write_weights
-    from lipmotion.pipeline.opened_job import character_of
+    from lipmotion.pipeline.job import open_character
     from lipmotion.pipeline.outputs.curve_sets import described
 
     if options.character.suffix.lower() == ".csv":
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> None:
     stated = _stated(options)
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
     try:
-        character = character_of(part_of(options, Outputs(), control_points=by_points))
+        character = open_character(part_of(options, Outputs(), control_points=by_points))
     except InputError:
         if options.write_table:
             _write_blank_table(options.character)

@@ -16,7 +16,7 @@ from lipmotion.cli.arguments.several import placed_outputs
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.status import LEVELS, status_lines
 from lipmotion.errors import shortened
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import is_file
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.values import whole_of

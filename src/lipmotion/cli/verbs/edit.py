@@ -7,7 +7,7 @@ import argparse
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 
 

@@ -7,7 +7,7 @@ import argparse
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input
 from lipmotion.cli.terminal.printing import print_json, print_lines
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 
 RUNS = 2000
 

@@ -12,13 +12,13 @@ from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input
 from lipmotion.cli.arguments.pipes import add_pipe_format, written_pipe
-from lipmotion.pipeline.job import Job, Request
+from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
+from lipmotion.pipeline.job import run as run_job
+from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 
 if TYPE_CHECKING:
-    from lipmotion.pipeline.opened_job import OpenedJob
     from lipmotion.types import Monitor
-
 
 LOG = logging.getLogger("lipmotion")
 
@@ -43,17 +43,16 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Read the motion and call ``lipmotion.write``; print the paths that were written."""
     from lipmotion.cli.terminal.progress import reporting
-    from lipmotion.pipeline.opened_job import opened
 
     with reporting(options) as report:
         with written_pipe(options) as (files, pipe):
-            job = opened(part_of(options, Job()).of(options.sound or _sound_named_by(options.motion), files))
+            job = part_of(options, Job()).of(options.sound or _sound_named_by(options.motion), files)
             _render(job, options.motion, options.motion_rate, report.receive)
         written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
 
 
-def _render(job: OpenedJob, motion: Path, rate_hz: float | None, monitor: Monitor) -> None:
+def _render(job: Job, motion: Path, rate_hz: float | None, monitor: Monitor) -> None:
     import numpy as np
 
     from lipmotion.pipeline.edit_files import is_edit_file
@@ -64,15 +63,15 @@ def _render(job: OpenedJob, motion: Path, rate_hz: float | None, monitor: Monito
     if is_edit_file(motion):
         _replay(job, motion, monitor)
         return
-    sound: Path | Audio | None = job.job.request.recording
-    planned = job.checked(sound)
-    generation = read_generation(motion, job.job.request.units, rate_hz)
+    sound, face = job.request.recording, open_face(job.outputs)
+    planned = check_outputs(job, face, sound)
+    generation = read_generation(motion, job.request.units, rate_hz)
     if isinstance(sound, Path):
         generation = as_long_as(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
     elif any(output.draws for output in planned):
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
         sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
-    job.write(generation, sound, monitor=monitor)
+    write_outputs(job, face, generation, sound, monitor=monitor)
 
 
 def _sound_named_by(motion: Path) -> Path | None:
@@ -91,18 +90,17 @@ def _sound_named_by(motion: Path) -> Path | None:
     return None
 
 
-def _replay(job: OpenedJob, path: Path, monitor: Monitor) -> None:
+def _replay(job: Job, path: Path, monitor: Monitor) -> None:
     """Make the motion of the recording that a file of edits names, and write the outputs as ``animate`` does."""
     from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import read_edits
-    from lipmotion.pipeline.opened_job import opened
 
-    asked, edits = job.job.request, read_edits(path)
-    if asked.recording or asked.units:
+    edits = read_edits(path)
+    if job.request.recording or job.request.units:
         raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
     if edits.named.recording is None:
         raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
-    opened(replace(job.job, request=replace(edits.named, edits=path))).run(monitor=monitor)
+    run_job(replace(job, request=replace(edits.named, edits=path)), monitor=monitor)
 
 
 SILENT_HZ = 16_000

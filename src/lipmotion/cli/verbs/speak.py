@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.pipeline.job import Job, Request
+from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
+from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file
 
@@ -54,13 +55,13 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora.store import Corpus
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.opened_job import opened
-    from lipmotion.pipeline.understand.read_request import read_lexicon
+    from lipmotion.pipeline.understand.read_request import lexicon_of
 
-    job = opened(part_of(options, Job()))
-    job.checked()
-    asked, text = job.job.request, read_text(options.text) if options.text else options.words
-    lexicon = read_lexicon(asked)
+    job = part_of(options, Job())
+    face = open_face(job.outputs)
+    check_outputs(job, face)
+    asked, text = job.request, read_text(options.text) if options.text else options.words
+    lexicon = lexicon_of(asked) if asked.lexicon else None
     model, corpus = load_model(asked.model), Corpus.open(options.corpus) if options.corpus else None
     sound, result = speak(
         text,
@@ -69,12 +70,12 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
         model=model,
         lexicon=lexicon,
         speaker=asked.speaker,
-        onto=asked.onto or job.face.other_person(model, asked.speaker),
+        onto=asked.onto or face.other_person(model, asked.speaker),
         onto_speaker=asked.onto_speaker,
         pauses=asked.pauses,
         asymmetry=asked.asymmetry,
     )
-    job.write(result, sound, model, monitor=report.receive)
+    write_outputs(job, face, result, sound, model=model, monitor=report.receive)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_execution, list_or_all, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 
 if TYPE_CHECKING:
     from lipmotion.engines import Engine
@@ -77,8 +77,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings, preset_visual
-    from lipmotion.pipeline.model import save_model
-    from lipmotion.pipeline.training.channels import GEOMETRY
+    from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.storage.files import unfinished_work

@@ -8,7 +8,7 @@ from typing import Any
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_execution, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.request import Request
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -28,7 +28,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``recognise_words`` and ``write_words``; print the words or the paths that were written."""
     from lipmotion.cli.terminal.progress import reporting
-    from lipmotion.pipeline.understand.request import SpeechRequest
+    from lipmotion.pipeline.request import Request
     from lipmotion.pipeline.understand.words import (
         check_word_outputs,
         recognise_words,
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> None:
 
     with reporting(options) as report:
         check_word_outputs(options.output, options.speech)
-        request = SpeechRequest(options.speech, recogniser=options.recogniser)
+        request = Request(options.speech, recogniser=options.recogniser)
         found = recognise_words(request, model=options.model, workers=worker_count(options))
         write_words(found.words, options.output, options.speech)
         text = "\n".join(map(str, options.output)) or words_as_text(found.words).removesuffix("\n")

@@ -14,7 +14,8 @@ from lipmotion.errors import CorpusError, InputError, LipMotionError
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
 from lipmotion.pipeline.batch.pool import WorkerDied, local_pool
-from lipmotion.pipeline.job import Job, Request
+from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.spoken_language import english_spoken
 from lipmotion.speech.sound.audio_files import read_audio

@@ -19,8 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
-from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD_BYTES, Record, read_record
+from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.settings import InputFile, input_paths, line_fingerprint
 from lipmotion.storage.files import (
     TEMPORARY,
@@ -33,7 +32,51 @@ from lipmotion.storage.files import (
     sha256_of,
     whole_file,
 )
-from lipmotion.storage.json_text import as_json
+from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, whole
+
+Record = dict[str, Any]
+"""What is known of one line; its fields are listed in docs/batch.md."""
+DONE, FAILED = "done", "failed"
+LARGEST_RECORD_BYTES = 1 << 20
+"""Most bytes of a record; one has about a thousand."""
+LARGEST_NUMBER = 1e12
+"""No duration, level or count of a recording is larger."""
+TOGETHER = (("words", "confidence"), ("closures_heard", "closures_made"))
+"""Fields of which the second is there wherever the first is."""
+
+
+_TEXT, _NUMBER = text(LARGEST_RECORD_BYTES), number(-LARGEST_NUMBER, LARGEST_NUMBER)
+_INPUT = {"path": _TEXT, "size": whole(0, 1 << 63), "changed_ns": whole(-(1 << 63), 1 << 63), "sha256": _TEXT}
+_CHECKED = members(
+    {
+        **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "error", "redone"), _TEXT),
+        **dict.fromkeys(("warnings", "advice"), items(_TEXT)),
+        **dict.fromkeys(("duration_s", "seconds", "confidence", "range_db", "widest", "motion"), _NUMBER),
+        **dict.fromkeys(("closures_heard", "closures_made", "least_sure_s"), _NUMBER),
+        "voice": optional(_NUMBER),
+        "outcome": one_of((DONE, FAILED)),
+        "inputs": items(members(_INPUT, _INPUT, alone=True)),
+        "outputs": any_members(_TEXT),
+    },
+    ("name", "recording", "run", "fingerprint", "outcome", "inputs", "outputs"),
+)
+"""What every known field must hold; a field of a later version may hold anything."""
+
+
+def read_record(content: bytes) -> Record | None:
+    """Return the record in a row of a ledger, or in a receipt; None: it is damaged."""
+    try:
+        record: Record = from_json(content)
+        _CHECKED(record)
+    except ValueError:
+        return None
+    if any(first in record and second not in record for first, second in TOGETHER):
+        return None
+    names = [record["name"], *record["outputs"]]
+    belong = all(output.startswith(f"{record['name']}.") for output in record["outputs"])
+    return record if belong and not any(map(CONTROL.search, names)) else None
+
 
 LOG = logging.getLogger("lipmotion")
 LEDGER, RECEIPTS, WORK, RUN = "batch.jsonl", "receipts", "work", "run"

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.pipeline.batch.ledger import Record
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES
-from lipmotion.pipeline.batch.record import Record
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
 

@@ -20,26 +20,27 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import failed_extension, provided
 from lipmotion.formats.base import motion_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
-from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.batch.ledger import (
+    DONE,
+    FAILED,
     Place,
+    Record,
     are_in_place,
     is_in_place,
     read_receipt,
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.settings import CUES, input_files, line_fingerprint
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.job import Job, Request
+from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.opened_job import OpenedJob, opened
-from lipmotion.pipeline.understand.read_request import read_lexicon, read_request
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.outputs.output import ShownFace
+from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import (
     check_target,
@@ -50,7 +51,6 @@ from lipmotion.storage.files import (
     sha256_of,
     temporary_folder,
 )
-from lipmotion.storage.sources import is_file
 from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
@@ -162,23 +162,23 @@ def _written(work: LineWork) -> Generation:
     staged = tuple(str(work.place.staged(line.name, kind)) for kind in kinds)
     for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
-    model, opened_job = _model(work.job.request), _opened(work.job)
-    generation = animate(_request(line, opened_job, model), model=model)
-    opened_job.of(Path(line.recording), staged).write(generation, Path(line.recording), model)
-    return generation
+    shared = _cached(work.job, work.place.run)
+    request = _request(line, work.job.request, shared)
+    job = replace(work.job.of(None, staged), request=request)
+    return run(job, face=shared.face, model=shared.model, is_typed=False)
 
 
-def _request(line: BatchLine, opened_job: OpenedJob, model: Model) -> SpeechRequest:
+def _request(line: BatchLine, named: Request, shared: _Shared) -> Request:
     """Return the request of a line, with the labels beside its recording where the row has no words.
 
     Where a filmed face of another person is shown, the motion is mapped onto it, as ``lipmotion animate`` does.
     """
-    named = opened_job.of(Path(line.recording)).job.request
     speaker = line.speaker or named.speaker
-    read = read_request(replace(named, speaker=speaker, lexicon=None), words_beside=not line.transcript)
-    request = replace(read, transcript=line.transcript or read.transcript, lexicon=_lexicon(named))
-    face = opened_job.face.other_person(model, speaker) if named.onto is None else None
-    return request if face is None else replace(request, onto=_map_onto(model, face, speaker))
+    named = replace(named, recording=Path(line.recording), speaker=speaker, lexicon=shared.lexicon)
+    request = read_request(named, words_beside=not line.transcript)
+    request = replace(request, transcript=line.transcript or request.transcript)
+    face = shared.face.other_person(shared.model, speaker) if named.onto is None else None
+    return request if face is None else replace(request, onto=_map_onto(shared.model, face, speaker))
 
 
 def _findings(generation: Generation) -> Record:
@@ -250,38 +250,20 @@ def _keep(record: logging.LogRecord) -> bool:
     return False
 
 
-def _stamp(*paths: str | Path | None) -> tuple[int, ...]:
-    """Return the times of change of files, so that what is kept of them is renewed; 0: there is no such file."""
-    return tuple(Path(path).stat().st_mtime_ns if path and is_file(Path(path)) else 0 for path in paths)
+@dataclass(frozen=True, eq=False)
+class _Shared:
+    """What all lines of a batch share: it is loaded once a run."""
 
-
-def _model(request: Request) -> Model:
-    return _model_of(request.model, _stamp(request.model))
-
-
-@lru_cache(maxsize=1)
-def _model_of(path: Path | None, _: tuple[int, ...]) -> Model:
-    return load_model(path)
-
-
-def _lexicon(request: Request) -> Lexicon | None:
-    return _lexicon_of(request, _stamp(request.lexicon))
+    model: Model
+    face: ShownFace
+    lexicon: Lexicon | None
 
 
 @lru_cache(maxsize=1)
-def _lexicon_of(request: Request, _: tuple[int, ...]) -> Lexicon | None:
-    return read_lexicon(request)
-
-
-def _opened(job: Job) -> OpenedJob:
-    shown = job.outputs
-    table = table_path(shown.character) if shown.character else None
-    return _opened_of(job, _stamp(shown.face, shown.character, table, shown.lip_points, shown.binding))
-
-
-@lru_cache(maxsize=1)
-def _opened_of(job: Job, _: tuple[int, ...]) -> OpenedJob:
-    return opened(job)
+def _cached(job: Job, of_run: str) -> _Shared:  # noqa: ARG001 (files may change between two runs)
+    """Return what the lines of a run share. Raises as ``open_face``, ``Lexicon.from_file`` and ``load_model``."""
+    lexicon = None if job.request.lexicon is None else lexicon_of(job.request)
+    return _Shared(load_model(job.request.model), open_face(job.outputs), lexicon)
 
 
 @lru_cache(maxsize=8)
@@ -290,30 +272,22 @@ def _map_onto(model: Model, face: Any, speaker: str) -> SpeakerMap:
     return provided("map_onto")(model, face, speaker=speaker)
 
 
-def check_line_job(job: Job) -> None:
-    """Load what all lines need, so that a mistake in it ends the batch before its first line.
+def check_line_job(job: Job, of_run: str) -> None:
+    """Load what all lines of a run need, so that a mistake in it ends the batch before its first line.
 
     Motion files of a moment of silence are made and deleted, so that channels, curves and formats are tried out.
-    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``OpenedJob``.
+    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``open_face``.
     """
-    anywhere, opened_job = Path(tempfile.gettempdir()), _opened(job)
+    shared, anywhere = _cached(job, of_run), Path(tempfile.gettempdir())
     files = tuple(str(anywhere / f"line.{kind}") for kind in job.outputs.kinds)
-    replace(opened_job, job=job.of(anywhere, files)).checked()
-    _lexicon(job.request)
-    _try_out(opened_job, _model(job.request))
-
-
-def _try_out(opened_job: OpenedJob, model: Model) -> None:
-    """Write the motion files of a moment of silence into a folder that is deleted. Raises as ``animate``, ``write``."""
-    job = opened_job.job
-    kinds = [kind for kind in job.outputs.kinds if motion_suffix(Path(f"line.{kind}"))]
-    kinds = [kind for kind in kinds if not kind.startswith(CUES)]
-    if not kinds or opened_job.face.other_person(model, job.request.speaker) is not None:
+    check_outputs(job.of(anywhere, files), shared.face)
+    kinds = [kind for kind in job.outputs.kinds if motion_suffix(Path(f"line.{kind}")) and not kind.startswith(CUES)]
+    if not kinds or shared.face.other_person(shared.model, job.request.speaker) is not None:
         return
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
     units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))
-    request = SpeechRequest(silence, units=units, speaker=job.request.speaker)
+    request = Request(silence, units=units, speaker=job.request.speaker)
     with temporary_folder() as folder:
         files = tuple(str(folder / f"line.{kind}") for kind in kinds)
         early = replace(job, delivery=replace(job.delivery, offset_ms=0.0), outputs=replace(job.outputs, files=files))
-        replace(opened_job, job=early).write(animate(request, model=model), silence)
+        write_outputs(early, shared.face, animate(request, model=shared.model), silence)

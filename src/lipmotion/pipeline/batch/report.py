@@ -14,10 +14,9 @@ from typing import Any
 from urllib.parse import quote
 
 from lipmotion.formats.web_page import coloured
-from lipmotion.pipeline.batch.ledger import Ledger
+from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.marks import APPROVE, Mark, is_due
-from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import CorpusError, ExportError, shortened
-from lipmotion.pipeline.batch.ledger import Ledger, Place, are_same_inputs, opened_ledger
+from lipmotion.pipeline.batch.ledger import DONE, FAILED, Ledger, Place, Record, are_same_inputs, opened_ledger
 from lipmotion.pipeline.batch.lines import MOST_NAMED_LINES, BatchLine, check_names, read_lines
 from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merged, read_marks, write_marks
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finished_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
-from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import check_job, fingerprint_of, line_fingerprint
 from lipmotion.pipeline.job import Job
@@ -102,7 +101,7 @@ def batch(
         check_names(lines, job.outputs.kinds)
     _check_outside(lines, place)
     chosen = _chosen_marks(Path(place.out), marks, lines)
-    check_line_job(job)
+    check_line_job(job, place.run)
     of_settings = fingerprint_of(job)
     with opened_ledger(place, lines) as ledger:
         if marks is not None:

@@ -39,6 +39,11 @@ def check_job(job: Job) -> None:
     found = next((name for name, value in alone.items() if value), None)
     if found:
         raise InputError(f"the job of a batch has {found!r}, which belongs to one recording; leave it out")
+    found = next(
+        (name for name in ("lexicon", "onto") if not isinstance(getattr(job.request, name), Path | None)), None
+    )
+    if found:
+        raise InputError(f"the job of a batch has a value as {found!r}, required a file, whose content can be compared")
 
 
 def possible_kinds() -> tuple[str, ...]:

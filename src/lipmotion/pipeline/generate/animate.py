@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import InputError
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.types import Constraints, Generation, Monitor, TimedTranscript, silent_monitor
 
 if TYPE_CHECKING:
@@ -31,14 +31,14 @@ def animate(  # noqa: PLR0913
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
-    speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest`` with all that is known of it
-    model       : from ``load_model``, or the path of a model file; None: the shipped model
-    transcript  : the spoken words, or a Path of a file with them; the same as a ``SpeechRequest`` with this transcript
-    language    : that is spoken; the same as a ``SpeechRequest`` with this language (None: its own, or English)
+    speech      : an audio or video file, samples at 16 kHz, or a ``Request`` with all that is known of it
+    model       : from ``load_model``, or the path of a model file; None: that of the request, or the shipped one
+    transcript  : the spoken words, or a Path of a file with them; the same as a ``Request`` with this transcript
+    language    : that is spoken; the same as a ``Request`` with this language (None: its own, or English)
     constraints : values that the motion must take exactly, in the units of the request's speaker; also of curves that
                   follow from it (``Session.generated``)
     edits       : what is changed of the motion, or the path of a file of edits (docs/edit.md), whose phones are used
-                  where the request has no words and no phones
+                  where the request has no words and no phones. None: those of the request
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
     monitor     : receives reports of the progress
@@ -58,7 +58,8 @@ def animate(  # noqa: PLR0913
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
     request = request_of(speech, transcript, language)
-    model = model if isinstance(model, Model) else load_model(model)
+    model = model if isinstance(model, Model) else load_model(model or request.model)
+    edits = request.edits if edits is None else edits
     if edits is None or isinstance(edits, Edits):
         session = Session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
     else:

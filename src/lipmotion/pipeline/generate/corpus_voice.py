@@ -8,14 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Pauses, Request
 from lipmotion.speech.sound.overlap_add import JoinedPieces, overlapped
 from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import SILENCE, Lexicon, words_of
@@ -39,7 +38,7 @@ def speak_from_corpus(  # noqa: PLR0913
     constraints: Constraints | None = None,
     lexicon: Lexicon | None = None,
     speaker: str = "",
-    pauses: str = REST,
+    pauses: Pauses = "rest",
     asymmetry: float = 0.0,
 ) -> SpokenText:
     """Return a text as the joined sound of recordings, and the motion that was recorded with it.
@@ -90,7 +89,7 @@ def speak_from_corpus(  # noqa: PLR0913
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
     spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
-    request = SpeechRequest(audio, units=spoken, speaker=speaker, pauses=pauses, asymmetry=asymmetry, spoken_so=True)
+    request = Request(audio, units=spoken, speaker=speaker, pauses=pauses, asymmetry=asymmetry, spoken_so=True)
     return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 

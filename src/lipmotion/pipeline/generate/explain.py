@@ -1,4 +1,4 @@
-"""Explanations of frames: ``explain(speech, at=…) → explanations``, and their text and JSON."""
+"""What determined frames of motion: ``explain(speech, at=…) → explanations``, as text, JSON, pictures of posteriors."""
 
 from __future__ import annotations
 
@@ -8,21 +8,24 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from lipmotion.engines import ENGINES, Engine
 from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.generate.generation_for import explanation_for
+from lipmotion.pipeline.generation import explanation_for
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.session import NO_EDITS, Session
-from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.printable import printable
 from lipmotion.types import (
     FRAME_RATE_HZ,
+    ChainPosteriors,
     ChainStates,
     ChannelValue,
     DominantGaussian,
     Explanation,
+    Generation,
     NamedProbability,
     RegressedMean,
     SpeechPart,
@@ -33,6 +36,8 @@ LINE = 110
 """Width of the text of a row, without its name, in characters."""
 SHOWN_CHANNELS = 6
 """Largest number of channels in a text; points are left out if there are other channels."""
+SUFFIX = ".png"
+"""Pictures of posteriors end so."""
 
 
 def explain(
@@ -187,3 +192,19 @@ def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
         yield "", text
     if len(channels) > min(len(names), SHOWN_CHANNELS):
         yield "", f"and {len(channels) - min(len(names), SHOWN_CHANNELS)} more channels (--json has all)"
+
+
+@one_thread()
+def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
+    """Return the motion of a session with some edits, and the posterior probabilities of every chain of its model.
+
+    Raises InputError: as ``Session.generated``, or the model's engine has no chains of states.
+    """
+    engine, learned = session.model.engine, session.model.learned
+    if type(engine).posteriors is Engine.posteriors:
+        having = [name for name in ENGINES.names if ENGINES.load(name).posteriors is not Engine.posteriors]
+        raise InputError(
+            f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
+            f"was trained with --engine {' or '.join(having)}"
+        )
+    return session.generated(edits), engine.posteriors(learned, session.understood(edits).speech)

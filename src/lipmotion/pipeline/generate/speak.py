@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.entry import quantise
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
@@ -19,10 +18,9 @@ from lipmotion.formats.subtitles import is_subtitles, subtitle_words
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
-from lipmotion.pipeline.generate.generation_for import speaker_map
-from lipmotion.pipeline.job import ASKED
+from lipmotion.pipeline.generation import speaker_map
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand.request import Onto, SpeechRequest
+from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import at_speech_rate
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
@@ -65,7 +63,7 @@ def speak(  # noqa: PLR0913
     speaker: str = "",
     onto: Onto | None = None,
     onto_speaker: str = "",
-    pauses: str = REST,
+    pauses: Pauses = "rest",
     asymmetry: float = 0.0,
 ) -> SpokenText:
     """Return a text as sound of a synthetic voice, and the lip motion for it, with 0.25 s of rest at both ends.
@@ -79,7 +77,7 @@ def speak(  # noqa: PLR0913
     constraints : values that the motion must take exactly, in the units of the speaker
     lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
     speaker     : whose motion is generated, of the people whom the model was trained on; empty: the mean person
-    onto, onto_speaker, pauses, asymmetry : as of ``SpeechRequest``
+    onto, onto_speaker, pauses, asymmetry : as of ``Request``
     The phones and their times are the synthesiser's, so nothing is recognised. The sound is one of 16 bits, at the
     synthesiser's rate or 16 kHz if that is less; ``animate`` of a ``.wav`` or ``.flac`` of it, with the units, returns
     the same motion.
@@ -117,7 +115,7 @@ def speak(  # noqa: PLR0913
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
     sound, units = _said(sentences, chosen, lexicon)
     sound = quantise(_with_floor(sound, units))
-    request = SpeechRequest(
+    request = Request(
         at_speech_rate(sound),
         units=units,
         speaker=speaker,

@@ -11,7 +11,7 @@ import numpy as np
 
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechInput
+from lipmotion.pipeline.request import SpeechInput
 from lipmotion.printable import printable
 from lipmotion.types import Generation
 

@@ -136,4 +136,4 @@ class CueOutput(Output):
 
     @property
     def _fps(self) -> float:
-        return CUES_FPS if self.settings.fps is None else self.settings.fps
+        return self.settings.outputs.fps or CUES_FPS

@@ -56,18 +56,18 @@ class MotionOutput(Output):
 
     def check(self) -> None:  # noqa: D102
         settings = self.settings
-        check_rate(self.path, settings.rate_hz)
+        check_rate(self.path, settings.outputs.rate_hz)
 
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         settings = self.settings
-        spoken, chosen, asked = performance.once(_chosen)
+        spoken, chosen, asked = performance.cached(_chosen)
         lives = motion_format(self.path).curves in LIVING_SETS or settings.curves in LIVING_SETS
-        prosody = performance.once(recorded_prosody) if lives else None
-        named = settings.channels
-        held = in_format(self.path, spoken, chosen, settings.rate_hz, settings.staging, prosody, named)
+        prosody = performance.cached(recorded_prosody) if lives else None
+        rate_hz, named = settings.outputs.rate_hz, settings.outputs.channels
+        held = in_format(self.path, spoken, chosen, rate_hz, settings.staging, prosody, named)
         warn_of_unused(self.path, held, asked)
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
-        held = held_mouth(held, frames, performance.once(_closed_s))
+        held = held_mouth(held, frames, performance.cached(_closed_s))
         if motion_format(self.path).keyed and settings.delivery.key_tolerance:
             held = thinned(held, Thinning(settings.delivery.key_tolerance, tuple(closed_times(held))))
         check_motion(self.path, held.motion)
@@ -106,26 +106,26 @@ def thinned(held: Generation, thinning: Thinning) -> Generation:
 def _delivered(performance: Performance) -> Generation:
     """Return the motion as delivered, with the articulatory channels that were asked for."""
     generation, settings = performance.generation, performance.settings
-    if {*(settings.channels or ())} & {*GESTURES}:
-        generation = with_articulation(generation, settings.channels or ())
+    if {*settings.outputs.channels} & {*GESTURES}:
+        generation = with_articulation(generation, settings.outputs.channels)
     return delivered(generation, settings.delivery)
 
 
 def _closed_s(performance: Performance) -> list[float]:
     """Return the times of p, b and m that held poses show; none, where poses are not held."""
-    return closed_times(performance.once(_delivered)) if performance.settings.delivery.hold_ms else []
+    return closed_times(performance.cached(_delivered)) if performance.settings.delivery.hold_ms else []
 
 
 def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[str]]:
     """Return the motion, what motion files hold of it unless their format says more, and the channels asked for."""
-    settings, spoken = performance.settings, performance.once(_delivered)
-    rate_hz, curves, channels = settings.rate_hz, settings.curves, settings.channels
-    if rate_hz is not None and (performance.once(_closed_s) or rate_hz < spoken.motion.rate_hz):
+    settings, spoken = performance.settings, performance.cached(_delivered)
+    rate_hz, curves, channels = settings.outputs.rate_hz, settings.curves, settings.outputs.channels or None
+    if rate_hz is not None and (performance.cached(_closed_s) or rate_hz < spoken.motion.rate_hz):
         spoken = closed_on_grid(spoken, rate_hz)
     asked: Sequence[str] = channels or ()
     names: Sequence[str] | None = channels
     if curves is not None:
-        prosody = performance.once(recorded_prosody) if curves in LIVING_SETS else None
+        prosody = performance.cached(recorded_prosody) if curves in LIVING_SETS else None
         spoken, found = with_curves(spoken, curves, staging=settings.staging, prosody=prosody)
         asked = asked if channels or isinstance(curves, DrivenCharacter) else found
         names = found if channels is None else channels

@@ -12,10 +12,10 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
 from lipmotion.formats.cues import read_cue_motion
-from lipmotion.formats.label_files import read_units
 from lipmotion.meshes.files.steady_rate import rate_in_step
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace
+from lipmotion.pipeline.understand.read_request import read_units
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")
 TOLERATED_S = 0.1
@@ -29,11 +29,14 @@ STATE = "file"
 """The state of every frame of motion that was read."""
 
 
-def read_generation(path: str | Path, units: str | Path | None = None, rate_hz: float | None = None) -> Generation:
+def read_generation(
+    path: str | Path, units: str | Path | Timeline[Unit] | None = None, rate_hz: float | None = None
+) -> Generation:
     """Return the motion of a file as ``write`` takes it: with its phones, if it has them, and without variance.
 
     path  : ``.json``, ``.csv``, ``.npz``, or another motion file that can be read
-    units : a file with phones in time (``read_units``), for motion files that have none; None: those of the motion file
+    units : phones in time, or a file with them (``read_units``), for motion files that have none; None: those of the
+            motion file
     rate_hz : frames a second, where the file states them wrong, or not at all, as Moho's ``.dat``; None: as it says
     Blendshapes, visemes, vowels and moods count as weights, whatever unit the file gives them.
     Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
@@ -51,7 +54,7 @@ def read_generation(path: str | Path, units: str | Path | None = None, rate_hz: 
     lasts_s = (len(motion.values) - 1) / motion.rate_hz
     if lasts_s > LONGEST_S:
         raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
-    phones = found if units is None else read_units(units)
+    phones = found if units is None else read_units(units) if isinstance(units, str | Path) else units
     channels = tuple(
         Channel(each.name, WEIGHT)
         if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))

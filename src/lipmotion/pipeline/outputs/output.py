@@ -7,7 +7,7 @@ A new kind is a class of ``Output`` in a module of its own, and a line in ``OUTP
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,7 +16,7 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.pipeline.job import RATE, Jaw, Mark, Overlay, Refinement
+from lipmotion.pipeline.request import Outputs
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.staging import Staging
@@ -26,34 +26,6 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
 
 Made = TypeVar("Made")
-
-
-@dataclass(frozen=True)
-class FilmOptions:
-    """How a filmed face is shown.
-
-    background : footage of the same person into which mouth and jaw are stitched; None: the one in the face's file
-    jaw        : what the jaw follows: the motion, the energy of the sound (Xie & Liu 2007, §6.2), or the background's
-                 own motion (``none``)
-    overlay    : the aid to lip-reading: on the speech's own video, a large mouth in a corner (``inset``) or over the
-                 speaker's own (``mouth``); None: no such video is needed
-    mark       : how the video says that it is synthetic: in its metadata, there and in a corner of the picture
-                 (``visible``), or not at all (docs/consent.md)
-    refinement : detail of the mouth: ``steady``, or of the nearest picture, as in the paper (``paper``)
-
-    >>> import lipmotion
-    >>> lipmotion.FilmOptions(jaw="none").mark
-    'metadata'
-    """
-
-    background: Path | None = None
-    jaw: Jaw = "motion"
-    overlay: Overlay | None = None
-    mark: Mark = "metadata"
-    refinement: Refinement = "steady"
-
-
-FILM = FilmOptions()
 
 
 class ShownFace(ABC):
@@ -105,30 +77,23 @@ class ShownFace(ABC):
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """What outputs hold, and how they show it.
+    """What outputs hold, and how they show it: known, and checked, before there is motion.
 
     face      : of videos and scenes, from ``shown_face``
+    outputs   : rates, channels, and how a filmed face is shown; a ``background`` there is footage
+    staging, delivery : as of ``write``
+    curves    : what motion files hold instead of the motion; None: nothing
     recording : the file that was, or will be, animated; None: there is none
     sounded   : whether there is, or will be, a sound that is in no file
-    channels, curves, rate_hz, fps, film, staging, delivery : as of ``write``
-    Raises InputError: a frame rate out of its range.
     """
 
     face: ShownFace
     recording: Path | None = None
     sounded: bool = False
-    channels: tuple[str, ...] | None = None
+    outputs: Outputs = field(default_factory=Outputs)
     curves: str | Path | DrivenCharacter | None = None
-    rate_hz: float | None = None
-    fps: float | None = None
-    film: FilmOptions = FILM
     staging: Staging = field(default_factory=Staging)
     delivery: Delivery = field(default_factory=Delivery)
-
-    def __post_init__(self) -> None:
-        for hertz in (self.fps, self.rate_hz):
-            if hertz is not None and not RATE.allows(hertz):
-                raise InputError(f"the frame rate is {hertz}, required {RATE.words}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,18 +111,18 @@ class Performance:
     sound_file: Path | None = None
     model: Model | None = None
     monitor: Monitor = silent_monitor
-    _kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+    _cache: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def speech(self) -> Path | Audio | None:
         """The sound, or else the recording; None: there is neither."""
         return self.sound or self.settings.recording
 
-    def once(self, make: Callable[[Performance], Made]) -> Made:
+    def cached(self, make: Callable[[Performance], Made]) -> Made:
         """Return what a function makes of this performance; outputs that need the same share it."""
-        if make not in self._kept:
-            self._kept[make] = make(self)
-        made: Made = self._kept[make]
+        if make not in self._cache:
+            self._cache[make] = make(self)
+        made: Made = self._cache[make]
         return made
 
 
@@ -193,10 +158,6 @@ class Output(ABC):
         Raises ExportError or InputError: the motion does not suit the file. So nothing is written if one of several
         outputs cannot be.
         """
-
-    def write(self, performance: Performance) -> None:
-        """Write the file. Raises ExportError: it cannot be written, or the motion does not suit it."""
-        self.prepared(performance)()
 
 
 _HERE = "lipmotion.pipeline.outputs"
@@ -241,12 +202,6 @@ def checked_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> li
         check_target(output.path, settings.recording)
         output.check()
     return planned
-
-
-def perform(performance: Performance, planned: Sequence[Output]) -> None:
-    """Write outputs; nothing, if the motion does not suit one of them. Raises ExportError: one cannot be written."""
-    for write_file in [output.prepared(performance) for output in planned]:
-        write_file()
 
 
 def _kinds() -> list[type[Output]]:

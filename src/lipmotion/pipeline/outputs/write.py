@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,12 @@ from lipmotion.formats.sound import SOUND_CODECS, write_sound
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import (
-    FILM,
-    FilmOptions,
     Output,
     OutputSettings,
     Performance,
     checked_outputs,
-    perform,
 )
+from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
 from lipmotion.types.staging import Staging
 
@@ -63,7 +62,7 @@ def write(  # noqa: PLR0913
     rate_hz: float | None = None,
     fps: float | None = None,
     face: Any = "portrait",
-    film: FilmOptions = FILM,
+    film: Outputs | None = None,
     staging: Staging | None = None,
     delivery: Delivery | None = None,
     curves: str | Path | DrivenCharacter | None = None,
@@ -87,7 +86,7 @@ def write(  # noqa: PLR0913
     face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
                filmed face (a value or a ``.face`` file), which is written as ``.mp4``. ``.glb`` and ``.usda`` hold the
                character of a ``MeshFace``, or else the 3D head
-    film     : how a filmed face is shown
+    film     : how a filmed face is shown: its background, jaw, overlay, mark, refinement; None: the defaults
     staging  : size and background of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
     delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: the
@@ -109,15 +108,13 @@ def write(  # noqa: PLR0913
     time_s,opening,width
     """
     sound = speech if isinstance(speech, Audio) else None
+    how = replace(film or Outputs(), channels=tuple(channels or ()), rate_hz=rate_hz, fps=fps)
     settings = OutputSettings(
         provided("shown_face")(face),
         None if speech is None or sound is not None else Path(str(speech)),
         sound is not None,
-        None if channels is None else tuple(channels),
+        how,
         curves,
-        rate_hz,
-        fps,
-        film,
         staging or Staging(),
         delivery or Delivery(),
     )
@@ -142,4 +139,6 @@ def write_planned(
     """
     sounds = (output.path for output in planned if isinstance(output, SoundOutput))
     sound_file = next(sounds, None) if settings.recording is None or temporary else settings.recording
-    perform(Performance(generation, settings, sound, sound_file, model, monitor), planned)
+    performance = Performance(generation, settings, sound, sound_file, model, monitor)
+    for write_file in [output.prepared(performance) for output in planned]:  # nothing, if the motion does not suit one
+        write_file()

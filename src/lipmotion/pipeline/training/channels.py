@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError, shortened
 from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
+from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
 from lipmotion.printable import printable
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Channel, Motion, Track, Utterance
 
 LOG = logging.getLogger("lipmotion")
-GEOMETRY, EIGENLIPS, BOTH = "geometry", "eigenlips", "both"
-VISUALS = (GEOMETRY, EIGENLIPS, BOTH)
-"""Tracked or supplied channels; coefficients of mouth pictures (eigenlips); the former followed by the latter."""
 PICTURES = 980
 """Number of mouth pictures that eigenlips are trained on. Source: Xie & Liu 2007, §5."""
 

@@ -16,8 +16,7 @@ from lipmotion.engines import Engine
 from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import blas_kernels
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.storage.files import sha256_of
 from lipmotion.units import Lexicon

@@ -21,10 +21,8 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import model_motion
 from lipmotion.motion.speaker_maps import SpeakerMaps, mean_person_examples, with_habits
-from lipmotion.pipeline.generate.prior import with_prior
-from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
 from lipmotion.pipeline.training.channels import (
-    GEOMETRY,
     check_visual,
     train_eigenlips,
     with_common_channels,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from pathlib import Path
+from typing import cast
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.understand.read_request import lexicon_of
 from lipmotion.pipeline.understand.spoken_language import english_spoken
 from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
@@ -20,8 +21,8 @@ from lipmotion.units.text_normalisation import written_words
 LOG = logging.getLogger("lipmotion")
 
 
-def in_language(request: SpeechRequest) -> SpeechRequest:
-    """Return a request whose words are those of its language, with the lexicon that pronounces them.
+def in_language(request: Request) -> Request:
+    """Return a request, of ``read_request``, whose words are those of its language, with the lexicon that has them.
 
     A request in English stays as it is. ``AUTO`` stays where the speech is known not to be English, and no more.
     Raises InputError: the transcript cannot be read, or has words that nobody pronounces. Raises
@@ -29,23 +30,20 @@ def in_language(request: SpeechRequest) -> SpeechRequest:
     """
     if request.language == ENGLISH:
         return request
-    given = request.transcript
-    if isinstance(given, Path) or (isinstance(given, str) and ":" in given):
-        from lipmotion.formats.label_files import read_transcript  # forty formats
-
-        given = read_transcript(given)
-    transcript = _plain_transcript(given) if isinstance(given, str) else given
+    transcript = cast("str | TimedTranscript | None", request.transcript)
+    if isinstance(transcript, str):
+        transcript = _plain_transcript(transcript)
     language = request.language if request.language != AUTO else _told(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)
-    lexicon = LanguageLexicon(request.lexicon.user if request.lexicon else {}, language)
+    lexicon = LanguageLexicon(lexicon_of(request).user, language)
     if transcript is not None and request.units is None:
         transcript = transcript.with_words(lambda word: written_words(word) if any(map(str.isalnum, word)) else ())
         lexicon = lexicon.with_words(transcript.words)
     return replace(request, language=language, transcript=transcript, lexicon=lexicon)
 
 
-def _told(request: SpeechRequest, transcript: TimedTranscript | None) -> str:
+def _told(request: Request, transcript: TimedTranscript | None) -> str:
     """Return the language of a request that names none; a warning says which.
 
     Without a transcript: ``AUTO``, where it is not English; English also where it is not known, as without the option.

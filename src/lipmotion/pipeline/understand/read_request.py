@@ -1,64 +1,80 @@
-"""Requests from files: of a job's request, the ``SpeechRequest``; a transcript is a text, or the path of a file."""
+"""Requests from files: what a request names is read here, and nowhere else.
+
+Formats of labels and of motion are imported where such a file is read: most requests have none.
+"""
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import labels_beside, read_transcript, read_units, speakers_in
-from lipmotion.pipeline.job import Request
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import check_kind
-from lipmotion.types import TimedTranscript
+from lipmotion.types import TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon
 
+LABEL_SUFFIXES = (".textgrid", ".eaf", ".lab", ".phn", ".txt", ".json", ".jsonl", ".marks", ".csv", ".tsv")
+"""Suffixes of label files, in lower case; their content decides which form they have. ``.json`` and ``.csv`` may also
+be motion."""
 LONGEST_NAME, LONGEST_PATH = 255, 1000
 """Most bytes of the name of a file on any usual system; most letters of an argument that may be a path."""
 _SUFFIX = re.compile(r"\.[A-Za-z]{1,10}")
 
 
-def read_request(request: Request, *, words_beside: bool = False) -> SpeechRequest:
-    """Return what is animated, with the content of its files.
+def read_request(request: Request, *, words_beside: bool = False, is_typed: bool = True) -> Request:
+    """Return a request with the content of the files that it names; what is a value already stays.
 
     words_beside : use the text, subtitles or labels beside the recording, where no words and no phones are given
+    is_typed     : whether a transcript that is a text may be the name of a file, as what a user types
     Raises InputError: no recording is named, or a file cannot be read.
     """
     if request.recording is None:
         raise InputError("the job names no recording; required: [request] recording = 'FILE'")
-    spoken_by = _speaker_of_labels(request)
-    given = request.transcript
-    transcript = text_or_file_content(given, request.tier, spoken_by) if given is not None else None
-    units = read_units(request.units, request.tier, spoken_by) if request.units else None
-    labels = labels_beside(request.recording) if words_beside and transcript is None and units is None else None
-    if labels is not None:
-        transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
-    return SpeechRequest(
-        request.recording,
+    transcript, units = request.transcript, request.units
+    spoken_by = _speaker_of_labels(request, is_typed=is_typed)
+    if is_typed and isinstance(transcript, str):
+        transcript = text_or_file_content(transcript, request.tier, spoken_by)
+    elif isinstance(transcript, Path) or (isinstance(transcript, str) and ":" in transcript):  # perhaps subtitles
+        transcript = _read_words(transcript, request.tier, spoken_by)
+    if isinstance(units, Path):
+        units = read_units(units, request.tier, spoken_by)
+    if words_beside and transcript is None and units is None and isinstance(request.recording, Path):
+        from lipmotion.formats.label_files import labels_beside
+
+        labels = labels_beside(request.recording)
+        if labels is not None:
+            transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
+    return replace(
+        request,
         transcript=transcript,
         units=units,
-        lexicon=read_lexicon(request),
-        language=request.language,
-        recogniser=request.recogniser,
+        lexicon=None if request.lexicon is None else lexicon_of(request),
         speaker="" if spoken_by else request.speaker,
-        onto=request.onto,
-        onto_speaker=request.onto_speaker,
-        pauses=request.pauses,
-        manner=request.manner,
-        asymmetry=request.asymmetry,
     )
 
 
-def read_lexicon(request: Request) -> Lexicon | None:
-    """Return the pronunciations that a request names; None: it names none. Raises InputError: they cannot be read."""
-    return Lexicon.from_file(request.lexicon) if request.lexicon else None
+def lexicon_of(request: Request) -> Lexicon:
+    """Return the pronunciations of a request; those of the dictionary alone, where it has none.
+
+    Raises InputError: its file cannot be read.
+    """
+    lexicon = request.lexicon
+    return Lexicon.from_file(lexicon) if isinstance(lexicon, str | Path) else lexicon or Lexicon()
 
 
-def _speaker_of_labels(request: Request) -> str:
+def _speaker_of_labels(request: Request, *, is_typed: bool) -> str:
     """Return the speaker of a request if its labels have one of that name: it then is whose words are read."""
-    files = (Path(name) for name in (request.transcript, request.units) if name is not None and request.speaker)
-    named = (name.lower() for file in files if _file_exists(file) for name in speakers_in(file))
-    return request.speaker if request.speaker.lower() in named else ""
+    named = (request.transcript, request.units) if request.speaker else ()
+    kinds = (str, Path) if is_typed else Path
+    files = [Path(name) for name in named if isinstance(name, kinds) and _file_exists(Path(name))]
+    if not files:
+        return ""
+    from lipmotion.formats.label_files import speakers_in
+
+    speakers = (name.lower() for file in files for name in speakers_in(file))
+    return request.speaker if request.speaker.lower() in speakers else ""
 
 
 def text_or_file_content(argument: str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
@@ -72,8 +88,16 @@ def text_or_file_content(argument: str, tier: str = "", speaker: str = "") -> st
     looks_like_path = _may_be_name(argument) and (_SUFFIX.fullmatch(path.suffix) or _is_in_a_folder(argument))
     if not looks_like_path and not _file_exists(path):
         return argument
-    check_kind(path, "text", "transcript")
-    return read_transcript(path, tier, speaker)
+    return _read_words(path, tier, speaker)
+
+
+def _read_words(words: Path | str, tier: str, speaker: str) -> str | TimedTranscript:
+    """Return the words of a file, or of a text that may be subtitles."""
+    from lipmotion.formats.label_files import read_transcript
+
+    if isinstance(words, Path):
+        check_kind(words, "text", "transcript")
+    return read_transcript(words, tier, speaker)
 
 
 def _may_be_name(argument: str) -> bool:
@@ -102,3 +126,27 @@ def _file_exists(path: Path) -> bool:
         return path.exists() and not path.is_dir()
     except (OSError, ValueError):  # too long for a file name, or with a character that no file name has
         return False
+
+
+def read_units(path: str | Path, tier: str = "", speaker: str = "") -> Timeline[Unit]:
+    """Return the phones in time of a file.
+
+    path : a motion file (``.json``, ``.npz``); a ``.json`` with the member ``units`` alone; or any file of labels that
+           corpora may have (``LABEL_SUFFIXES``): a TextGrid with a tier of phones, Audacity's or HTK's labels, the
+           timings of a voice or an aligner
+    tier, speaker : of labels, which tier and whose phones (``read_phones``)
+    Raises InputError: no such file, not one of these, or without phones.
+    """
+    from lipmotion.formats.base import motion_suffix
+    from lipmotion.formats.base import read_units as read_units_of_motion
+    from lipmotion.formats.label_files import holds_timings, read_phones
+
+    path = Path(path)
+    check_kind(path, "motion file", "units file")
+    is_label = path.suffix.lower() in LABEL_SUFFIXES
+    if motion_suffix(path) and not (is_label and holds_timings(path)):
+        return read_units_of_motion(path)
+    if is_label:
+        return read_phones(path, tier, speaker)
+    required = "use one of .json, .npz, .TextGrid, .eaf, .lab, .txt, .jsonl, .marks"
+    raise InputError(f"{path}: cannot read phones from {path.suffix!r}; {required}")

@@ -9,17 +9,16 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.pipeline.generate.prior import with_prior
-from lipmotion.pipeline.job import DETECTED
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.model import Model, with_prior
+from lipmotion.pipeline.request import DETECTED, Request
+from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.pipeline.understand.spoken_language import warn_of_another_language
 from lipmotion.pipeline.understand.transcribe import (
     heard_phones,
@@ -79,7 +78,6 @@ from lipmotion.types.moods import MoodTag
 from lipmotion.units import (
     SILENCE,
     UNKNOWN_PHONES,
-    Lexicon,
     check_phones,
     check_text,
     is_silent,
@@ -139,7 +137,7 @@ class UnderstoodSpeech:
         return not self.speech.units_known and self.speech_s < LEAST_SPEECH_S
 
 
-def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) -> Speech:
+def understand(model: Model, request: Request, each: ParallelMap = map) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
     each : applies a function to many items, perhaps in several processes
@@ -150,12 +148,13 @@ def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) ->
 
 
 def understood_speech(
-    model: Model, request: SpeechRequest, each: ParallelMap = map, monitor: Monitor = silent_monitor
+    model: Model, request: Request, each: ParallelMap = map, monitor: Monitor = silent_monitor
 ) -> UnderstoodSpeech:
     """Return the speech of a request as ``understand`` does, with what was recognised.
 
     monitor : receives reports of the progress; the share is that of recognition, up to ``WORDS[1]``
     """
+    request = read_request(request, is_typed=False)
     monitor(Progress("reading the sound", 0, 1, 0.0))
     audio = analysed(audio_of(request))
     monitor(Progress("recognising phones", 0, 1, 0.02))
@@ -207,7 +206,7 @@ def _detected(understood: UnderstoodSpeech, audio: AnalysedAudio) -> UnderstoodS
     return replace(understood, speech=speech, events=events)
 
 
-def prepare_search(request: SpeechRequest) -> None:
+def prepare_search(request: Request) -> None:
     """Load the words that are searched where a phone recogniser decides; they are then there when it is done."""
     is_searched = request.transcript is None and request.units is None and request.language == ENGLISH
     if is_searched and network_of(request.recogniser) is not None:
@@ -235,7 +234,7 @@ def known_voice(
 
 def aligned_within(
     model: Model,
-    request: SpeechRequest,
+    request: Request,
     audio: AnalysedAudio,
     word: str,
     start_s: float,
@@ -253,7 +252,7 @@ def aligned_within(
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
     (first, stop), lexicon = (
         (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
-        request.lexicon or Lexicon(),
+        lexicon_of(request),
     )
     words = checked_tokens(word)
     warn_of_guesses(words, lexicon)
@@ -290,7 +289,7 @@ def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> Paralle
     return mapped
 
 
-def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each: ParallelMap) -> UnderstoodSpeech:
+def _understood(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> UnderstoodSpeech:
     """Return the speech of a request, without what the model that this one stands on makes of it."""
     kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
     if request.recogniser not in kinds:
@@ -315,12 +314,11 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
         units, fit = _followed(model, request, audio, phones.kind, lambda: recognised().units)
         speech = speech_of(model.engine, audio, features, units, phones.kind, each)
         return UnderstoodSpeech(replace(speech, times_given=True), None, range_db, fit)
-    words = _words(request.transcript, audio.duration_s)
+    words = _words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     if words is not None:
-        lexicon = request.lexicon or Lexicon()
-        said, fit = transcribe(phones, audio, features, words, lexicon, lambda: recognised().units)
+        said, fit = transcribe(phones, audio, features, words, lexicon_of(request), lambda: recognised().units)
         if said is not None:
             speech = speech_of(model.engine, audio, features, said, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
@@ -328,7 +326,7 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
     return UnderstoodSpeech(recognised(), found[0] if found else None, range_db, fit)
 
 
-def audio_of(request: SpeechRequest) -> Audio:
+def audio_of(request: Request) -> Audio:
     """Return the samples of a request's recording. Raises InputError: it cannot be read."""
     recording = request.recording
     if isinstance(recording, Audio):
@@ -448,18 +446,11 @@ def recognised_speech(
     return with_units(speech, joined_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
 
 
-def _words(
-    transcript: str | Path | TimedTranscript | None, duration_s: float
-) -> tuple[str, ...] | TimedTranscript | None:
+def _words(text: str | TimedTranscript | None, duration_s: float) -> tuple[str, ...] | TimedTranscript | None:
     """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
-    text = transcript
-    if isinstance(text, Path) or (isinstance(text, str) and ":" in text):  # a file, or perhaps subtitles
-        from lipmotion.formats.label_files import read_transcript  # forty formats
-
-        text = read_transcript(text)
     if text is None or isinstance(text, TimedTranscript):
         return text
-    if text is transcript and "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
+    if "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
     plain, tags = tagged_text(text)
@@ -468,7 +459,7 @@ def _words(
 
 
 def _followed(
-    model: Model, request: SpeechRequest, audio: AnalysedAudio, kind: str, recognised: Callable[[], Timeline[Unit]]
+    model: Model, request: Request, audio: AnalysedAudio, kind: str, recognised: Callable[[], Timeline[Unit]]
 ) -> tuple[Timeline[Unit], TranscriptFit | None]:
     """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
 
@@ -476,7 +467,7 @@ def _followed(
     Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
     else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
     """
-    given = request.units or Timeline(())
+    given = cast("Timeline[Unit]", request.units)  # of ``read_request``
     _check_units(given, audio.duration_s)
     spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
     for span in (span for span in given if span.start_s < audio.duration_s):

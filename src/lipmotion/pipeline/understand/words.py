@@ -9,7 +9,7 @@ from typing import Any
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand.request import SpeechInput, request_of
+from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import analysed
@@ -29,7 +29,7 @@ LINE_PAUSE_S = 0.5
 def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = None, workers: int = 1) -> Recognition:
     """Return the English words of a recording in time, with the phones that they or free recognition decided.
 
-    speech  : an audio or video file, samples at 16 kHz, or a ``SpeechRequest``, of which the transcript is not used
+    speech  : an audio or video file, samples at 16 kHz, or a ``Request``, of which the transcript is not used
     model   : whose phone models align the words: from ``load_model``, or a path; None: the shipped one
     workers : as of ``animate``
     Raises InputError: the recording is not usable, or the recogniser does not recognise words.
@@ -40,8 +40,8 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     >>> found.words[0].label.text, found.word_s > found.phone_s
     ('please', True)
     """
-    chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech)
+    chosen = model if isinstance(model, Model) else load_model(model or request.model)
     if request.recogniser in WITHOUT_WORDS:
         raise InputError(
             f"the recogniser {request.recogniser!r} recognises phones, not words; required one of: "

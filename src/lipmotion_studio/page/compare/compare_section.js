@@ -1,7 +1,6 @@
 // The part of the panel that compares: with what, how, and a blind comparison.
 
-import { iconButton, made, textButton } from "../dom.js";
-import { row, section } from "../panel/panel.js";
+import { iconButton, made, row, section, textButton } from "../dom.js";
 import { TEXT, filled } from "../strings.js";
 import { OTHER } from "./comparison.js";
 

@@ -1,9 +1,8 @@
 // How the motion is delivered: fields from the forms of the server.
 
-import { choice, labelled, made } from "../dom.js";
+import { choice, labelled, made, section } from "../dom.js";
 import { placed, say } from "../sentences.js";
 import { TEXT } from "../strings.js";
-import { section } from "./panel.js";
 
 /** A range wider than this has a field of numbers. */
 const WIDEST_SLIDER = 10;

@@ -1,9 +1,8 @@
 // What is selected, and what can be done to it.
 
-import { choice, labelled, made, textButton } from "../dom.js";
+import { choice, following, labelled, made, row, section, textButton } from "../dom.js";
 import { placed, say } from "../sentences.js";
 import { TEXT, filled } from "../strings.js";
-import { following, row, section } from "./panel.js";
 
 const MOST_GAIN = 2;
 /** Moods that have no strength. */

@@ -1,9 +1,8 @@
 // The edits of the line, newest first, and the comparison with another motion.
 
 import { compareSection } from "../compare/compare_section.js";
-import { made, textButton } from "../dom.js";
+import { made, row, section, textButton } from "../dom.js";
 import { TEXT } from "../strings.js";
-import { row, section } from "./panel.js";
 
 export function historyTab(studio) {
   const { line } = studio.store;

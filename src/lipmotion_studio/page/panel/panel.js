@@ -49,16 +49,3 @@ export class Panel {
     });
   }
 }
-
-/** A part of a panel under a heading. */
-export const section = (title, ...children) => made("section", {}, title && made("h2", { textContent: title }), ...children.filter(Boolean));
-
-export const row = (...children) => made("div", { className: "row" }, ...children.filter(Boolean));
-
-/** Element that shows something at the playhead: `follow` runs when it moves, and now. */
-export function following(element, follow) {
-  element.dataset.follows = "";
-  element.follow = () => follow(element);
-  follow(element);
-  return element;
-}

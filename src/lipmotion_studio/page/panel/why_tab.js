@@ -1,8 +1,7 @@
 // Why the mouth is as it is at the playhead, and the moments that are in doubt.
 
-import { made, textButton } from "../dom.js";
+import { following, made, row, section, textButton } from "../dom.js";
 import { TEXT, filled } from "../strings.js";
-import { following, row, section } from "./panel.js";
 
 const SETTLED_MS = 120, FACTS = ["word", "phone", "unit", "state", "experts", "confidence"];
 
