@@ -1,4 +1,4 @@
-"""Settings of the documentation site, which ``make site`` builds (docs/decisions/0024-documentation-site.md).
+"""Settings of the documentation site, which ``make site`` builds (docs/decisions/studies-and-pages.md).
 
 Sphinx reads the repository as it lies, so that links between pages are the same here, on the web and on GitHub. What
 the sidebar shows, and in which order, is said by docs/index.md alone. Nothing of this file needs Sphinx but ``setup``.

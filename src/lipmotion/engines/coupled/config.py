@@ -20,7 +20,7 @@ COUNT, MIXTURES, WEIGHT = Rule(least=1), Rule(least=1, power_of_two=True), Rule(
 
 @dataclass(frozen=True)
 class CoupledConfig(Configuration):
-    """How the coupled engine models speech and lips (chosen on the validation list; see docs/decisions/0010).
+    """How the coupled engine models speech and lips (chosen on the validation list; see docs/decisions/engines.md).
 
     structure  : ``hmm``, ``multistream``, ``factorial`` or ``coupled`` (``presets`` has the paper's six systems)
     chains     : the unit set of each chain, separated by blanks: names or table files; the first chain emits speech

@@ -41,7 +41,7 @@ POSITIVE, ODD = Rule(above=0), Rule(least=1, odd=True)
 
 @dataclass(frozen=True)
 class TrajectoryConfig(Configuration):
-    """Options of the trajectory engine; the default values were chosen on the validation list (docs/decisions/0009).
+    """Options of the trajectory engine; defaults were chosen on the validation list (docs/decisions/motion.md).
 
     states, silent_states : states of a phone, and of a silence; odd numbers
     edge_s     : longest duration of a state before or after the middle one, seconds

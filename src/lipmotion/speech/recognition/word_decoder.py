@@ -23,7 +23,7 @@ VARIANT = re.compile(r"\(\d+\)$")
 """The number of a pronunciation behind a word."""
 OPTIONS = {"fwdflat": False, "maxhmmpf": 10_000}
 """One pass over the tree of all words finds more phones, and faster, than with a second one over the words that it
-found (decision 13)."""
+found (docs/decisions/recognition.md)."""
 _LOCK = threading.Lock()
 """A decoder works on one recording at a time."""
 
@@ -33,7 +33,7 @@ def words_in(samples: bytes) -> tuple[FoundWord, ...]:
 
     samples : 16-bit integers at 16 kHz
     The words are those of the best path of the search. Their posteriors are those of the best path through its lattice,
-    0 where that has another word: it finds fewer words (decision 13), but knows how many others were possible.
+    0 where that has another word: it finds fewer words, but knows how many others were possible.
     Raises MissingDependencyError: pocketsphinx is not installed, or without its language model.
     """
     decoder = _decoder()

@@ -121,7 +121,7 @@ class WordSearch:
 
 
 def confidence_of(fit: float, posterior: float) -> float:
-    """Return the probability that a word is right, 0 to 1: a logistic regression on some hundred words (decision 13).
+    """Return the probability that a word is right, 0 to 1: by logistic regression (docs/decisions/recognition.md).
 
     fit       : of the word (``AlignedWords.fits``), in nats
     posterior : among the words of the search
