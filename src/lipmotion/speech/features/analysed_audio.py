@@ -11,11 +11,19 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import smooth_level, spoken_frames
-from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count, log_energy, mfcc_of_warps
+from lipmotion.hmm.loudness import power_level, smooth_level, sound_runs, spoken_frames
+from lipmotion.speech.features.mfcc import HOP, WINDOW, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import CEPSTRA, general_features
-from lipmotion.speech.sound.voice_activity import Stretch, fill_gaps, find_passages, find_tones, level_passage
+from lipmotion.speech.sound.voice_activity import (
+    SEPARATE_FRAMES,
+    SOFTEST_DROP,
+    Stretch,
+    fill_gaps,
+    find_passages,
+    find_tones,
+    level_passage,
+)
 from lipmotion.types import Audio, Features
 
 MadeT = TypeVar("MadeT")
@@ -53,32 +61,54 @@ class AnalysedAudio(Audio):
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         """The passages of the recording, in order; none where nothing can be said in it."""
-        recorded, energy = self.samples, self._recorded_energy
-        if self.tones:
-            recorded = recorded.copy()
-            for first, end in self.tones:
-                recorded[max(first - 1, 0) * HOP : end * HOP] = 0
-            energy = log_energy(recorded)
-        found = find_passages(energy)
-        bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(found)), self.frames]
+        found = [(piece, stretch) for piece in self._pieces for stretch in piece.passages]
+        stretches = [Stretch(piece.frame + first, piece.frame + end) for piece, (first, end) in found]
+        bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(stretches)), self.frames]
         passages = []
-        for number, (first, end) in enumerate(found):
-            level, samples = energy[first:end], recorded[first * HOP : end * HOP]
+        for number, (piece, (first, end)) in enumerate(found):
+            level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
             samples = level_passage(fill_gaps(samples, level), level)
             sound = spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
             padded = _PassageAudio(np.pad(samples, (lead * HOP, tail * HOP)), self.rate_hz, lead=lead, tail=tail)
-            passages.append(Passage(first - lead, slice(bounds[number], bounds[number + 1]), padded))
+            own = slice(bounds[number], bounds[number + 1])
+            passages.append(Passage(stretches[number].first - lead, own, padded))
         return tuple(passages)
 
-    @cached_property
+    @property
     def tones(self) -> list[Stretch]:
         """Where a steady tone covers what is said; its frames count as silence."""
-        return find_tones(self.samples, self._recorded_energy)
+        found = {Stretch(each.frame + first, each.frame + end) for each in self._pieces for first, end in each.tones}
+        return sorted(found)
 
     @cached_property
-    def _recorded_energy(self) -> NDArray[np.float32]:
-        return log_energy(checked_samples(self))
+    def _pieces(self) -> list[_Piece]:
+        """What lies between digital silences, in order: each is a recording of its own, with frames of its own."""
+        pieces, waiting = [], [(0, checked_samples(self))]
+        while waiting:
+            start, samples = waiting.pop()
+            heard = samples != 0
+            first, end = int(heard.argmax()), len(heard) - int(heard[::-1].argmax())
+            if end - first < WINDOW or not heard[first]:
+                continue
+            start, samples, heard = start + first, samples[first:end], heard[first:end]
+            piece = _Piece((start + HOP // 2) // HOP, samples, log_energy(samples))
+            if tones := find_tones(samples, piece.energy):
+                samples = samples.copy()
+                for tone in tones:
+                    samples[max(tone.first - 1, 0) * HOP : tone.end * HOP] = 0
+                waiting.append((start, samples))
+                pieces.append(piece._replace(tones=tones))
+                continue
+            found = find_passages(piece.energy)
+            cuts = _silences_beside(found, heard)
+            waiting += [(start + cut, samples[cut:stop]) for cut, stop in pairwise([0, *cuts, len(samples)]) if cuts][
+                ::-1
+            ]
+            pieces.append(piece._replace(passages=[] if cuts else found))
+        levels = [power_level(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
+        least = max(levels, default=0) - SOFTEST_DROP
+        return [piece for piece, level in zip(pieces, levels, strict=True) if level >= least or piece.tones]
 
     @property
     def is_passage(self) -> bool:
@@ -164,6 +194,33 @@ class Passage(NamedTuple):
     first: int
     own: slice
     audio: AnalysedAudio
+
+
+class _Piece(NamedTuple):
+    """The sound between two digital silences, without what is before and after it.
+
+    frame    : of the recording, in which it begins
+    energy   : the log energy of its frames [shape=(T,)]
+    passages : what is said in it, in its frames;  tones : where it is a steady tone
+    """
+
+    frame: int
+    samples: NDArray[np.float32]
+    energy: NDArray[np.float32]
+    passages: Sequence[Stretch] = ()
+    tones: Sequence[Stretch] = ()
+
+
+def _silences_beside(passages: Sequence[Stretch], heard: NDArray[np.bool_]) -> list[int]:
+    """Return a sample of each digital silence before, after and between passages that is long enough to part them.
+
+    heard : whether a sample is not 0 [shape=(N,)]
+    """
+    silent = ~heard[: len(heard) // HOP * HOP].reshape(-1, HOP).any(axis=1)
+    for first, end in passages:
+        silent[first:end] = False
+    runs = sound_runs(silent, 1) if passages else []
+    return [(first + end) // 2 * HOP for first, end in runs if end - first >= SEPARATE_FRAMES]
 
 
 @dataclass(frozen=True, eq=False)
