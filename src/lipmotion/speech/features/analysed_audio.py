@@ -87,25 +87,23 @@ class AnalysedAudio(Audio):
         pieces, waiting = [], [(0, checked_samples(self))]
         while waiting:
             start, samples = waiting.pop()
-            heard = samples != 0
-            first, end = int(heard.argmax()), len(heard) - int(heard[::-1].argmax())
-            if end - first < WINDOW or not heard[first]:
+            heard = _heard(samples)
+            start, samples = start + heard.start, samples[heard]
+            if len(samples) < WINDOW:
                 continue
-            start, samples, heard = start + first, samples[first:end], heard[first:end]
-            piece = _Piece((start + HOP // 2) // HOP, samples, log_energy(samples))
-            if tones := find_tones(samples, piece.energy):
-                samples = samples.copy()
+            energy = log_energy(samples)
+            tones = find_tones(samples, energy)
+            passages = [] if tones else find_passages(energy)
+            cuts = _silences_beside(passages, samples)
+            parts = [(start + cut, samples[cut:stop]) for cut, stop in pairwise([0, *cuts, len(samples)])]
+            if tones:
+                parts = [(start, samples.copy())]
                 for tone in tones:
-                    samples[max(tone.first - 1, 0) * HOP : tone.end * HOP] = 0
-                waiting.append((start, samples))
-                pieces.append(piece._replace(tones=tones))
-                continue
-            found = find_passages(piece.energy)
-            cuts = _silences_beside(found, heard)
-            waiting += [(start + cut, samples[cut:stop]) for cut, stop in pairwise([0, *cuts, len(samples)]) if cuts][
-                ::-1
-            ]
-            pieces.append(piece._replace(passages=[] if cuts else found))
+                    parts[0][1][max(tone.first - 1, 0) * HOP : tone.end * HOP] = 0
+            if tones or cuts:
+                waiting += parts[::-1]
+            if not cuts:
+                pieces.append(_Piece((start + HOP // 2) // HOP, samples, energy, passages, tones))
         levels = [power_level(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
         least = max(levels, default=0) - SOFTEST_DROP
         return [piece for piece, level in zip(pieces, levels, strict=True) if level >= least or piece.tones]
@@ -207,16 +205,19 @@ class _Piece(NamedTuple):
     frame: int
     samples: NDArray[np.float32]
     energy: NDArray[np.float32]
-    passages: Sequence[Stretch] = ()
-    tones: Sequence[Stretch] = ()
+    passages: Sequence[Stretch]
+    tones: Sequence[Stretch]
 
 
-def _silences_beside(passages: Sequence[Stretch], heard: NDArray[np.bool_]) -> list[int]:
-    """Return a sample of each digital silence before, after and between passages that is long enough to part them.
+def _heard(samples: NDArray[np.float32]) -> slice:
+    """Return the samples without digital silence before and after them; none where there is nothing else."""
+    sound = samples != 0
+    return slice(int(sound.argmax()), len(sound) - int(sound[::-1].argmax())) if sound.any() else slice(0, 0)
 
-    heard : whether a sample is not 0 [shape=(N,)]
-    """
-    silent = ~heard[: len(heard) // HOP * HOP].reshape(-1, HOP).any(axis=1)
+
+def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) -> list[int]:
+    """Return a sample of each digital silence before, after and between passages that is long enough to part them."""
+    silent = ~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1)
     for first, end in passages:
         silent[first:end] = False
     runs = sound_runs(silent, 1) if passages else []
@@ -324,14 +325,20 @@ def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
     """
     count = len(samples) // HOP if samples.ndim == 1 else 0
-    frames, offsets = samples[: count * HOP].reshape(count, HOP), np.zeros(count + 1, np.float32)
-    with np.errstate(all="ignore"):  # what is not finite is refused later
-        means, powers = frames.mean(axis=1, dtype=np.float64), np.einsum("ti,ti->t", frames, frames) / HOP
-        spread, sound = powers - means**2, np.flatnonzero(powers)
-        for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
-            quiet = part[np.argsort(spread[part], kind="stable")[: int(len(part) * QUIETEST) + 1]]
-            offset, heard = np.median(means[quiet]), np.median(spread[quiet])
-            if max(heard, OFFSET_SHARE**2 * powers[part].mean(), 0) < offset**2 < np.inf:
-                offsets[part] = offset
-    offsets[-1] = offsets[count - 1]
-    return samples - np.repeat(offsets, HOP)[: len(samples)] if offsets.any() else samples
+    sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
+    for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
+        first = part[0] * HOP
+        heard = _heard(samples[first : (part[-1] + 2) * HOP])  # the next frame is silent, or not whole
+        place = slice(first + heard.start, first + heard.stop)
+        frames = samples[place][: (heard.stop - heard.start) // HOP * HOP].reshape(-1, HOP)
+        if not len(frames):
+            continue
+        with np.errstate(all="ignore"):  # what is not finite is refused later
+            means, powers = frames.mean(axis=1, dtype=np.float64), np.einsum("ti,ti->t", frames, frames) / HOP
+            spread = powers - means**2
+            quiet = np.argsort(spread, kind="stable")[: int(len(frames) * QUIETEST) + 1]
+            offset, level = np.median(means[quiet]), np.median(spread[quiet])
+            if max(level, OFFSET_SHARE**2 * powers.mean(), 0) < offset**2 < np.inf:
+                result = samples.copy() if result is samples else result
+                result[place] -= np.float32(offset)
+    return result
