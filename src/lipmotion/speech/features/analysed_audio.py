@@ -81,6 +81,12 @@ class AnalysedAudio(Audio):
         found = {Stretch(each.frame + first, each.frame + end) for each in self._pieces for first, end in each.tones}
         return sorted(found)
 
+    @property
+    def between_silences(self) -> list[tuple[int, AnalysedAudio]]:
+        """What lies between digital silences, as far as something may be said in it: its first frame, and its sound."""
+        pieces = [piece for piece in self._pieces if piece.passages]
+        return [(each.frame, _Stretch(each.samples, self.rate_hz, whole=self, first=each.frame)) for each in pieces]
+
     @cached_property
     def _pieces(self) -> list[_Piece]:
         """What lies between digital silences, in order: each is a recording of its own, with frames of its own."""
@@ -103,7 +109,8 @@ class AnalysedAudio(Audio):
             if tones or cuts:
                 waiting += parts[::-1]
             if not cuts:
-                pieces.append(_Piece((start + HOP // 2) // HOP, samples, energy, passages, tones))
+                frame = min((start + HOP // 2) // HOP, self.frames - len(energy))
+                pieces.append(_Piece(frame, samples, energy, passages, tones))
         levels = [power_level(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
         least = max(levels, default=0) - SOFTEST_DROP
         return [piece for piece, level in zip(pieces, levels, strict=True) if level >= least or piece.tones]
