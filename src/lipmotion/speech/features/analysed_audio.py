@@ -101,14 +101,14 @@ class AnalysedAudio(Audio):
             tones = find_tones(samples, energy)
             passages = [] if tones else find_passages(energy)
             cuts = _silences_beside(passages, samples)
-            parts = [(start + cut, samples[cut:stop]) for cut, stop in pairwise([0, *cuts, len(samples)])]
             if tones:
-                parts = [(start, samples.copy())]
-                for tone in tones:
-                    parts[0][1][max(tone.first - 1, 0) * HOP : tone.end * HOP] = 0
-            if tones or cuts:
-                waiting += parts[::-1]
-            if not cuts:
+                waiting.append((start, samples.copy()))
+            for tone in tones:
+                waiting[-1][1][max(tone.first - 1, 0) * HOP : tone.end * HOP] = 0
+            if cuts:  # the first part is the next one
+                bounds = pairwise([0, *cuts, len(samples)])
+                waiting += [(start + first, samples[first:end]) for first, end in bounds][::-1]
+            else:
                 frame = min((start + HOP // 2) // HOP, self.frames - len(energy))
                 pieces.append(_Piece(frame, samples, energy, passages, tones))
         levels = [power_level(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
@@ -224,7 +224,7 @@ def _heard(samples: NDArray[np.float32]) -> slice:
 
 def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) -> list[int]:
     """Return a sample of each digital silence before, after and between passages that is long enough to part them."""
-    silent = ~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1)
+    silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
     for first, end in passages:
         silent[first:end] = False
     runs = sound_runs(silent, 1) if passages else []

@@ -85,11 +85,8 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     found, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
-        said, level_db, (voiced, pitch) = (
-            units.between(at_s, at_s + sound.duration_s),
-            smoothed_level_db(sound),
-            _voice(sound),
-        )
+        said = units.between(at_s, at_s + sound.duration_s)
+        level_db, (voiced, pitch) = smoothed_level_db(sound), _voice(sound)
         laughs = tuple(_laughs(sound, level_db, voiced, said))
         phrases = [phrase for phrase in _phrases(said) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
         events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
