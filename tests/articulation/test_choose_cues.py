@@ -166,6 +166,20 @@ def test_the_size_of_the_face_does_not_matter(toy_sentence: ToySentence) -> None
     assert choose_cues(larger) == choose_cues(generation)
 
 
+@pytest.mark.parametrize("pause_s", [0.6, 5.0])
+def test_how_far_one_line_opens_the_mouth_says_nothing_of_another(pause_s: float) -> None:
+    """The second line's lips move a third as far, as those of a softer voice."""
+    said = [(phone, 0.25) for phone in "s ah s ae n aa s iy".split()]
+    units = timeline([("sil", 0.5), *said, ("sil", pause_s), *said, ("sil", 0.5)])
+    both = result(units)
+    values, second = both.motion.values.copy(), both.motion.time_s > 2.5 + pause_s / 2
+    values[second] /= 3
+    cues = choose_cues(replace(both, motion=replace(both.motion, values=values))).cues
+    first, other = ([cue.label for cue in cues if cue.label != "X" and (cue.start_s > 2.6) == late] for late in (0, 1))
+    assert len({*first}) >= 3
+    assert first == other
+
+
 def test_shapes_that_are_not_drawn() -> None:
     generation = spoken("b aa f aa l aa", 0.2)
     assert shapes(choose_cues(generation)) == "XADGDHDX"

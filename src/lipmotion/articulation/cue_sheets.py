@@ -16,6 +16,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.liveliness import phrases
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
@@ -178,6 +179,8 @@ LARGEST_OPENING = 1.2
 """Largest relative opening that is distinguished."""
 LEAST_OPENING = 1e-4
 """Least mean opening, in the unit of the motion, that scales: a mouth that stays closed is not amplified."""
+LINE_PAUSE_S, SHORT_S, NEAR_S = 0.5, 1.5, 1.5
+"""A longer pause divides lines; one shorter than the second belongs to another one nearer than the third."""
 LIP_BITING = VISEMES["ld"]
 LEAD_S = 0.02
 """The shape of a phone begins this long before its sound."""
@@ -204,12 +207,15 @@ def frame_costs(generation: Generation, frames: int, fps: float, intensity: floa
             start_s += duration_s
     phone_values = silence + _integrals(np.array(bounds_s), np.array(sums), edges_s)
     cost, voiced, nominal = phone_values[:, : len(_NAMES)].copy(), phone_values[:, -3], phone_values[:, -2:]
+    lines = _lines(generation.units, edges_s)
     if "opening" in generation.motion.names:
-        opening = _relative_opening(_means(generation.motion, "opening", edges_s), nominal[:, 0], voiced)
+        means = _means(generation.motion, "opening", edges_s)
+        opening = np.concatenate([_relative_opening(means[s], nominal[s, 0], voiced[s]) for s in lines])
         opening = np.minimum(intensity * opening, LARGEST_OPENING)
         cost += OPENING_WEIGHT * voiced[:, None] * (opening[:, None] - _POSES[:, 0]) ** 2
     if "width" in generation.motion.names:
-        spread = _relative_spread(_means(generation.motion, "width", edges_s), nominal[:, 1], voiced)
+        means = _means(generation.motion, "width", edges_s)
+        spread = np.concatenate([_relative_spread(means[s], nominal[s, 1], voiced[s]) for s in lines])
         spread = np.clip(intensity * spread, _POSES[:, 1].min(), _POSES[:, 1].max())
         cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
     cost *= COST_RATE_HZ / fps
@@ -236,6 +242,24 @@ def _phone_values(part: PhoneShapes, silent: bool) -> Array:
     ]
     pose = _POSES[[_NAMES.index(name) for name in part.best]].mean(axis=0)
     return np.array([*cost, float(not silent), *pose])
+
+
+def _lines(units: Timeline[Unit], edges_s: Array) -> list[slice]:
+    """Return the frames of each line: how far the lips open and spread in one says nothing of another.
+
+    edges_s : of all frames [shape=(frames + 1,)]
+    Pauses of ``LINE_PAUSE_S`` divide lines; a short one belongs to a near one, as a word says little of a voice.
+    """
+    lines: list[tuple[float, float]] = []
+    for start_s, end_s in phrases(units, LINE_PAUSE_S):
+        before_s, until_s = lines[-1] if lines else (0.0, -np.inf)
+        if start_s - until_s < NEAR_S and min(end_s - start_s, until_s - before_s) < SHORT_S:
+            lines[-1] = before_s, end_s
+        else:
+            lines.append((start_s, end_s))
+    middles = [(before[1] + after[0]) / 2 for before, after in pairwise(lines)]
+    bounds = [0, *np.searchsorted(edges_s, middles), len(edges_s) - 1]
+    return [slice(first, end) for first, end in pairwise(bounds)]
 
 
 def _means(motion: Motion, channel: str, edges_s: Array) -> Array:

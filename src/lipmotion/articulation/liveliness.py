@@ -188,12 +188,12 @@ def _in_mood(moved: Liveliness, mood: Mapping[int, Curve], *, head: bool) -> Liv
     )
 
 
-def phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
-    """Return start and end, in seconds, of every stretch of speech without a pause of ``PHRASE_PAUSE_S``."""
+def phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list[tuple[float, float]]:
+    """Return start and end, in seconds, of every stretch of speech without a pause of ``pause_s``."""
     found: list[tuple[float, float]] = []
     for span in units:
         if not is_silent(span.label.phone):
-            if found and span.start_s - found[-1][1] < PHRASE_PAUSE_S:
+            if found and span.start_s - found[-1][1] < pause_s:
                 found[-1] = found[-1][0], span.end_s
             else:
                 found.append((span.start_s, span.end_s))

@@ -365,12 +365,8 @@ def _join_rows(
     whole[:] = still
     ramp = (1 - np.cos(np.pi * np.arange(1, RAMP_FRAMES + 1) / (RAMP_FRAMES + 1))) / 2
     for part, inside in zip(parts, rows, strict=True):
-        share = np.ones(part.frames)
+        share = np.concatenate([ramp, np.ones(part.frames - 2 * RAMP_FRAMES), ramp[::-1]])
         first, end = max(part.first, 0), min(part.first + part.frames, len(like))
-        if first:  # else the recording begins within it
-            share[:RAMP_FRAMES] = ramp
-        if end < len(like):
-            share[part.frames - RAMP_FRAMES :] = ramp[::-1]
         chosen = slice(first - part.first, end - part.first)
         whole[first:end] += share[chosen, None] * (inside[chosen] - still)
     return whole

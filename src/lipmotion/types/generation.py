@@ -17,7 +17,7 @@ from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
 from lipmotion.types.moods import MoodKey
 from lipmotion.types.motion import Motion, between_frames
-from lipmotion.types.timeline import Timeline, Unit
+from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.voice_event import VoiceEvent
 
 KeptT = TypeVar("KeptT")
@@ -115,7 +115,10 @@ class SpeechPart(NamedTuple):
         """Return the recording's phones in time in its own frames, with times from its first frame."""
         inside = self.inside
         within = units.between(inside.start / FRAME_RATE_HZ, inside.stop / FRAME_RATE_HZ)
-        return within.shifted((inside.start - self.first) / FRAME_RATE_HZ)
+        lead_s = (inside.start - self.first) / FRAME_RATE_HZ
+        return Timeline(  # half a frame must not be more or less by where in the recording the passage is
+            tuple(Span(round(each.start_s + lead_s, 9), round(each.end_s + lead_s, 9), each.label) for each in within)
+        )
 
 
 @dataclass(frozen=True, eq=False)

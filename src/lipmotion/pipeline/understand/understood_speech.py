@@ -182,14 +182,15 @@ def with_voice(
     phones, found, given : as of ``known_voice``
     """
     voice, parts = known_voice(phones, audio, speech, found, given=given), speech.parts
-    if parts is not None and len(parts) > 1 and voice < 1:
-        sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
-        voices = [_voice_of(phones, sounds[part.first]) for part in parts]
-    else:
-        voices = [voice] * len(parts or ())
     if parts is not None:
-        known = zip(parts, voices, strict=True)
-        parts = tuple(part._replace(speech=replace(part.speech, voice=each)) for part, each in known)
+        sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
+        is_recognised = not given and not speech.units_known
+        parts = tuple(
+            part
+            if is_recognised and part.speech.voice == 1
+            else part._replace(speech=replace(part.speech, voice=_voice_of(phones, sounds[part.first])))
+            for part in parts
+        )
     return replace(speech, voice=voice, parts=parts)
 
 
@@ -394,10 +395,14 @@ def _parts_with(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[S
             return None
     spoken = []
     for part in parts:
-        within = part.between(units)
-        sure = next((span.label.confidence for span in within if span.label.confidence is not None), None)
-        silent = Unit(SILENCE, confidence=sure)  # as sure as the phones beside it
-        within = joined_units([within], silent, part.speech.features.duration_s)
+        within = list(part.between(units))
+        said = [span.label for span in within if not is_silent(span.label.phone)] or [span.label for span in within]
+        for place in (0, -1) if within else ():  # silence between passages is as sure as the phones beside it
+            if is_silent(within[place].label.phone):
+                label = replace(within[place].label, confidence=said[place].confidence)
+                within[place] = replace(within[place], label=label)
+        silent = Unit(SILENCE, confidence=said[0].confidence if said else None)
+        within = joined_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
         spoken.append(part._replace(speech=with_units(part.speech, within)))
     return tuple(spoken)
 
@@ -433,12 +438,13 @@ def recognised_speech(
                 within = relied_on(phones.align_phones(sound, sound.mfcc(), within), 0.0)
             except AlignmentError:
                 within = None
+        knows_voice = within is not None
         if within is None:
             found = found or recognise()
             within = part.between(relied_on(found.units, found.reliability))
         if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < LEAST_SPEECH_S:
             continue  # a click, a knock
-        spoken.append(part)
+        spoken.append(part._replace(speech=replace(part.speech, voice=float(knows_voice))))  # else ``with_voice`` says
         units.append(placed_units(within, part.first, part.own))
     if speech.parts is not None:
         speech = replace(speech, parts=tuple(spoken))

@@ -11,11 +11,19 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import smooth_level, spoken_frames
-from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count, log_energy, mfcc_of_warps
+from lipmotion.hmm.loudness import power_level, smooth_level, sound_runs, spoken_frames
+from lipmotion.speech.features.mfcc import HOP, WINDOW, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import CEPSTRA, general_features
-from lipmotion.speech.sound.voice_activity import Stretch, fill_gaps, find_passages, find_tones, level_passage
+from lipmotion.speech.sound.voice_activity import (
+    SEPARATE_FRAMES,
+    SOFTEST_DROP,
+    Stretch,
+    fill_gaps,
+    find_passages,
+    find_tones,
+    level_passage,
+)
 from lipmotion.types import Audio, Features
 
 MadeT = TypeVar("MadeT")
@@ -53,32 +61,59 @@ class AnalysedAudio(Audio):
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         """The passages of the recording, in order; none where nothing can be said in it."""
-        recorded, energy = self.samples, self._recorded_energy
-        if self.tones:
-            recorded = recorded.copy()
-            for first, end in self.tones:
-                recorded[max(first - 1, 0) * HOP : end * HOP] = 0
-            energy = log_energy(recorded)
-        found = find_passages(energy)
-        bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(found)), self.frames]
+        found = [(piece, stretch) for piece in self._pieces for stretch in piece.passages]
+        stretches = [Stretch(piece.frame + first, piece.frame + end) for piece, (first, end) in found]
+        bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(stretches)), self.frames]
         passages = []
-        for number, (first, end) in enumerate(found):
-            level, samples = energy[first:end], recorded[first * HOP : end * HOP]
+        for number, (piece, (first, end)) in enumerate(found):
+            level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
             samples = level_passage(fill_gaps(samples, level), level)
             sound = spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
             padded = _PassageAudio(np.pad(samples, (lead * HOP, tail * HOP)), self.rate_hz, lead=lead, tail=tail)
-            passages.append(Passage(first - lead, slice(bounds[number], bounds[number + 1]), padded))
+            own = slice(bounds[number], bounds[number + 1])
+            passages.append(Passage(stretches[number].first - lead, own, padded))
         return tuple(passages)
 
-    @cached_property
+    @property
     def tones(self) -> list[Stretch]:
         """Where a steady tone covers what is said; its frames count as silence."""
-        return find_tones(self.samples, self._recorded_energy)
+        found = {Stretch(each.frame + first, each.frame + end) for each in self._pieces for first, end in each.tones}
+        return sorted(found)
+
+    @property
+    def between_silences(self) -> list[tuple[int, AnalysedAudio]]:
+        """What lies between digital silences, as far as something may be said in it: its first frame, and its sound."""
+        pieces = [piece for piece in self._pieces if piece.passages]
+        return [(each.frame, _Stretch(each.samples, self.rate_hz, whole=self, first=each.frame)) for each in pieces]
 
     @cached_property
-    def _recorded_energy(self) -> NDArray[np.float32]:
-        return log_energy(checked_samples(self))
+    def _pieces(self) -> list[_Piece]:
+        """What lies between digital silences, in order: each is a recording of its own, with frames of its own."""
+        pieces, waiting = [], [(0, checked_samples(self))]
+        while waiting:
+            start, samples = waiting.pop()
+            heard = _heard(samples)
+            start, samples = start + heard.start, samples[heard]
+            if len(samples) < WINDOW:
+                continue
+            energy = log_energy(samples)
+            tones = find_tones(samples, energy)
+            passages = [] if tones else find_passages(energy)
+            cuts = _silences_beside(passages, samples)
+            if tones:
+                waiting.append((start, samples.copy()))
+            for tone in tones:
+                waiting[-1][1][max(tone.first - 1, 0) * HOP : tone.end * HOP] = 0
+            if cuts:  # the first part is the next one
+                bounds = pairwise([0, *cuts, len(samples)])
+                waiting += [(start + first, samples[first:end]) for first, end in bounds][::-1]
+            else:
+                frame = min((start + HOP // 2) // HOP, self.frames - len(energy))
+                pieces.append(_Piece(frame, samples, energy, passages, tones))
+        levels = [power_level(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
+        least = max(levels, default=0) - SOFTEST_DROP
+        return [piece for piece, level in zip(pieces, levels, strict=True) if level >= least or piece.tones]
 
     @property
     def is_passage(self) -> bool:
@@ -164,6 +199,36 @@ class Passage(NamedTuple):
     first: int
     own: slice
     audio: AnalysedAudio
+
+
+class _Piece(NamedTuple):
+    """The sound between two digital silences, without what is before and after it.
+
+    frame    : of the recording, in which it begins
+    energy   : the log energy of its frames [shape=(T,)]
+    passages : what is said in it, in its frames;  tones : where it is a steady tone
+    """
+
+    frame: int
+    samples: NDArray[np.float32]
+    energy: NDArray[np.float32]
+    passages: Sequence[Stretch]
+    tones: Sequence[Stretch]
+
+
+def _heard(samples: NDArray[np.float32]) -> slice:
+    """Return the samples without digital silence before and after them; none where there is nothing else."""
+    sound = samples != 0
+    return slice(int(sound.argmax()), len(sound) - int(sound[::-1].argmax())) if sound.any() else slice(0, 0)
+
+
+def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) -> list[int]:
+    """Return a sample of each digital silence before, after and between passages that is long enough to part them."""
+    silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
+    for first, end in passages:
+        silent[first:end] = False
+    runs = sound_runs(silent, 1) if passages else []
+    return [(first + end) // 2 * HOP for first, end in runs if end - first >= SEPARATE_FRAMES]
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,14 +332,20 @@ def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
     """
     count = len(samples) // HOP if samples.ndim == 1 else 0
-    frames, offsets = samples[: count * HOP].reshape(count, HOP), np.zeros(count + 1, np.float32)
-    with np.errstate(all="ignore"):  # what is not finite is refused later
-        means, powers = frames.mean(axis=1, dtype=np.float64), np.einsum("ti,ti->t", frames, frames) / HOP
-        spread, sound = powers - means**2, np.flatnonzero(powers)
-        for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
-            quiet = part[np.argsort(spread[part], kind="stable")[: int(len(part) * QUIETEST) + 1]]
-            offset, heard = np.median(means[quiet]), np.median(spread[quiet])
-            if max(heard, OFFSET_SHARE**2 * powers[part].mean(), 0) < offset**2 < np.inf:
-                offsets[part] = offset
-    offsets[-1] = offsets[count - 1]
-    return samples - np.repeat(offsets, HOP)[: len(samples)] if offsets.any() else samples
+    sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
+    for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
+        first = part[0] * HOP
+        heard = _heard(samples[first : (part[-1] + 2) * HOP])  # the next frame is silent, or not whole
+        place = slice(first + heard.start, first + heard.stop)
+        frames = samples[place][: (heard.stop - heard.start) // HOP * HOP].reshape(-1, HOP)
+        if not len(frames):
+            continue
+        with np.errstate(all="ignore"):  # what is not finite is refused later
+            means, powers = frames.mean(axis=1, dtype=np.float64), np.einsum("ti,ti->t", frames, frames) / HOP
+            spread = powers - means**2
+            quiet = np.argsort(spread, kind="stable")[: int(len(frames) * QUIETEST) + 1]
+            offset, level = np.median(means[quiet]), np.median(spread[quiet])
+            if max(level, OFFSET_SHARE**2 * powers.mean(), 0) < offset**2 < np.inf:
+                result = samples.copy() if result is samples else result
+                result[place] -= np.float32(offset)
+    return result

@@ -82,19 +82,18 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     units : the phones in time
     Raises InputError: as ``speech.features.mfcc`` says.
     """
-    audio = analysed(audio)
-    if not audio.passages:
-        return ()
-    level_db, voiced, pitch = smoothed_level_db(audio), *_voice(audio)
-    laughs = tuple(_laughs(audio, level_db, voiced, units))
-    phrases = [phrase for phrase in _phrases(units) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
-    found = [
-        *laughs,
-        *_breaths(audio, level_db, voiced, units),
-        *_whispers(level_db, voiced, phrases),
-        *_shouts(audio, level_db, pitch, phrases),
-    ]
-    return tuple(sorted(found, key=lambda event: event.start_s))
+    found, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
+    for first, sound in analysed(audio).between_silences:
+        at_s = first / FRAME_RATE_HZ
+        said = units.between(at_s, at_s + sound.duration_s)
+        level_db, (voiced, pitch) = smoothed_level_db(sound), _voice(sound)
+        laughs = tuple(_laughs(sound, level_db, voiced, said))
+        phrases = [phrase for phrase in _phrases(said) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
+        events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
+        found += [event.shifted(at_s) for event in events]
+        efforts = _efforts(sound, level_db, pitch, phrases)
+        judged += [(start_s + at_s, end_s + at_s, effort) for (start_s, end_s), effort in efforts]
+    return tuple(sorted([*found, *_shouts(judged)], key=lambda event: event.start_s))
 
 
 def without_laughter(units: Timeline[Unit], events: Sequence[VoiceEvent]) -> Timeline[Unit]:
@@ -174,15 +173,14 @@ def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, fl
             yield VoiceEvent(start_s, end_s, WHISPER, strength)
 
 
-def _shouts(
+def _efforts(
     audio: AnalysedAudio, level_db: Curve, pitch: Curve, phrases: Sequence[tuple[float, float]]
-) -> Iterator[VoiceEvent]:
-    """Yield the phrases that are higher, brighter and louder than the others."""
-    rows, judged = [], []
+) -> Iterator[tuple[tuple[float, float], tuple[float, float, float]]]:
+    """Yield the phrases with a voice, and how high (semitones), bright and loud (decibels) it is there."""
     high = (band_centres() >= 1000) & (band_centres() < 4500)
     low = band_centres() < 1000
-    for start_s, end_s in phrases:
-        frames = _frames(start_s, end_s)
+    for phrase in phrases:
+        frames = _frames(*phrase)
         voiced = np.flatnonzero(np.isfinite(pitch[frames]))
         if len(voiced) < LEAST_VOICED:
             continue
@@ -190,12 +188,15 @@ def _shouts(
         loud = voiced[levels > np.median(levels) - 6]
         powers = np.exp(_bands(audio, frames)[loud])
         tilt_db = DB * np.median(np.log(powers[:, high].sum(axis=1)) - np.log(powers[:, low].sum(axis=1)))
-        rows.append((np.median(pitch[frames][voiced]), tilt_db, DB * np.log(np.mean(np.exp(levels / DB)))))
-        judged.append((start_s, end_s))
-    if len(rows) < LEAST_PHRASES:
+        yield phrase, (np.median(pitch[frames][voiced]), tilt_db, DB * np.log(np.mean(np.exp(levels / DB))))
+
+
+def _shouts(judged: Sequence[tuple[float, float, tuple[float, float, float]]]) -> Iterator[VoiceEvent]:
+    """Yield the phrases that are higher, brighter and louder than the others, of which the efforts are given."""
+    if len(judged) < LEAST_PHRASES:
         return
-    beyond = np.array(rows) - np.median(rows, axis=0)
-    for (start_s, end_s), values in zip(judged, beyond.tolist(), strict=True):
+    efforts = np.array([effort for *_, effort in judged])
+    for (start_s, end_s, _), values in zip(judged, (efforts - np.median(efforts, axis=0)).tolist(), strict=True):
         limits = (SHOUT_SEMITONES, SHOUT_TILT_DB, SHOUT_DB)
         strength = min(_risen(value, limit) for value, limit in zip(values, limits, strict=True))
         if strength > 0:
