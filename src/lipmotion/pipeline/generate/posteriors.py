@@ -62,7 +62,9 @@ def animate_with_posteriors(
         )
     file = edit_file(edits)
     session = file.session(request_of(speech), model=model)
-    return session.generated(file.edits), engine.posteriors(learned, session.understood(file.edits).speech)
+    return session.generated(file.edits), engine.posteriors(
+        learned, session.understood(file.edits).speech.with_arrays()
+    )
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:
