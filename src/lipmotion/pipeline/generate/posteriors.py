@@ -62,9 +62,7 @@ def animate_with_posteriors(
         )
     file = edit_file(edits)
     session = file.session(request_of(speech), model=model)
-    return session.generated(file.edits), engine.posteriors(
-        learned, session.understood(file.edits).speech.with_arrays()
-    )
+    return session.generated(file.edits), engine.posteriors(learned, session.understood(file.edits).speech)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:
