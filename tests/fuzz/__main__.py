@@ -63,6 +63,8 @@ def fuzz(options: argparse.Namespace, good: Good) -> int:
             end_s = time.monotonic() + (0 if stopped.is_set() else budget_s)
             begin = (READERS[name], worker, good, options.seed)
             record = campaign(*begin, lambda _: time.monotonic() < end_s and not stopped.is_set())
+            defects = sum(found.count for found in record.findings.values())
+            print(f"{name}: {record.distinct} inputs, {defects} defects", file=sys.stderr, flush=True)
             for place in keep(record, worker, options.found):
                 print(f"{name}: {place}; again: python -m fuzz --reader {name} --replay {place}", file=sys.stderr)
             return record

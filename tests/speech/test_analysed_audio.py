@@ -143,6 +143,21 @@ def test_features_are_joined_from_those_of_passages(decibels: float) -> None:
         assert whole[place + 60 : place + 200] == pytest.approx(was[60:200], abs=2e-3)
 
 
+def test_silence_between_passages_takes_no_memory() -> None:
+    audio = of_samples(whole_frames(1), silence(120), whole_frames(0))
+    sizes = [passage.audio.spectrum.nbytes for passage in audio.passages]
+    tracemalloc.start()
+    rows = audio.joined_rows(lambda sound: sound.spectrum)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(sizes) == 2
+    assert kept < sum(sizes) < rows.shape[0] * rows.shape[1]
+    whole = np.concatenate([rows[:50], rows[50:7000], rows[7000:]])
+    assert np.array_equal(whole, audio.spectrum)
+    assert np.array_equal(rows[5000:5001], whole[5000:5001])
+    assert (len(rows), rows.any(), rows.dtype) == (audio.frames, True, whole.dtype)
+
+
 def test_where_nothing_is_said_all_features_are_0() -> None:
     for samples in (np.zeros(16_000), 0.1 * np.sin(np.arange(16_000) / 5)):
         audio = of_samples(samples)

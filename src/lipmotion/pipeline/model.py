@@ -263,11 +263,12 @@ def with_prior(prior: Model | None, speech: Speech) -> Speech:
     if speech.parts is not None:
         parts = tuple(part._replace(speech=with_prior(prior, part.speech)) for part in speech.parts)
         speech = replace(speech, parts=parts)
-    motion = prior.engine.without_closures().generate(prior.learned, speech).motion
+    whole = speech.with_arrays()
+    motion = prior.engine.without_closures().generate(prior.learned, whole).motion
     measured = measured_articulators(motion.values, motion.names)
     chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]
     steps = len(motion.values[::STEP])
     nothing = np.zeros((steps, 0), np.float32), np.zeros(steps)
-    hidden, distortion = prior.engine.hidden(prior.learned, speech) or nothing
+    hidden, distortion = prior.engine.hidden(prior.learned, whole) or nothing
     articulators = np.stack(chosen, axis=1) if chosen else np.zeros((steps, 0))
     return replace(speech, prior=PriorOutput(articulators, hidden, distortion))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import Any
@@ -43,6 +44,34 @@ class TokenPosteriors:
     values: NDArray[np.float16]
     source: str
     mean: float
+
+
+class JoinedRows:
+    """Rows of a whole recording, some of which are one row in memory, as those of hours of silence.
+
+    It is used as an array, which takes the memory of all rows: ``np.asarray(rows)``, or of some: ``rows[first:stop]``.
+    """
+
+    def __init__(self, parts: Sequence[NDArray[Any]]) -> None:
+        self._parts = parts
+        self.shape = (sum(map(len, parts)), *parts[0].shape[1:])
+        self.dtype = parts[0].dtype
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, rows: slice) -> NDArray[Any]:
+        first, stop, _ = rows.indices(len(self))
+        starts = np.cumsum([0, *map(len, self._parts)]).tolist()
+        pairs = zip(self._parts, starts, strict=False)
+        return np.concatenate([part[max(first - start, 0) : max(stop - start, 0)] for part, start in pairs])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return self[:].astype(dtype or self.dtype, copy=False)
+
+    def any(self) -> bool:
+        """Return whether a value is not 0."""
+        return any(part.any() for part in self._parts)
 
 
 def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:

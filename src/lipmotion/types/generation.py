@@ -55,7 +55,7 @@ class Speech:
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
     kept        : what was computed of the sound alone (``once``); speech with other units shares it
     parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
-                  empty: nothing is said
+                  empty: nothing is said. Beside it, features, spectrum and posteriors may be ``JoinedRows``
     """
 
     features: Features
@@ -82,6 +82,13 @@ class Speech:
             found = self.kept[of] = (sound, make())
         made: KeptT = found[1]
         return made
+
+    def with_arrays(self) -> Speech:
+        """Return the same with an array in place of all ``JoinedRows``, for an engine that takes it as one passage."""
+        features = replace(self.features, values=np.asarray(self.features.values))
+        spectrum = None if self.spectrum is None else np.asarray(self.spectrum)
+        said = self.posteriors and replace(self.posteriors, values=np.asarray(self.posteriors.values))
+        return replace(self, features=features, spectrum=spectrum, posteriors=said)
 
     @property
     def units_decide(self) -> bool:
@@ -310,6 +317,8 @@ class ReducedVariance:
     mixing: NDArray[np.floating[Any]]
 
 
+BLOCK_FRAMES = 60_000
+"""Frames whose variances are in memory at once."""
 FULL_FIT_SHARE = 0.995
 """A transcript that fits as large a share of the speech fits all of it, rounded."""
 SURE_CONFIDENCE = 0.8
@@ -418,7 +427,9 @@ class Generation:
         if self.knowledge is None or not names or not len(self.motion.values):
             return None
         opening = self.selected(names[:1])
-        return self.knowledge.confidence(opening.motion.values[:, 0], opening.variance[:, 0])
+        blocks = range(0, len(opening.motion.values), BLOCK_FRAMES)
+        variance = [opening.variance_of(slice(first, first + BLOCK_FRAMES))[:, 0] for first in blocks]
+        return self.knowledge.confidence(opening.motion.values[:, 0], np.concatenate(variance))
 
     def variance_of(self, frames: slice) -> NDArray[np.floating[Any]]:
         """Return the variance of every channel in a range of N frames [shape=(N, P)]."""

@@ -6,6 +6,8 @@ import json
 import math
 from pathlib import Path
 
+from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
+from formats.test_transcripts import OF_LINES, OF_WORDS
 from formats.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
@@ -68,9 +70,13 @@ TEXTS = {
     "table.tsv": "start\tend\ttext\n500\t1500\tHi you\n",
     "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
 }
+OTHER_FORMS = {**LINES, **OTHERS, **SERVICES, **OF_LINES, **OF_WORDS}
+SAMPLED = {f"{name}.json": sample for name, sample in SAMPLES.items()} | SPEAKERS
+SAMPLED |= {f"{n}.{'srt' if isinstance(form, str) else 'json'}": form for n, form in enumerate(OTHER_FORMS.values())}
 TEXTS |= {
-    f"{name}.json": sample if isinstance(sample, str) else json.dumps(sample, ensure_ascii=False)
-    for name, sample in SAMPLES.items()
+    name: sample if isinstance(sample, str) else json.dumps(sample, ensure_ascii=False)
+    for name, sample in SAMPLED.items()
+    if not isinstance(sample, bytes)
 }
 SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
 LENGTH_S = 4.0

@@ -144,7 +144,7 @@ def understand(model: Model, request: Request, each: ParallelMap = map) -> Speec
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
-    return understood_speech(model, request, each).speech
+    return understood_speech(model, request, each).speech.with_arrays()
 
 
 def understood_speech(
@@ -298,7 +298,7 @@ def _understood(model: Model, request: Request, audio: AnalysedAudio, each: Para
     range_db = level_range_db(audio.log_energy)
     installed = request.recogniser in INSTALLED_RECOGNISERS
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
-    features, fit = audio.mfcc(), None
+    features, fit = audio.joined_mfcc(), None
     found: list[Recognition] = []
 
     def recognise() -> Recognition:
@@ -319,7 +319,7 @@ def _understood(model: Model, request: Request, audio: AnalysedAudio, each: Para
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     if words is not None:
-        said, fit = transcribe(phones, audio, features, words, lexicon_of(request), lambda: recognised().units)
+        said, fit = transcribe(phones, audio, audio.mfcc(), words, lexicon_of(request), lambda: recognised().units)
         if said is not None:
             speech = speech_of(model.engine, audio, features, said, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
@@ -353,9 +353,11 @@ def speech_of(
     """
     inputs, audio = engine.inputs(), analysed(audio, features)
     f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
-    spectrum = audio.spectrum if inputs.conditions else None
+    spectrum: Any = None
+    if inputs.conditions:
+        spectrum = audio.spectrum if audio.is_passage else audio.joined_rows(lambda sound: sound.spectrum)
     network = network_of(kind) if inputs.posteriors else None
-    posteriors = token_posteriors(network, audio, each) if network is not None else None
+    posteriors = token_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
     parts = None
     if not audio.is_passage:
         parts = tuple(
@@ -372,7 +374,9 @@ def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
     Where only some of them are known, those of a user who corrected the others, ``confidence`` is one of each frame.
     Every passage has those in its time; where phones are said outside of all, the recording is one passage.
     """
-    speech = replace(speech, parts=None if speech.parts is None else _parts_with(speech.parts, units))
+    if speech.parts is not None:
+        speech = replace(speech, parts=_parts_with(speech.parts, units))
+        speech = speech.with_arrays() if speech.parts is None else speech
     found = [span.label.confidence for span in units]
     first = found[0] if found else None
     if found.count(first) == len(found):
@@ -402,8 +406,8 @@ def _parts_with(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[S
                 label = replace(within[place].label, confidence=said[place].confidence)
                 within[place] = replace(within[place], label=label)
         silent = Unit(SILENCE, confidence=said[0].confidence if said else None)
-        within = joined_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
-        spoken.append(part._replace(speech=with_units(part.speech, within)))
+        joined = joined_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
+        spoken.append(part._replace(speech=with_units(part.speech, joined)))
     return tuple(spoken)
 
 

@@ -24,7 +24,7 @@ from lipmotion.speech.sound.voice_activity import (
     find_tones,
     level_passage,
 )
-from lipmotion.types import Audio, Features
+from lipmotion.types import Audio, Features, JoinedRows
 
 MadeT = TypeVar("MadeT")
 SILENT_FRAMES = 50
@@ -136,21 +136,33 @@ class AnalysedAudio(Audio):
         of_passage : returns the features of one
         silence    : the value between passages; None: as in the last frame of silence beside them
         """
+        return np.asarray(self.joined_rows(of_passage, silence))
+
+    def joined_rows(self, of_passage: Callable[[AnalysedAudio], NDArray[Any]], silence: Any = None) -> JoinedRows:
+        """Return ``joined`` as rows that take memory within passages alone."""
         parts = [of_passage(passage.audio) for passage in self.passages]
         if not parts:
             some = of_passage(_PassageAudio(self.samples[: self.rate_hz], self.rate_hz))  # not of hours of silence
-            return np.zeros((self.frames, *some.shape[1:]), some.dtype)
-        whole = np.empty((self.frames, *parts[0].shape[1:]), parts[0].dtype)
+            return JoinedRows([np.broadcast_to(np.zeros_like(some[0]), (self.frames, *some.shape[1:]))])
+        rows = list[NDArray[Any]]()
         for (first, own, _), part in zip(self.passages, parts, strict=True):
-            whole[own] = part[-1] if silence is None else silence
+            between = np.asarray(part[-1] if silence is None else silence, part.dtype)
             start, stop = max(first, own.start), min(first + len(part), own.stop)
-            whole[start:stop] = part[start - first : stop - first]
-        return whole
+            before, after = (
+                np.broadcast_to(between, (n, *part.shape[1:])) for n in (start - own.start, own.stop - stop)
+            )
+            rows += [before, part[start - first : stop - first], after]
+        return JoinedRows(rows)
 
     def mfcc(self, warp: float = 1.0) -> Features:
         """Return the features of ``speech.features.mfcc.mfcc`` at one warp of the frequencies."""
         (features,) = self.mfcc_of_warps((warp,))
         return features
+
+    def joined_mfcc(self) -> Features:
+        """Return ``mfcc`` with values that are ``JoinedRows``."""
+        values: Any = self.joined_rows(partial(_mfcc_values, warp=1.0))
+        return Features(values, self.duration_s)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
         """Return the features of ``features.mfcc.mfcc`` at several warps; the missing ones are computed together."""
@@ -321,7 +333,7 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
     """
     if not isinstance(audio, AnalysedAudio):
         audio = AnalysedAudio(_without_offset(audio.samples), audio.rate_hz)
-    if features is not None:
+    if features is not None and isinstance(features.values, np.ndarray):
         audio._mfcc.setdefault(1.0, features)
     return audio
 

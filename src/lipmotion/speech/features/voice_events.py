@@ -67,6 +67,8 @@ BREATH_TILT_DB = (-8.0, 6.0)
 """Level from 3.5 to 7.6 kHz beside that from 1 to 3.5 kHz: s and sh are brighter."""
 BREATH_LOW_DB = -4.0
 """Level under 1 kHz beside that from 1 to 3.5 kHz, at most: rumble and plosives have more."""
+PAUSE_PIECE_S = 600.0
+"""Longer pauses are searched in pieces: silence may last for hours."""
 QUIET_REACH_S = 2.0
 """The quiet around a pause is looked for so far beside it."""
 QUIET_SHARE = 0.08
@@ -222,12 +224,17 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
 
 
 def _silences(units: Timeline[Unit]) -> list[tuple[float, float]]:
-    """Return start and end, in seconds, of the stretches without phones that are long enough for a breath."""
+    """Return start and end, in seconds, of the stretches without phones that are long enough for a breath, cut."""
     ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
     starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
     starts_s.append(max((span.end_s for span in units), default=0.0))
     pairs = zip(ends_s, starts_s, strict=True)
-    return [(start_s, end_s) for start_s, end_s in pairs if end_s - start_s >= BREATH_PAUSE_S]
+    return [
+        (first_s, min(first_s + PAUSE_PIECE_S, end_s))
+        for start_s, end_s in pairs
+        if end_s - start_s >= BREATH_PAUSE_S
+        for first_s in np.arange(start_s, end_s, PAUSE_PIECE_S).tolist()
+    ]
 
 
 def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:

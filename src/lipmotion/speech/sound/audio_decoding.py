@@ -25,6 +25,8 @@ speech needs less than 56, digital silence in FLAC 27. A small file must not fil
 LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
 """Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
 MOST_CHANNELS = 64
+PIECE_BYTES = 1 << 20
+"""Sound is collected in pieces of this size, and without digital silence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,7 @@ def decode_audio(container: Any, rate_hz: int, channel: int | None = None) -> De
     rate_hz : sampling rate to convert to
     channel : number of the channel to take; None: the mean of all channels
     Time 0 is the container's start; in a file without moving pictures, the first sample.
-    The silence that fills holes is allocated at the end, when its length is known and allowed.
+    Digital silence, and that which fills holes, is left out until the end: memory that nobody writes to costs nothing.
     Raises InputError: time stamps that jump by more than ``LONGEST_HOLE_S``, or leave more silence than
     ``MOST_SILENCE_RATIO`` allows; more sound than the bytes of the track can hold; a rate or a number of channels that
     no recorder has.
@@ -80,14 +82,15 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
 
 
 class _TrackDecoder:
-    """Decodes one track; the samples so far are in ``_bytes``, which grows in place."""
+    """Decodes one track; the sound so far is in ``_pieces``, each with the number of samples before it."""
 
     def __init__(self, container: Any, rate_hz: int, channel: int | None) -> None:
         self._container = container
         self._name = container.name.removeprefix("file:")
         self._stream = container.streams.audio[0]
         self._rate_hz, self._channel = rate_hz, channel
-        self._bytes = bytearray()
+        self._pieces = [(0, bytearray())]
+        self._count = 0
         self._resampler: Any = None
         self._form: tuple[Any, ...] = ()
         self._layout: Any = None
@@ -96,7 +99,6 @@ class _TrackDecoder:
         self._energies: NDArray[np.float64] | float = 0.0
         self._mean_energy = 0.0
         self._silence_s = self._sound_s = 0.0
-        self._holes: list[tuple[int, int]] = []  # position and number of bytes of each
         self._packets = self._damaged = self._size = 0
 
     def decoded(self) -> DecodedAudio:
@@ -109,9 +111,12 @@ class _TrackDecoder:
             self._resample(frame)
         self._flush()
         self._check_silence()
-        self._fill_holes()
+        samples = np.zeros(self._count, np.float32)
+        while self._pieces:  # each is freed when it is copied
+            first, piece = self._pieces.pop()
+            samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
         return DecodedAudio(
-            samples=np.frombuffer(self._bytes, np.float32)[self._cut :],
+            samples=samples[self._cut :],
             rate_hz=self._rate_hz,
             energies=tuple(np.atleast_1d(self._energies).tolist()),
             mean_energy=self._mean_energy,
@@ -147,7 +152,7 @@ class _TrackDecoder:
             elif time_s - self._clock_s > HOLE_S:
                 self._flush()
                 self._silence_s += time_s - self._clock_s
-                self._holes.append((len(self._bytes), self._silence(time_s - self._clock_s)))
+                self._count += self._silence(time_s - self._clock_s)
             if self._clock_s is None or abs(time_s - self._clock_s) > HOLE_S:
                 self._clock_s = time_s
         if self._clock_s is not None:
@@ -156,17 +161,17 @@ class _TrackDecoder:
     def _start(self, time_s: float) -> None:
         has_pictures = bool(video_streams(self._container))
         offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
-        self._bytes += bytes(self._silence(max(offset_s, 0.0)))
+        self._count += self._silence(max(offset_s, 0.0))
         self._cut = max(round(-offset_s * self._rate_hz), 0)
 
     def _silence(self, duration_s: float) -> int:
-        """Return the number of bytes of a hole's silence. Raises InputError: the hole is too long."""
+        """Return the number of samples of a hole's silence. Raises InputError: the hole is too long."""
         if duration_s > LONGEST_HOLE_S:
             raise InputError(
                 f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s, at most "
                 f"{LONGEST_HOLE_S:.0f} s are bridged; export the recording again"
             )
-        return 4 * round(duration_s * self._rate_hz)
+        return round(duration_s * self._rate_hz)
 
     def _check_silence(self) -> None:
         most_s = LONGEST_HOLE_S + MOST_SILENCE_RATIO * self._sound_s
@@ -184,17 +189,6 @@ class _TrackDecoder:
                 f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {most_s:.0f} s "
                 f"({LEAST_BYTES_PER_S:.0f} bytes a second); export the recording again"
             )
-
-    def _fill_holes(self) -> None:
-        """Insert the silence of all holes into the bytes, in place, from the last hole to the first."""
-        end, moved = len(self._bytes), sum(count for _, count in self._holes)
-        self._bytes += bytes(moved)
-        view = memoryview(self._bytes)
-        for start, count in reversed(self._holes):
-            view[start + moved : end + moved] = view[start:end]
-            moved -= count
-            view[start + moved : start + moved + count] = bytes(count)
-            end = start
 
     def _resample(self, frame: Any) -> None:
         import av
@@ -221,4 +215,10 @@ class _TrackDecoder:
                 self._energies = self._energies + np.square(channels, dtype=np.float64).sum(axis=0)
                 self._mean_energy += float(np.square(mean, dtype=np.float64).sum())
             chosen = mean if self._channel is None else channels[:, self._channel]
-            self._bytes += np.ascontiguousarray(chosen).data
+            if chosen.any():
+                first, piece = self._pieces[-1]
+                if first + len(piece) // 4 < self._count or len(piece) > PIECE_BYTES:
+                    piece = bytearray()
+                    self._pieces.append((self._count, piece))
+                piece += np.ascontiguousarray(chosen).data
+            self._count += len(chosen)

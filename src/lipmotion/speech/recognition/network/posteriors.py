@@ -20,7 +20,7 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import Registry
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, Passage, analysed
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
-from lipmotion.types import Audio, ParallelMap, TokenPosteriors
+from lipmotion.types import Audio, JoinedRows, ParallelMap, TokenPosteriors
 from lipmotion.types.audio import from_sixteen_bits
 from lipmotion.units import PHONES
 from lipmotion.units.ipa_phones import token_phones
@@ -213,27 +213,35 @@ def recording_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = ma
     """
 
     def joined() -> PhonePosteriors:
-        tokens = phone_recogniser(name).tokens
-        rows = -(-len(audio.log_energy) // POSTERIOR_STEP)
-        values = np.full((rows, len(tokens)), LEAST_LOG_POSTERIOR, np.float16)  # as stretches are computed
-        values[:, tokens.index(BLANK)] = 0
-        for stretch, posteriors in posterior_stretches(name, audio, each):
-            first = stretch.first // POSTERIOR_STEP
-            kept = posteriors.values[: rows - first]
-            values[first : first + len(kept)] = kept
-        return PhonePosteriors(values, tokens)
+        return PhonePosteriors(np.asarray(_posterior_rows(name, audio, each)), phone_recogniser(name).tokens)
 
     return audio.once(f"all posteriors of {name}", joined)
 
 
-def token_posteriors(name: str, audio: Audio, each: ParallelMap = map) -> TokenPosteriors:
+def _posterior_rows(name: str, audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
+    tokens = phone_recogniser(name).tokens
+    silence = np.full(len(tokens), LEAST_LOG_POSTERIOR, np.float16)  # as stretches are computed
+    silence[tokens.index(BLANK)] = 0
+    rows, end, parts = -(-audio.frames // POSTERIOR_STEP), 0, list[NDArray[np.float16]]()
+    for stretch, posteriors in posterior_stretches(name, audio, each):
+        first = stretch.first // POSTERIOR_STEP
+        if first < end:  # the last row of the one before
+            parts[-1] = parts[-1][: first - end]
+        parts += [np.broadcast_to(silence, (max(first - end, 0), len(tokens)))]
+        parts += [posteriors.values[: rows - first].astype(np.float16)]
+        end = first + len(parts[-1])
+    return JoinedRows([*parts, np.broadcast_to(silence, (rows - end, len(tokens)))])
+
+
+def token_posteriors(name: str, audio: Audio, each: ParallelMap = map, *, dense: bool = True) -> TokenPosteriors:
     """Return the posteriors in a recording as the input of an engine.
 
     audio      : an ``AnalysedAudio`` shares them with what recognises its phones
     name, each : as of ``posterior_stretches``, whose errors it raises
+    dense      : whether the values are an array; False: ``JoinedRows``
     """
     audio = analysed(audio)
-    values = recording_posteriors(name, audio, each).values
+    values: Any = recording_posteriors(name, audio, each).values if dense else _posterior_rows(name, audio, each)
     mean = mean_posterior(posterior_stretches(name, audio, each))
     return TokenPosteriors(values, phone_recogniser(name).source, mean)
 

@@ -99,13 +99,15 @@ def english_words() -> EnglishWords:
         ) from error
     base = float(np.log(log_math.exp(1)))
     pronounced = _pronunciations()
-    names = np.array(list(pronounced))
+    names = list(pronounced)
     scores = np.array([model.prob([word]) for word in pronounced]) * base
     chosen = np.argsort(-scores, kind="stable")[:MOST_WORDS]
     chosen = chosen[scores[chosen] > LEAST_LOG_PROBABILITY]
-    words = tuple(names[chosen].tolist())
-    tree = word_tree([_numbers(pronounced[word]) for word in words], scores[chosen] * LANGUAGE_WEIGHT)
-    return EnglishWords(tree, LanguageModel(words, model, base))
+    words = np.array([names[number] for number in chosen.tolist()])
+    numbers = [_numbers(pronounced[word]) for word in words.tolist()]
+    del pronounced, names  # no string of theirs is kept, which would keep the memory of many
+    tree = word_tree(numbers, scores[chosen] * LANGUAGE_WEIGHT)
+    return EnglishWords(tree, LanguageModel(tuple(words.tolist()), model, base))
 
 
 def _pronunciations() -> dict[str, list[str]]:
@@ -145,7 +147,7 @@ def word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float64]) ->
     differs = np.ones(rows.shape, bool)
     differs[1:] = np.logical_or.accumulate(rows[1:] != rows[:-1], axis=1)
     new = differs & inside
-    node = np.where(new, np.cumsum(new).reshape(rows.shape), 0)
+    node = np.where(new, np.cumsum(new, dtype=np.int32).reshape(rows.shape), 0)
     node = np.maximum.accumulate(node, axis=0)  # rows of the same beginning share its nodes
     count = int(new.sum()) + 1
     score = np.full(count + len(SOUNDS), -np.inf)
