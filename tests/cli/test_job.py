@@ -109,7 +109,8 @@ def test_each_option_is_declared_once() -> None:
     flags = [flag for each in told for flag in each.metadata.get("flags", ("--" + each.name.replace("_", "-"),))]
     assert len(set(flags)) == len(flags) > 30
     found = set()
-    for path in (Path(command_line.__file__).parent).rglob("*.py"):
+    source = Path(command_line.__file__).parents[2]
+    for path in [*(source / "lipmotion" / "cli").rglob("*.py"), *source.glob("lipmotion_*/verbs/*.py")]:
         calls = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
         words = {str(word.value) for node in calls for word in node.args if isinstance(word, ast.Constant)}
         found |= {f"{path.stem} {flag}" for flag in words & {*flags} - {"-o", "--output", "speech"}}

@@ -6,6 +6,7 @@ import json
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from shutil import copyfile
 from tempfile import TemporaryDirectory
 
 from fuzz.inputs import Files, Good
@@ -93,7 +94,10 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
     elif name == VOTES:
         read_votes(path)
     elif name == TRAINING:
-        Trainer(ProjectFolder(folder)).document()
+        with TemporaryDirectory() as own:  # a good copy is put beside the file
+            (Path(own) / TRAINING).parent.mkdir()
+            copyfile(path, Path(own) / TRAINING)
+            Trainer(ProjectFolder(Path(own))).document()
     elif name == PROJECT:
         project = ProjectFolder(folder).project
         require(project_from(from_json(json.dumps(project_document(project)))) == project, "another project")
