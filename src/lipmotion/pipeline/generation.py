@@ -60,7 +60,7 @@ OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lip
 WHOLE_TRANSCRIPT = "a transcript of all that is said, and of nothing else"
 LESS_NOISE = "a recording with less noise"
 RAMP_FRAMES = 12
-"""Frames at both ends of a passage in which the mouth comes from rest, or goes there."""
+"""Frames beside a passage in which the mouth comes from rest, or goes there; within it, where another one is near."""
 NOWHERE_S = 1e6
 """Nothing that is detected or pinned lies so long before a recording."""
 LONG_SILENCE_S = 10.0
@@ -364,11 +364,16 @@ def _join_rows(
     whole = np.empty((len(like), len(still)), like.dtype)
     whole[:] = still
     ramp = (1 - np.cos(np.pi * np.arange(1, RAMP_FRAMES + 1) / (RAMP_FRAMES + 1))) / 2
-    for part, inside in zip(parts, rows, strict=True):
-        share = np.concatenate([ramp, np.ones(part.frames - 2 * RAMP_FRAMES), ramp[::-1]])
-        first, end = max(part.first, 0), min(part.first + part.frames, len(like))
-        chosen = slice(first - part.first, end - part.first)
-        whole[first:end] += share[chosen, None] * (inside[chosen] - still)
+    edges = [-NOWHERE_S, *(edge for part in parts for edge in (part.first, part.first + part.frames)), NOWHERE_S]
+    rooms = [after - before >= 2 * RAMP_FRAMES for before, after in zip(edges[::2], edges[1::2], strict=True)]
+    for part, inside, *is_room in zip(parts, rows, rooms, rooms[1:], strict=False):
+        lead, tail = (RAMP_FRAMES if room else 0 for room in is_room)  # outside, where nobody else speaks there
+        moved = np.pad(inside, ((lead, tail), (0, 0)), "edge") - still
+        moved[:RAMP_FRAMES] *= ramp[:, None]
+        moved[-RAMP_FRAMES:] *= ramp[::-1, None]
+        start = part.first - lead
+        first, end = max(start, 0), min(start + len(moved), len(like))
+        whole[first:end] += moved[first - start : end - start]
     return whole
 
 
