@@ -110,26 +110,17 @@ def _prepare(name: str, recordings: Path, workers: str) -> Job:
     return Job(name, ("corpus", "prepare", str(recordings), "-o", "corpus", "--workers", workers))
 
 
+def _speech(inputs: Path) -> tuple[str, ...]:
+    model = ("--model", str(inputs / "model.lipmotion"), "--recogniser", "own")
+    return str(inputs / "recordings" / "toy00.mp4"), *model
+
+
 def _animate(inputs: Path) -> Job:
-    speech = (
-        str(inputs / "recordings" / "toy00.mp4"),
-        "--model",
-        str(inputs / "model.lipmotion"),
-        "--recogniser",
-        "own",
-    )
-    return Job("animate", ("animate", *speech, "-o", "a.json", "a.mp4"), ("a.json", "a.mp4"))
+    return Job("animate", ("animate", *_speech(inputs), "-o", "a.json", "a.mp4"), ("a.json", "a.mp4"))
 
 
 def _cues(inputs: Path) -> Job:
-    speech = (
-        str(inputs / "recordings" / "toy00.mp4"),
-        "--model",
-        str(inputs / "model.lipmotion"),
-        "--recogniser",
-        "own",
-    )
-    return Job("cues", ("cues", *speech, "-o", "a.tsv", "--machine-readable"), ("a.tsv",), "stderr")
+    return Job("cues", ("cues", *_speech(inputs), "-o", "a.tsv", "--machine-readable"), ("a.tsv",), "stderr")
 
 
 def _adapt(inputs: Path) -> Job:

@@ -31,8 +31,6 @@ Made = TypeVar("Made")
 class ShownFace(ABC):
     """A face with all that outputs ask of it."""
 
-    files: tuple[Path, ...] = ()
-    """Pictures that it is read from."""
     has_own_background = False
     """Whether the background is footage, and not a colour."""
     character: DrivenCharacter | None = None
