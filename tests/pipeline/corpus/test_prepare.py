@@ -272,7 +272,8 @@ def hold(event):
     items.append(isinstance(event, Item))
     if sum(items) == 2:
         print("two are done", flush=True)
-        time.sleep(600)
+        while True:
+            time.sleep(0.05)  # a signal that comes just before one long sleep would be handled after it
 
 if __name__ == "__main__":
     prepare(Path(sys.argv[1]), Path(sys.argv[2]), workers=2, monitor=hold)
