@@ -18,7 +18,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
@@ -117,20 +117,19 @@ def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequen
 
 
 def _row(corpus: Corpus, result: HeldOutResult, seed: int) -> dict[str, Any]:
-    """Return the figures of one model, by condition."""
-    conditions = {name: figures_of(clips, result.recordings, seed) for name, clips in result.clips.items()}
+    """Return the figures of one model, by condition; None for channels that the corpus does not have."""
+    conditions = {}
+    for name, clips in result.clips.items():
+        figures = figures_of(clips, result.recordings, seed)
+        channels = figures["channels"]
+        accs = {f"acc_{other}": channels[other]["acc"] if other in channels else None for other in OTHERS}
+        conditions[name] = opening_row(figures) | accs
     return {
         "used": len(result.used),
         "minutes": sum(corpus.utterance(name).audio.duration_s for name in result.used) / 60,
         "seconds": result.seconds,
-        "conditions": {name: opening_row(figures) | _other_accs(figures) for name, figures in conditions.items()},
+        "conditions": conditions,
     }
-
-
-def _other_accs(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ACC of the other channels; None where the corpus does not have them."""
-    channels = figures["channels"]
-    return {f"acc_{name}": channels[name]["acc"] if name in channels else None for name in OTHERS}
 
 
 def table(figures: Mapping[str, Any]) -> str:

@@ -17,7 +17,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
-from lipmotion_lab.evaluation.figures import BILABIAL
+from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import ComparedClip, compared_clips, held_out_recordings
 from lipmotion_lab.folds import folds, table
 from lipmotion_lab.runner import ExperimentSettings

@@ -9,12 +9,10 @@ from typing import Any
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion_lab.comparison import sign_of_difference
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY
-from lipmotion_lab.hofer2008.table1 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
-from lipmotion_lab.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
+from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
+from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion_lab.report.charts import Dot, dots, rising
-from lipmotion_lab.report.order import PaperOrder, PaperPair
-from lipmotion_lab.report.section import Section, difference, named, warning_of
-from lipmotion_lab.report.table import (
+from lipmotion_lab.report.section import (
     ACC,
     ELSEWHERE,
     JERK,
@@ -25,8 +23,14 @@ from lipmotion_lab.report.table import (
     SCORE,
     VARIANCE,
     Column,
+    PaperOrder,
+    PaperPair,
     Row,
+    Section,
     Table,
+    difference,
+    named,
+    warning_of,
 )
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, TUNED
 

@@ -19,7 +19,7 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
 from lipmotion_faces import Staging, staged_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
-from lipmotion_lab.evaluation.figures import BILABIAL
+from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
 from lipmotion_lab.report.charts import curve
 

@@ -95,7 +95,7 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
 
 def run_hofer2008(options: argparse.Namespace) -> None:
     """Call ``experiment.hofer2008`` and print its tables; with ``--output``, a second run goes on where one stopped."""
-    from lipmotion_lab.hofer2008.table1 import FULL, QUICK, hofer2008, table
+    from lipmotion_lab.hofer2008 import FULL, QUICK, hofer2008, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         with unfinished_parts(options) as work:
@@ -187,8 +187,7 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
     from lipmotion.corpora.splits import read_names
     from lipmotion.errors import InputError
     from lipmotion_lab.noise import NoiseConditions, read_talkers
-    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
-    from lipmotion_lab.xie_liu2007.text import table
+    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, table, xieliu2007
 
     if options.quick and options.order:
         raise InputError("--quick takes recordings of its own, and --order is a list of others; leave out one of them")
@@ -229,7 +228,7 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 def run_minnis2000(options: argparse.Namespace) -> None:
     """Call ``experiment.minnis2000`` and print its table; with ``--output``, a second run goes on where one stopped."""
-    from lipmotion_lab.minnis_breen2000.minnis2000 import minnis2000, table
+    from lipmotion_lab.minnis2000 import minnis2000, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         with unfinished_parts(options) as work:
@@ -249,7 +248,7 @@ def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -
 
 def run_engines(options: argparse.Namespace) -> None:
     """Call ``experiment.engines`` and print its table."""
-    from lipmotion_lab.engines.engine_comparison import engines, table
+    from lipmotion_lab.engine_comparison import engines, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         return engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)

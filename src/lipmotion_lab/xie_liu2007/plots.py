@@ -15,7 +15,7 @@ from lipmotion.extensions import install_command
 from lipmotion.storage.files import make_folder, whole_file
 from lipmotion.types import GREY
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
-from lipmotion_lab.xie_liu2007.tuning import TrainedSystem
+from lipmotion_lab.xie_liu2007.systems import TrainedSystem
 
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
 """Recordings that are shown in one picture."""

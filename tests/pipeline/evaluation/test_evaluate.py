@@ -22,8 +22,7 @@ from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
-from lipmotion_lab.evaluation.evaluate import _was_trained_on
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.evaluate import _was_trained_on, figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     ComparedClip,

@@ -15,7 +15,7 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.examples import examples
 from lipmotion.types import silent_monitor
 from lipmotion_lab.evaluation.held_out import HeldOutRecordings, compared_clips, held_out_recordings
-from lipmotion_lab.xie_liu2007.tuning import (
+from lipmotion_lab.xie_liu2007.systems import (
     CONVERSIONS,
     Trial,
     TuningOptions,

@@ -33,8 +33,8 @@ from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab.comparison import correlation_statistic, opening_curves, significance_mark
-from lipmotion_lab.engines.models import EngineModel, engine_models
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.engine_comparison import EngineModel, engine_models
+from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     DISTANCES,
@@ -197,7 +197,7 @@ def minnis2000(
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
-    the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/minnis_breen2000).
+    the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/test_minnis2000.py).
     Raises CorpusError: no utterances to train on or of ``test``, or motion without an opening.
     Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
     """

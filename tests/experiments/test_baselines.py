@@ -10,7 +10,7 @@ from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, silent_monitor
-from lipmotion_lab.baselines.frame_regression import REACH, ContextRidge, LoudnessRegression, MeanPose
+from lipmotion_lab.baselines import REACH, ContextRidge, LoudnessRegression, MeanPose
 
 BASELINES: list[type] = [MeanPose, LoudnessRegression, ContextRidge]
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines.joint.config import JointEngineConfig
@@ -27,14 +26,13 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS, Lexicon
 from lipmotion_lab.comparison import (
-    ClipStatistic,
     closing_score_statistic,
     correlation_statistic,
     opening_curves,
     sign_of_difference,
     significance_mark,
 )
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
@@ -93,6 +91,16 @@ class _System:
     gaussians: int
     acc: dict[int, float]
 
+    def generate(self, recordings: HeldOutRecordings) -> dict[tuple[str, str], Sequence[ComparedClip]]:
+        """Return what it makes of held-out recordings, by condition and name of ``PINS``."""
+        clips: dict[tuple[str, str], Sequence[ComparedClip]] = {}
+        for condition in recordings.conditions:
+            speech = speech_of_condition(recordings, condition, self.engine, self.model)
+            for pins, closures in PINS.items():
+                engine = JointEngine(replace(self.engine.config, closures=closures))
+                clips[condition, pins] = compare_with_recorded(recordings, speech, engine, self.model)
+        return clips
+
 
 @one_thread()
 def hofer2008(
@@ -140,20 +148,27 @@ def hofer2008(
     choosing = recordings_of(validation, sub_monitor(monitor, 0.1, 0.12))
     recordings = recordings_of(held_out, sub_monitor(monitor, 0.12, 0.15))
     cells = [(states, units) for states in options.states for units in PAPER_SCORES]
-    made: dict[tuple[int, str], _Made] = {}
+    systems: dict[int, dict[str, _System]] = {states: {} for states in options.states}
+    generated: dict[tuple[int, str], dict[tuple[str, str], Sequence[ComparedClip]]] = {}
     for number, (states, units) in enumerate(cells):
         start, end = (0.15 + 0.85 * (number + step) / len(cells) for step in (0, 1))
         part = sub_monitor(monitor, start, end, f"{units}, {states} states: ")
         engine = _engine(units=units, states=states, mixtures=max(options.mixtures))
-        system = _trained(engine, options.mixtures, examples, choosing, checkpoint, part)
-        made[states, units] = _made(recordings, system)
-        for (condition, pins), clips in made[states, units].clips.items():
+        system = _train_system(engine, options.mixtures, examples, choosing, checkpoint, part)
+        systems[states][units], generated[states, units] = system, system.generate(recordings)
+        for (condition, pins), clips in generated[states, units].items():
             if not PINS[pins]:
                 settings.receive(f"{units}, {states} states", condition, recordings, clips)
     about = {"split": split or "all", "clips": len(recordings.utterances), "trained_on": len(examples)}
     about |= {"closed_under": recordings.closed_under, "mixtures": list(options.mixtures), "seed": settings.seed}
     tables = [
-        _table(recordings, {units: made[states, units] for units in PAPER_SCORES}, condition, pins, settings.seed)
+        {"condition": condition, "pins": pins}
+        | _table(
+            recordings,
+            systems[states],
+            {units: generated[states, units][condition, pins] for units in PAPER_SCORES},
+            settings.seed,
+        )
         | {"states": states}
         for states in options.states
         for condition in recordings.conditions
@@ -166,7 +181,7 @@ def _engine(**options: Any) -> JointEngine:
     return JointEngine(JointEngineConfig(**{**JointEngineConfig.presets[PRESET], **options}))
 
 
-def _trained(
+def _train_system(
     engine: JointEngine,
     counts: Sequence[int],
     examples: Sequence[Example],
@@ -177,83 +192,53 @@ def _trained(
     """Return a system with the number of Gaussians whose motion correlates best with that of some recordings.
 
     Among equals, the smallest is chosen. A system is the same, whether it was trained now or found.
+    Raises InputError: training ends before any of the numbers of Gaussians.
     """
     stage = f"{engine.config.units}-{engine.config.states}-{'.'.join(map(str, counts))}"
     arrays = checkpoint.load(stage)
     if arrays is None:
-        arrays = _chosen(engine, counts, examples, choosing, monitor)
+        tried: dict[int, float] = {}
+        arrays = {}
+        for model in engine.growing_models(examples, monitor):
+            gaussians = model.hmm.models[SPEECH].tied.mixtures.size[1]
+            if gaussians in counts:
+                clips = compared_clips(choosing, AUDIO_ONLY, engine, model)
+                tried[gaussians] = correlation_statistic(*opening_curves(choosing, clips)).value
+                if _best_count(tried) == gaussians:
+                    arrays = engine.to_arrays(model)
+        if not tried:
+            raise InputError(f"no state has data for {min(counts)} Gaussians; compare also fewer, from 1")
+        arrays |= {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
         checkpoint.save(stage, arrays)
     acc = dict(zip(arrays[_COUNTS].tolist(), arrays[_ACC].tolist(), strict=True))
     model = engine.from_arrays({name: array for name, array in arrays.items() if name not in (_ACC, _COUNTS)})
-    return _System(engine, model, _best(acc), acc)
+    return _System(engine, model, _best_count(acc), acc)
 
 
-def _chosen(
-    engine: JointEngine,
-    counts: Sequence[int],
-    examples: Sequence[Example],
-    choosing: HeldOutRecordings,
-    monitor: Monitor,
-) -> dict[str, NDArray[Any]]:
-    """Return the arrays of the chosen model, and the correlations by which it was chosen.
-
-    Raises InputError: training ends before any of the numbers of Gaussians.
-    """
-    acc: dict[int, float] = {}
-    arrays: dict[str, NDArray[Any]] = {}
-    for model in engine.growing_models(examples, monitor):
-        gaussians = model.hmm.models[SPEECH].tied.mixtures.size[1]
-        if gaussians in counts:
-            made = compared_clips(choosing, AUDIO_ONLY, engine, model)
-            acc[gaussians] = correlation_statistic(*opening_curves(choosing, made)).value
-            if _best(acc) == gaussians:
-                arrays = engine.to_arrays(model)
-    if not acc:
-        raise InputError(f"no state has data for {min(counts)} Gaussians; compare also fewer, from 1")
-    return arrays | {_COUNTS: np.array(list(acc)), _ACC: np.array(list(acc.values()))}
-
-
-def _best(acc: Mapping[int, float]) -> int:
+def _best_count(acc: Mapping[int, float]) -> int:
     """Return the number of Gaussians with the highest correlation; among equals the smallest."""
     return max(acc, key=lambda count: (acc[count], -count))
 
 
-@dataclass(frozen=True, eq=False)
-class _Made:
-    """What a system made of held-out recordings, by condition and name of ``PINS``."""
-
-    system: _System
-    clips: Mapping[tuple[str, str], Sequence[ComparedClip]]
-
-
-def _made(recordings: HeldOutRecordings, system: _System) -> _Made:
-    clips: dict[tuple[str, str], Sequence[ComparedClip]] = {}
-    for condition in recordings.conditions:
-        speech = speech_of_condition(recordings, condition, system.engine, system.model)
-        for pins, closures in PINS.items():
-            engine = JointEngine(replace(system.engine.config, closures=closures))
-            clips[condition, pins] = compare_with_recorded(recordings, speech, engine, system.model)
-    return _Made(system, clips)
-
-
 def _table(
-    recordings: HeldOutRecordings, made: Mapping[str, _Made], condition: str, pins: str, seed: int
+    recordings: HeldOutRecordings,
+    systems: Mapping[str, _System],
+    clips: Mapping[str, Sequence[ComparedClip]],
+    seed: int,
 ) -> dict[str, Any]:
     """Return the figures of all sets in one condition, and the intervals of the differences of every two of them."""
-    scores: dict[str, ClipStatistic] = {}
-    acc: dict[str, ClipStatistic] = {}
-    for units, of_set in made.items():
-        generated, original = opening_curves(recordings, of_set.clips[condition, pins])
-        scores[units] = closing_score_statistic(generated, original, recordings.closed_under or 0.0)
-        acc[units] = correlation_statistic(generated, original)
+    openings = {units: opening_curves(recordings, own) for units, own in clips.items()}
+    threshold = recordings.closed_under or 0.0
+    scores = {units: closing_score_statistic(*pair, threshold) for units, pair in openings.items()}
+    acc = {units: correlation_statistic(*pair) for units, pair in openings.items()}
     rows = {}
-    for units, of_set in made.items():
-        figures = figures_of(of_set.clips[condition, pins], recordings, seed)
+    for units, system in systems.items():
+        figures = figures_of(clips[units], recordings, seed)
         rows[units] = opening_row(figures) | {
             "units": UNIT_SETS[units].count,
             "paper": PAPER_SCORES[units],
-            "gaussians": of_set.system.gaussians,
-            "acc_on_val": {str(count): value for count, value in of_set.system.acc.items()},
+            "gaussians": system.gaussians,
+            "acc_on_val": {str(count): value for count, value in system.acc.items()},
             "jerk": figures["channels"][OPENING]["jerk"],
             "score_95": scores[units].interval(seed),
             "score_gain_95": scores[units].gain(scores[REFERENCE_SET], seed),
@@ -263,7 +248,7 @@ def _table(
         {"better": better, "worse": worse, "score_gain_95": scores[better].gain(scores[worse], seed)}
         for better, worse in combinations(PAPER_SCORES, 2)
     ]
-    return {"condition": condition, "pins": pins, "rows": rows, "paper_order": pairs}
+    return {"rows": rows, "paper_order": pairs}
 
 
 HEAD = (

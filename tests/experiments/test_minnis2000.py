@@ -15,7 +15,7 @@ from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
-from lipmotion_lab.minnis_breen2000.minnis2000 import (
+from lipmotion_lab.minnis2000 import (
     ADDITIONS,
     EVERYTHING,
     PRINTED,
@@ -87,7 +87,7 @@ def test_a_run_that_was_stopped_goes_on(
     def run() -> dict[str, Any]:
         return minnis2000(toy_corpus, work=tmp_path, settings=ExperimentSettings(recogniser=PHONE_MODELS))
 
-    module = "lipmotion_lab.minnis_breen2000.minnis2000.join_figures"
+    module = "lipmotion_lab.minnis2000.join_figures"
     made: list[None] = []
 
     def stopping(*given: Any) -> dict[str, Any]:

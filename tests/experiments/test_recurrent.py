@@ -8,9 +8,8 @@ import pytest
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, Progress
-from lipmotion_lab.baselines import recurrent as network
-from lipmotion_lab.baselines.frame_regression import FrameRegressionModel
-from lipmotion_lab.baselines.recurrent import BlstmBaseline
+from lipmotion_lab import baselines as network
+from lipmotion_lab.baselines import BlstmBaseline, FrameRegressionModel
 
 pytest.importorskip("torch", reason="the extra 'network' is not installed")
 

@@ -13,16 +13,15 @@ from typing import Any
 import pytest
 
 from experiments.copies import copied, renamed
-from experiments.report.test_sections import figures_of
+from experiments.test_sections import figures_of
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
-from lipmotion_lab.hofer2008 import table1
-from lipmotion_lab.hofer2008.table1 import PAPER_SCORES, Table1Options
-from lipmotion_lab.report import parts, report
-from lipmotion_lab.report.parts import PARTS, PartRun, ReportPart
-from lipmotion_lab.report.report import PAGE, WrittenReport, experiment_report
+from lipmotion_lab import hofer2008 as table1
+from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options
+from lipmotion_lab.report import report
+from lipmotion_lab.report.report import PAGE, PARTS, PartRun, ReportPart, WrittenReport, experiment_report
 from lipmotion_lab.runner import ExperimentSettings
 from study.browser import BROWSER, DRIVER, MISSING, axe_script, browser
 
@@ -59,8 +58,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return figures_of(name)
 
     stand_ins = {name: replace(part, run=partial(run, name), draws=False) for name, part in PARTS.items()}
-    for module in (parts, report):
-        monkeypatch.setattr(module, "PARTS", stand_ins)
+    monkeypatch.setattr(report, "PARTS", stand_ins)
     return names
 
 

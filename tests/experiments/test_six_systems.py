@@ -22,7 +22,7 @@ from lipmotion_lab.noise import NoiseConditions
 from lipmotion_lab.runner import ExperimentSettings
 from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
-from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
+from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, table, xieliu2007
 from lipmotion_lab.xie_liu2007.systems import (
     BEST_PATH,
     BLSTM,
@@ -31,11 +31,10 @@ from lipmotion_lab.xie_liu2007.systems import (
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     TUNED,
+    TuningOptions,
     selected_systems,
     system_from_arrays,
 )
-from lipmotion_lab.xie_liu2007.text import table
-from lipmotion_lab.xie_liu2007.tuning import TuningOptions
 
 LONG = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -257,7 +256,7 @@ def test_noise_that_cannot_be_made() -> None:
 
 
 def test_the_document_shows_the_figures_beside_it() -> None:
-    results = Path(__file__).parents[3] / "docs" / "results"
+    results = Path(__file__).parents[2] / "docs" / "results"
     text = (results / "xieliu2007.md").read_text(encoding="utf-8")
     figures = json.loads((results / "xieliu2007.json").read_text(encoding="utf-8"))
     assert f"```text\n{table(figures)}\n```" in text
