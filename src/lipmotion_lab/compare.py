@@ -129,8 +129,8 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
     if points:
         figures["points"] = _point_figures(made, original, points)
     if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
-        sides = ([_values(side, upper)[:, :, None]] for side in (made, original))
-        deviation = vertices.upper_face_deviation(*sides, rest=np.zeros((len(upper), 1)))
+        generated, recorded = ([_values(side, upper)[:, :, None]] for side in (made, original))
+        deviation = vertices.upper_face_deviation(generated, recorded, rest=np.zeros((len(upper), 1)))
         figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
     return figures
 

@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any
 
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.engines import engine_named
+from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.evaluation_table import figure_text
@@ -27,12 +27,12 @@ from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,
     HeldOutRecordings,
-    compare_with_recorded,
-    held_out_recordings,
-    speech_of_condition,
+    generate_compared,
+    load_held_out,
+    make_speech,
 )
 from lipmotion_lab.learning_curve import check_training_names
-from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, opening_row
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, check_opening, opening_row_with_rates
 
 ENGINES_COMPARED = ("trajectory", "coupled", "selection")
 SUFFIX = ".lipmotion"
@@ -56,61 +56,46 @@ def engine_models(
 ) -> dict[str, EngineModel]:
     """Return models of the corpus's training list, each engine by its defaults.
 
+    folder : holds the models; what is not there yet is trained and put there. None: all are trained and not kept
     names  : of the engines
-    folder : has or gets the models, ``trajectory.lipmotion`` and so on; None: all are trained, and none is kept.
-             Training that was stopped goes on where it was.
-    No model stands on another one, which may have been trained on the recordings that are compared.
-    Raises CorpusError: no training list, or nothing in it that can be used.
-    Raises InputError: a file in the folder is a model of something else.
+    A run that was stopped goes on where it was.
+    Raises CorpusError: no training list. Raises InputError: a file in the folder is a model of something else.
     Raises ModelFormatError: a file in the folder is no model.
     Raises ExportError: the folder cannot be written to, or holds the corpus.
     """
-    corpus.required("train")
-    found: dict[str, EngineModel] = {}
+    training = corpus.required("train")
+    models: dict[str, EngineModel] = {}
     if folder is not None:
         check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
         make_folder(folder)
-        found = _present(corpus, folder, names)
-    missing = [name for name in names if name not in found]
+        paths = {name: folder / f"{name}{SUFFIX}" for name in names}
+        models = {name: EngineModel(load_model(path), None) for name, path in paths.items() if path.is_file()}
+        if models:
+            utterances = [corpus.utterance(name) for name in training]
+            required = about_training(corpus, utterances, "train", len(training))
+            for name, kept in models.items():
+                _check_model(paths[name], name, kept.model, required)
+    missing = [name for name in names if name not in models]
     for number, name in enumerate(missing):
         part = sub_monitor(settings.monitor, number / len(missing), (number + 1) / len(missing), f"{name}: ")
-        found[name] = _trained(corpus, name, folder, settings, Run(part, None, settings.workers))
-    return {name: found[name] for name in names}
+        start_s, engine, here = perf_counter(), engine_named(name, {}), replace(settings, monitor=part)
+        if folder is None:
+            model = train_engine(corpus, engine, here)
+        else:
+            with unfinished_work(paths[name]) as work:
+                save_model(train_engine(corpus, engine, here, work), paths[name])
+            model = load_model(paths[name])  # as the next run finds it
+        models[name] = EngineModel(model, perf_counter() - start_s)
+    return {name: models[name] for name in names}
 
 
-def _trained(corpus: Corpus, name: str, folder: Path | None, settings: ExperimentSettings, run: Run) -> EngineModel:
-    start_s = perf_counter()
-
-    def learned(work: Path | None) -> Model:
-        return train(
-            corpus,
-            engine=engine_named(name, {}),
-            recogniser=settings.recogniser,
-            lexicon=settings.lexicon,
-            run=Run(run.monitor, work, run.workers),
-        )[0]
-
-    if folder is None:
-        return EngineModel(learned(None), perf_counter() - start_s)
-    path = folder / f"{name}{SUFFIX}"
-    with unfinished_work(path) as work:
-        save_model(learned(work), path)
-    return EngineModel(load_model(path), perf_counter() - start_s)  # as the next run finds it
+def train_engine(corpus: Corpus, engine: Engine[Any], settings: ExperimentSettings, work: Path | None = None) -> Model:
+    """Return a model of the training list; ``work``: a folder from which training that was stopped goes on."""
+    run = Run(settings.monitor, work, settings.workers)
+    return train(corpus, engine=engine, recogniser=settings.recogniser, lexicon=settings.lexicon, run=run)[0]
 
 
-def _present(corpus: Corpus, folder: Path, engines: Sequence[str]) -> dict[str, EngineModel]:
-    """Return the models that are in a folder. Raises InputError: one of them is of something else."""
-    paths = {name: folder / f"{name}{SUFFIX}" for name in engines}
-    models = {name: load_model(path) for name, path in paths.items() if path.is_file()}
-    if models:
-        names = corpus.required("train")
-        wanted = about_training(corpus, [corpus.utterance(name) for name in names], "train", len(names))
-        for name, model in models.items():
-            _check(paths[name], name, model, wanted)
-    return {name: EngineModel(model, None) for name, model in models.items()}
-
-
-def _check(path: Path, name: str, model: Model, wanted: Mapping[str, object]) -> None:
+def _check_model(path: Path, name: str, model: Model, required: Mapping[str, object]) -> None:
     """Raise InputError unless a model is one of this engine and of the training list of the corpus."""
     way_out = "; move it away, or give another folder"
     if model.engine.name != name:
@@ -120,10 +105,12 @@ def _check(path: Path, name: str, model: Model, wanted: Mapping[str, object]) ->
             f"{path}: stands on another model, which may know the recordings that are compared; required one that "
             f"stands on none (train --from none){way_out}"
         )
-    different = [key for key in CHECKED if model.about.get(key) != wanted[key]]
+    different = [key for key in CHECKED if model.about.get(key) != required[key]]
     if different:
-        found, required = (", ".join(f"{key} {about.get(key)}" for key in different) for about in (model.about, wanted))
-        raise InputError(f"{path}: trained on {found}, required the training list of this corpus: {required}{way_out}")
+        texts = [", ".join(f"{key} {about.get(key)}" for key in different) for about in (model.about, required)]
+        raise InputError(
+            f"{path}: trained on {texts[0]}, required the training list of this corpus: {texts[1]}{way_out}"
+        )
 
 
 NAME_WIDTH = 19
@@ -168,29 +155,15 @@ def _line(name: str, row: Mapping[str, Any], reference: str) -> str:
         significance_mark(row["acc_gain_95"][reference]),
         *(figure_text(end, ".3f") for end in row["acc_95"]),
     )
-    opening = figure_text(row["nrmse"], "7.3f") + figure_text(row["global_variance"], "10.2f")
-    opening += figure_text(row["jerk"], "6.2f")
-    return (
-        f"  {name:{NAME_WIDTH}}{acc:23}{opening}{figure_text(row['width_acc'], '7.3f')} |{_closures(row)} |"
-        f"{'':9}{_closures(row['unpinned'])}"
-    )
-
-
-def _closures(row: Mapping[str, Any]) -> str:
-    return "".join(figure_text(row[name], form) for name, form in CLOSURES)
+    columns = (("nrmse", "7.3f"), ("global_variance", "10.2f"), ("jerk", "6.2f"), (f"{WIDTH}_acc", "7.3f"))
+    opening = "".join(figure_text(row[key], form) for key, form in columns)
+    pinned, free = ("".join(figure_text(of[key], form) for key, form in CLOSURES) for of in (row, row["unpinned"]))
+    return f"  {name:{NAME_WIDTH}}{acc:23}{opening} |{pinned} |{'':9}{free}"
 
 
 REFERENCE_ENGINE = "trajectory"
 """The engine that every other system is compared with; its phone models give the phones in time."""
 WIDTH = "width"
-
-
-@dataclass(frozen=True, eq=False)
-class _MadeClips:
-    """What a system generates in one condition, with closures forced and without."""
-
-    pinned: Sequence[ComparedClip]
-    free: Sequence[ComparedClip]
 
 
 @one_thread()
@@ -212,10 +185,10 @@ def engines(
     """
     held_out = corpus.required(split)
     check_training_names(corpus, corpus.required("train"), held_out)
-    channels = channels_with_opening(corpus, held_out)
+    channels = check_opening(corpus, held_out)
     monitor = settings.monitor
     trained = engine_models(corpus, models, replace(settings, monitor=sub_monitor(monitor, 0, 0.6)))
-    recordings = held_out_recordings(
+    recordings = load_held_out(
         corpus,
         cached_recogniser(trained[REFERENCE_ENGINE].model.phones),
         selection=Selection(names=held_out),
@@ -224,17 +197,18 @@ def engines(
         monitor=sub_monitor(monitor, 0.6, 0.7),
     )
     steps = [(condition, name) for condition in recordings.conditions for name in trained]
-    made: dict[str, dict[str, _MadeClips]] = {condition: {} for condition in recordings.conditions}
+    pinned: dict[str, dict[str, Sequence[ComparedClip]]] = {condition: {} for condition in recordings.conditions}
+    unpinned: dict[str, dict[str, Sequence[ComparedClip]]] = {condition: {} for condition in recordings.conditions}
     for condition, name in with_progress(steps, "comparing", sub_monitor(monitor, 0.7, 1)):
         system = trained[name].model
         known = replace(recordings, speakers=system.speakers)
-        speech = speech_of_condition(known, condition, system.engine, system.learned)
-        pinned = compare_with_recorded(known, speech, system.engine, system.learned)
+        speech = make_speech(known, condition, system.engine, system.learned)
+        clips = generate_compared(known, speech, system.engine, system.learned)
         free = system.engine.without_closures()
-        made[condition][name] = _MadeClips(
-            pinned, compare_with_recorded(known, speech, free, system.learned) if free != system.engine else pinned
-        )
-        settings.receive(name, condition, recordings, made[condition][name].pinned)
+        pinned[condition][name], unpinned[condition][name] = clips, clips
+        if free != system.engine:
+            unpinned[condition][name] = generate_compared(known, speech, free, system.learned)
+        settings.receive(name, condition, recordings, clips)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
     about["models"] = {
@@ -246,34 +220,37 @@ def engines(
         }
         for name, each in trained.items()
     }
-    conditions = {}
-    for condition, found in made.items():
-        references = {name: each.pinned for name, each in found.items()}
-        rows = {name: _row(recordings, each, references, settings.seed) for name, each in found.items()}
-        conditions[condition] = {"systems": rows}
+    conditions = {
+        condition: {
+            "systems": {
+                name: _row(recordings, clips, unpinned[condition][name], found, settings.seed)
+                for name, clips in found.items()
+            }
+        }
+        for condition, found in pinned.items()
+    }
     return nan_as_null(about | {"conditions": conditions})
 
 
 def _row(
-    recordings: HeldOutRecordings, made: _MadeClips, references: Mapping[str, Sequence[ComparedClip]], seed: int
+    recordings: HeldOutRecordings,
+    pinned: Sequence[ComparedClip],
+    free: Sequence[ComparedClip],
+    systems: Mapping[str, Sequence[ComparedClip]],
+    seed: int,
 ) -> dict[str, Any]:
     """Return the figures of one system; ``unpinned``: those of the opening without forced closures.
 
-    ``acc_gain_95`` has the paired 95 % interval of its ACC minus that of each engine.
+    ``acc_gain_95`` has the paired 95 % interval of its ACC minus that of each of the systems.
     """
-    own = correlation_statistic(*opening_curves(recordings, made.pinned))
+    acc = correlation_statistic(*opening_curves(recordings, pinned))
     gains = {
-        name: own.gain(correlation_statistic(*opening_curves(recordings, clips)), seed)
-        for name, clips in references.items()
+        name: acc.gain(correlation_statistic(*opening_curves(recordings, clips)), seed)
+        for name, clips in systems.items()
     }
-    figures = figures_of(made.pinned, recordings, seed)
+    figures = figures_of(pinned, recordings, seed)
     width = figures["channels"].get(WIDTH, {})
-    row = _opening(figures) | {"acc_gain_95": gains}
+    row = opening_row_with_rates(figures) | {"acc_gain_95": gains}
     row |= {f"{WIDTH}_{name}": width.get(name) for name in ("acc", "nrmse", "global_variance")}
     row |= {"jerk": figures["channels"][OPENING]["jerk"], "lag_ms": figures["lag_ms"]}
-    return row | {"unpinned": _opening(figures_of(made.free, recordings, seed))}
-
-
-def _opening(figures: Mapping[str, Any]) -> dict[str, Any]:
-    lips = figures["closures_p_b_m"]
-    return opening_row(figures) | {name: lips[name] for name in ("false_per_minute", "original_per_minute")}
+    return row | {"unpinned": opening_row_with_rates(figures_of(free, recordings, seed))}

@@ -29,12 +29,12 @@ from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
     PartKey,
-    channels_with_opening,
+    check_opening,
     clips_from_arrays,
-    finished_parts,
-    opening_row,
+    clips_to_arrays,
+    open_parts,
+    opening_row_with_rates,
     shuffled,
-    stored_clips,
     train_and_generate,
 )
 
@@ -66,7 +66,7 @@ class _GeneratedFold:
         about = [list(self.clips), self.speakers, self.used, self.closed_under]
         arrays = {_ABOUT: np.array(json.dumps(about))}
         for number, clips in enumerate(self.clips.values()):
-            arrays |= {f"{number}/{name}": array for name, array in stored_clips(clips).items()}
+            arrays |= {f"{number}/{name}": array for name, array in clips_to_arrays(clips).items()}
         return arrays
 
 
@@ -103,17 +103,17 @@ def folds(
     Raises AlignmentError: a transcript does not fit its recording.
     """
     names = corpus.required("train")
-    groups = [(name,) for name in names]  # of what is never divided
+    groups: list[tuple[str, ...]] = [(name,) for name in names]  # of what is never divided
     if by_speaker:  # those without a speaker are one more
         groups = [found for speaker in corpus.speakers if (found := corpus.names("train", [speaker]))]
     count = count if count is not None else len(groups) if by_speaker else FOLDS
     if not 2 <= count <= len(groups):
         what = "speakers" if by_speaker else "utterances"
         raise InputError(f"{count} folds; required: from 2 to {len(groups)}, which is how many {what} there are")
-    channels_with_opening(corpus, names)
+    check_opening(corpus, names)
     mixed = shuffled(groups, settings.seed)
     key = PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
-    kept, results = finished_parts(work, corpus, settings, key), []
+    kept, results = open_parts(work, corpus, settings, key), []
     for fold in range(count):
         stage = f"fold-{fold}"
         arrays = kept.load(stage)
@@ -128,7 +128,7 @@ def folds(
         results.append(_GeneratedFold(made.clips, speakers, len(made.used), made.recordings.closed_under))
         if work is not None:
             kept.save(stage, results[-1].as_arrays())
-    about = {"folds": count, "seed": settings.seed, "clips": len(names)}
+    about: dict[str, Any] = {"folds": count, "seed": settings.seed, "clips": len(names)}
     about |= {"trained_on": [result.used for result in results], "closed_under": results[0].closed_under}
     shared = [name for name in results[0].clips if all(name in result.clips for result in results)]
     conditions = {name: _row(results, name, settings.seed, by_speaker=by_speaker) for name in shared}
@@ -139,8 +139,7 @@ def _row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, by_spe
     """Return the figures of the clips of all folds in one condition, and the correlation of each speaker's opening."""
     pooled = [clip for result in results for clip in result.clips[condition]]
     figures = figures_of(pooled, results[0], seed)
-    lips = figures["closures_p_b_m"]
-    row = opening_row(figures) | {name: lips[name] for name in ("false_per_minute", "original_per_minute")}
+    row = opening_row_with_rates(figures)
     if not by_speaker:
         return row
     clips: dict[str, list[ComparedClip]] = {}

@@ -38,17 +38,17 @@ from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,
     HeldOutRecordings,
-    compare_with_recorded,
-    compared_clips,
-    held_out_recordings,
-    speech_of_condition,
+    generate_clips,
+    generate_compared,
+    load_held_out,
+    make_speech,
 )
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
     PartKey,
-    channels_with_opening,
-    finished_parts,
+    check_opening,
+    open_parts,
     opening_row,
 )
 
@@ -95,10 +95,10 @@ class _System:
         """Return what it makes of held-out recordings, by condition and name of ``PINS``."""
         clips: dict[tuple[str, str], Sequence[ComparedClip]] = {}
         for condition in recordings.conditions:
-            speech = speech_of_condition(recordings, condition, self.engine, self.model)
+            speech = make_speech(recordings, condition, self.engine, self.model)
             for pins, closures in PINS.items():
                 engine = JointEngine(replace(self.engine.config, closures=closures))
-                clips[condition, pins] = compare_with_recorded(recordings, speech, engine, self.model)
+                clips[condition, pins] = generate_compared(recordings, speech, engine, self.model)
         return clips
 
 
@@ -121,10 +121,10 @@ def hofer2008(
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
     Source: Hofer 2008, §6 and Table 1.
     """
-    channels_with_opening(corpus, held_out := corpus.required(split))  # before the long work
+    check_opening(corpus, held_out := corpus.required(split))  # before the long work
     validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
     lexicon, config, monitor = settings.lexicon or Lexicon(), settings.recogniser or HmmConfig(), settings.monitor
-    checkpoint = finished_parts(work, corpus, settings, PartKey(_engine(), (*names, *validation, *held_out)))
+    checkpoint = open_parts(work, corpus, settings, PartKey(_engine(), (*names, *validation, *held_out)))
     with worker_pool(min(settings.workers, len(names) // UTTERANCES_PER_WORKER)) as team:
         phones, examples, _ = phones_and_examples(
             [corpus.utterance(name) for name in names],
@@ -136,7 +136,7 @@ def hofer2008(
         )
 
     def recordings_of(chosen: Sequence[str], part: Monitor) -> HeldOutRecordings:
-        return held_out_recordings(
+        return load_held_out(
             corpus,
             cached_recogniser(phones),
             selection=Selection(names=chosen),
@@ -202,7 +202,7 @@ def _train_system(
         for model in engine.growing_models(examples, monitor):
             gaussians = model.hmm.models[SPEECH].tied.mixtures.size[1]
             if gaussians in counts:
-                clips = compared_clips(choosing, AUDIO_ONLY, engine, model)
+                clips = generate_clips(choosing, AUDIO_ONLY, engine, model)
                 tried[gaussians] = correlation_statistic(*opening_curves(choosing, clips)).value
                 if _best_count(tried) == gaussians:
                     arrays = engine.to_arrays(model)

@@ -24,8 +24,8 @@ from lipmotion_lab.runner import (
     ExperimentSettings,
     HeldOutResult,
     PartKey,
-    channels_with_opening,
-    finished_parts,
+    check_opening,
+    open_parts,
     opening_row,
     shuffled,
     train_and_generate,
@@ -63,11 +63,11 @@ def learning_curve(
     """
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), settings.seed)
     held_out = corpus.required(split)
-    steps = training_sizes(sizes, len(listed))
+    steps = choose_sizes(sizes, len(listed))
     check_training_names(corpus, listed, held_out)
-    channels = channels_with_opening(corpus, held_out)
+    channels = check_opening(corpus, held_out)
     shares = np.cumsum([0, *steps]) / sum(steps)
-    kept = finished_parts(work, corpus, settings, PartKey(engine_named("trajectory"), (*listed, *held_out)))
+    kept = open_parts(work, corpus, settings, PartKey(engine_named("trajectory"), (*listed, *held_out)))
     rows = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
         found = kept.load(str(count))
@@ -87,7 +87,7 @@ def learning_curve(
     return nan_as_null(about | {"rows": rows})
 
 
-def training_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
+def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
     """Return the sizes, each once, in rising order; the default ones where none are given.
 
     listed : number of names in the list

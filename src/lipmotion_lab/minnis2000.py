@@ -27,30 +27,29 @@ from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab.comparison import correlation_statistic, opening_curves, significance_mark
-from lipmotion_lab.engine_comparison import EngineModel, engine_models
+from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
 from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     DISTANCES,
     OPENING,
-    compare_with_recorded,
-    held_out_recordings,
-    speech_of_condition,
+    generate_compared,
+    load_held_out,
+    make_speech,
 )
 from lipmotion_lab.learning_curve import check_training_names
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
     PartKey,
-    channels_with_opening,
-    finished_parts,
-    opening_row,
+    check_opening,
+    open_parts,
+    opening_row_with_rates,
 )
 
 WIDTH = 36
@@ -77,7 +76,7 @@ def table(figures: Mapping[str, Any]) -> str:
 def _line(name: str, row: Mapping[str, Any]) -> str:
     joins, channels = row["joins"], [row["channels"].get(each) for each in DISTANCES]
     acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
-    shares = [_percent(joins["hard"]), _percent(joins["smooth"])]
+    shares = [figure_text(None if joins[key] is None else 100 * joins[key], ".0f") for key in ("hard", "smooth")]
     ratios = [
         "/".join(figure_text(each[key], ".2f") for each in channels if each) for key in ("global_variance", "jerk")
     ]
@@ -86,10 +85,6 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
         f"{figure_text(row['false_per_minute'], '11.1f')}{joins['per_clip']:7.1f}{shares[0]:>6}{shares[1]:>8}  "
         f"{'  '.join(ratios)}"
     )
-
-
-def _percent(share: float | None) -> str:
-    return figure_text(None if share is None else 100 * share, ".0f")
 
 
 Array = NDArray[np.float64]
@@ -208,13 +203,17 @@ def minnis2000(
     monitor = settings.monitor
     training = replace(settings, monitor=sub_monitor(monitor, 0, 0.6))
     kept_in = models or (work and work / "model")
-    trained = _quick_model(corpus, training) if quick else engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
+    if quick:
+        start_s, model = perf_counter(), train_engine(corpus, engine_named(ENGINE, {"epochs": 20}), training)
+        trained = EngineModel(model, perf_counter() - start_s)
+    else:
+        trained = engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
     found = {}
     for number, (split, names) in enumerate(lists.items()):
         start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
         part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
         key = PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
-        kept = finished_parts(work and work / split, corpus, settings, key)
+        kept = open_parts(work and work / split, corpus, settings, key)
         found[split] = _on_list(corpus, names, trained.model, kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
@@ -226,28 +225,16 @@ def minnis2000(
     return nan_as_null(about | {"lists": found})
 
 
-def _quick_model(corpus: Corpus, settings: ExperimentSettings) -> EngineModel:
-    start_s = perf_counter()
-    model, _ = train(
-        corpus,
-        engine=engine_named(ENGINE, {"epochs": 20}),
-        recogniser=settings.recogniser,
-        lexicon=settings.lexicon,
-        run=Run(settings.monitor, None, settings.workers),
-    )
-    return EngineModel(model, perf_counter() - start_s)
-
-
 def _on_list(
     corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: ExperimentSettings
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
     monitor = settings.monitor
-    recordings = held_out_recordings(
+    recordings = load_held_out(
         corpus,
         cached_recogniser(model.phones),
         selection=Selection(names=names),
-        channels=channels_with_opening(corpus, names),
+        channels=check_opening(corpus, names),
         lexicon=settings.lexicon,
         monitor=sub_monitor(monitor, 0, 0.4),
     )
@@ -263,15 +250,14 @@ def _on_list(
                 key = condition, config.joint_recogniser and condition == AUDIO_ONLY
                 if key not in spoken:
                     listening = SelectionConfig(joint_recogniser=key[1])
-                    spoken[key] = speech_of_condition(
+                    spoken[key] = make_speech(
                         recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening)
                     )
                 engine = SelectionEngine(config)
-                clips = compare_with_recorded(recordings, spoken[key], engine, learned)
+                clips = generate_compared(recordings, spoken[key], engine, learned)
                 settings.receive(name, condition, recordings, clips)
                 figures = figures_of(clips, recordings, settings.seed)
-                lips = figures["closures_p_b_m"]
-                row = opening_row(figures) | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}
+                row = opening_row_with_rates(figures)
                 row["channels"] = {
                     channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
                     for channel, values in figures["channels"].items()

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from lipmotion_lab.hofer2008 import PAPER_SCORES
-from lipmotion_lab.report.charts import Dot, curve, dots, rising
+from lipmotion_lab.report.charts import Dot, draw_curve, draw_dots, draw_rising
 from lipmotion_lab.report.report import PARTS
-from lipmotion_lab.report.section import FEW_CLIPS, Column, PaperOrder, PaperPair, Section, Table, warning_of
+from lipmotion_lab.report.section import FEW_CLIPS, Column, PaperOrder, PaperPair, Section, Table, warn_of_few
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES
 
 """Sections of the figures that stand in docs/results: what the page says of them follows from them."""
@@ -92,8 +92,8 @@ def test_an_addition_that_helps_is_named_so() -> None:
 
 
 def test_few_recordings_are_warned_of() -> None:
-    assert warning_of(FEW_CLIPS) == {}
-    assert "Only 2 recordings" in warning_of(2)["Beware"][0]
+    assert warn_of_few(FEW_CLIPS) == {}
+    assert "Only 2 recordings" in warn_of_few(2)["Beware"][0]
 
 
 def test_a_share_that_is_not_defined_is_not_told_as_0() -> None:
@@ -209,7 +209,7 @@ def test_a_table_without_rows() -> None:
 
 def test_figures_intervals_and_the_papers_stand_on_one_axis() -> None:
     rows = [Dot("a", 0.5, (0.4, 0.6), 0.9), Dot("<b>", 0.7, (None, None)), Dot("c", None)]
-    drawing = ElementTree.fromstring(dots("ACC", "ACC", rows)).find("svg")  # noqa: S314 (our own)
+    drawing = ElementTree.fromstring(draw_dots("ACC", "ACC", rows)).find("svg")  # noqa: S314 (our own)
     first, second = (float(each.attrib["cx"]) for each in drawing.findall("circle"))
     (interval,) = (each for each in drawing.findall("line") if each.attrib["class"] == "interval")
     low, high = float(interval.attrib["x1"]), float(interval.attrib["x2"])
@@ -222,19 +222,19 @@ def test_figures_intervals_and_the_papers_stand_on_one_axis() -> None:
 
 def test_a_curve_has_both_motions_and_what_is_marked() -> None:
     time_s = np.arange(5) / 25
-    made = ElementTree.fromstring(curve("x", time_s, np.zeros(5), np.arange(5.0), [(-0.1, 0.04, "p")])).find("svg")  # noqa: S314 (our own)
+    made = ElementTree.fromstring(draw_curve("x", time_s, np.zeros(5), np.arange(5.0), [(-0.1, 0.04, "p")])).find("svg")  # noqa: S314 (our own)
     assert [line.attrib["class"] for line in made.findall("polyline")] == ["recorded", "generated"]
     assert float(made.find("rect").attrib["x"]) == 34
 
 
 def test_a_still_motion_is_drawn() -> None:
-    assert "polyline" in curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])
-    assert "nan" not in dots("a", "b", [Dot("still", 0.0, (0.0, 0.0))])
+    assert "polyline" in draw_curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])
+    assert "nan" not in draw_dots("a", "b", [Dot("still", 0.0, (0.0, 0.0))])
 
 
 def test_a_curve_over_numbers_rises_with_them() -> None:
     lines = {"a": [(10.0, Dot("10", 0.1, (0.0, 0.2))), (100.0, Dot("100", 0.3, (0.2, 0.4)))]}
-    drawing = ElementTree.fromstring(rising("t", "n", lines)).find("svg")  # noqa: S314 (our own)
+    drawing = ElementTree.fromstring(draw_rising("t", "n", lines)).find("svg")  # noqa: S314 (our own)
     (x1, y1), (x2, y2) = (map(float, p.split(",")) for p in drawing.find("polyline").attrib["points"].split())
     assert x2 > x1
     assert y2 < y1

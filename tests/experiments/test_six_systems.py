@@ -17,7 +17,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
-from lipmotion_lab.evaluation.held_out import compared_clips, held_out_recordings
+from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.noise import NoiseConditions
 from lipmotion_lab.runner import ExperimentSettings
 from lipmotion_lab.xie_liu2007 import six_systems, systems
@@ -32,7 +32,7 @@ from lipmotion_lab.xie_liu2007.systems import (
     REFERENCE_SYSTEM,
     TUNED,
     TuningOptions,
-    selected_systems,
+    select_systems,
     system_from_arrays,
 )
 
@@ -103,9 +103,9 @@ def test_a_preset_is_the_row_of_the_table(name: str, figures: dict[str, Any], wo
     for key, array in arrays.items():
         np.testing.assert_array_equal(array, kept[key])
     system, learned = system_from_arrays(kept), model.engine.from_arrays(arrays)
-    recordings = held_out_recordings(toy_corpus, cached_recogniser(model.phones))
-    made = compared_clips(recordings, "audio only", model.engine, learned)
-    for ours, theirs in zip(made, compared_clips(recordings, "audio only", system.engine, system.model), strict=True):
+    recordings = load_held_out(toy_corpus, cached_recogniser(model.phones))
+    made = generate_clips(recordings, "audio only", model.engine, learned)
+    for ours, theirs in zip(made, generate_clips(recordings, "audio only", system.engine, system.model), strict=True):
         np.testing.assert_array_equal(ours.generated, theirs.generated)
     rows, training = (figures["rows"][-1][part] for part in ("conditions", "training"))
     row, generated = rows["audio only"][name], [clip.generated for clip in made]
@@ -115,7 +115,7 @@ def test_a_preset_is_the_row_of_the_table(name: str, figures: dict[str, Any], wo
     assert training[name]["parameters"] == model.learned.chains.parameters
     if name == REFERENCE_SYSTEM:
         by_path = engine_named("coupled", model.engine.config.as_mapping() | {"conversion": "viterbi"})
-        made = compared_clips(recordings, "audio only", by_path, learned)
+        made = generate_clips(recordings, "audio only", by_path, learned)
         acc = curves.pooled_correlation([clip.generated for clip in made], original).mean()
         assert rows["audio only"][BEST_PATH]["acc"] == pytest.approx(acc)
 
@@ -140,8 +140,8 @@ def test_a_tuned_system_is_the_best_that_was_tried(figures: dict[str, Any]) -> N
 def test_it_goes_on_from_what_is_finished(
     figures: dict[str, Any], work: Path, toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(systems, "trained_on_the_way", None)
-    monkeypatch.setattr(six_systems, "compared_clips", None)
+    monkeypatch.setattr(systems, "train_stages", None)
+    monkeypatch.setattr(six_systems, "generate_clips", None)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], tuning=BRIEF)
     again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SMALL)
     for name in CHAINS:
@@ -210,20 +210,20 @@ def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
 
 
 def test_systems_in_the_order_of_the_table() -> None:
-    assert selected_systems(["loudness", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "loudness"]
-    assert selected_systems([MATCHED]) == ["ph-MSHMM", "ph-vi-FHMM", REFERENCE_SYSTEM, "ph-vi-FHMM" + TUNED, MATCHED]
+    assert select_systems(["loudness", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "loudness"]
+    assert select_systems([MATCHED]) == ["ph-MSHMM", "ph-vi-FHMM", REFERENCE_SYSTEM, "ph-vi-FHMM" + TUNED, MATCHED]
     assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
     with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
-        selected_systems(["ph-RNN"])
+        select_systems(["ph-RNN"])
 
 
 def test_other_engines_are_compared_when_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
-    left_out = COMPARED_SYSTEMS.keys() - selected_systems(None)
+    left_out = COMPARED_SYSTEMS.keys() - select_systems(None)
     assert left_out == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
-    assert set(PAPER_FIGURES) | {name + TUNED for name in PAPER_FIGURES} <= set(selected_systems(None))
+    assert set(PAPER_FIGURES) | {name + TUNED for name in PAPER_FIGURES} <= set(select_systems(None))
     with pytest.raises(MissingDependencyError, match=r'needs PyTorch.*; pip install ".*\[network\]"'):
-        selected_systems([BLSTM])
+        select_systems([BLSTM])
 
 
 def test_without_matplotlib_there_are_no_pictures(

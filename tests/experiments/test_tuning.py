@@ -14,18 +14,18 @@ from lipmotion.measures import curves
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.examples import examples
 from lipmotion.types import silent_monitor
-from lipmotion_lab.evaluation.held_out import HeldOutRecordings, compared_clips, held_out_recordings
+from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007.systems import (
     CONVERSIONS,
     Trial,
     TuningOptions,
-    alternatives,
     best_trial,
-    changed_options,
-    chosen_by,
-    judged,
-    trained_on_the_way,
-    tuned,
+    choose_by,
+    judge_systems,
+    list_alternatives,
+    list_changed_options,
+    search_settings,
+    train_stages,
 )
 
 SMALL = SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
@@ -34,12 +34,12 @@ SMALL = SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
 @pytest.fixture(scope="module")
 def validation(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
     phones = Recogniser(toy_model.phones, "own")
-    return held_out_recordings(toy_corpus, phones, selection=Selection("val"), channels=("opening", "width"))
+    return load_held_out(toy_corpus, phones, selection=Selection("val"), channels=("opening", "width"))
 
 
 def test_a_model_on_the_way_is_that_of_its_own_training() -> None:
     sentences = examples(3)
-    one, two = trained_on_the_way(SMALL | {"mixtures": 2}, sentences)
+    one, two = train_stages(SMALL | {"mixtures": 2}, sentences)
     assert [system.engine.config.mixtures for system in (one, two)] == [1, 2]
     for system in (one, two):
         alone = CoupledEngine(CoupledConfig(**SMALL | {"mixtures": system.engine.config.mixtures}))
@@ -51,25 +51,25 @@ def test_a_model_on_the_way_is_that_of_its_own_training() -> None:
 
 def test_parameters_are_counted_by_hand() -> None:
     """13 visemes × 2 states: means and variances of every density, and a probability of moving on of every state."""
-    (system,) = trained_on_the_way(SMALL, examples(3))
+    (system,) = train_stages(SMALL, examples(3))
     groups = [group.mixtures.means.shape[2] for group in system.model.chains.groups]
     assert system.model.chains.parameters == 26 * (2 * sum(groups) + 1)
 
 
 @pytest.mark.long
 def test_every_conversion_is_judged_by_the_correlation_of_what_it_makes(validation: HeldOutRecordings) -> None:
-    systems = [*trained_on_the_way(SMALL, examples(3))]
-    found = [*judged(iter(systems), validation, CONVERSIONS)]
+    systems = [*train_stages(SMALL, examples(3))]
+    found = [*judge_systems(iter(systems), validation, CONVERSIONS)]
     assert [(system.engine.config.start, system.engine.config.steps) for _, system in found] == [
         ("viterbi", 3),
         ("soft", 1),
     ]
     for trial, system in found:
-        made = compared_clips(validation, "audio only", system.engine, system.model)
+        made = generate_clips(validation, "audio only", system.engine, system.model)
         generated, original = [clip.generated for clip in made], [clip.original for clip in made]
         assert trial.acc == pytest.approx(curves.pooled_correlation(generated, original).mean())
         assert trial.amse == pytest.approx(curves.mean_distance(generated, original))
-    best = chosen_by(lambda trial: -trial.amse, found)
+    best = choose_by(lambda trial: -trial.amse, found)
     assert best.tried == tuple(trial for trial, _ in found)
     assert best.engine.config.start == min(found, key=lambda pair: pair[0].amse)[1].engine.config.start
 
@@ -84,7 +84,7 @@ def test_one_setting_after_another_from_the_best_so_far() -> None:
         return [Trial({**options, "mixtures": k}, score - 0.01 * k, 0.0, 0) for k in counts]
 
     kinds = [[{"audio_weight": 1.0, "mixtures": 2}, {"audio_weight": 0.3, "mixtures": 2}], [{"states": 3}]]
-    tried = tuned({"states": 5}, kinds, attempt)
+    tried = search_settings({"states": 5}, kinds, attempt)
     assert [(each["audio_weight"], each["mixtures"], each["states"]) for each in asked] == [
         (1.0, 2, 5),
         (0.3, 2, 5),
@@ -97,7 +97,9 @@ def test_one_setting_after_another_from_the_best_so_far() -> None:
 def test_what_is_tried_for_which_structure() -> None:
     names = {
         system: [
-            *dict.fromkeys(name for kind in alternatives(options, TuningOptions()) for each in kind for name in each)
+            *dict.fromkeys(
+                name for kind in list_alternatives(options, TuningOptions()) for each in kind for name in each
+            )
         ]
         for system, options in SYSTEMS.items()
     }
@@ -108,7 +110,7 @@ def test_what_is_tried_for_which_structure() -> None:
 
 def test_options_are_told_where_they_are_not_those_printed() -> None:
     for system, options in SYSTEMS.items():
-        changed = changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 0.0}))
+        changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 0.0}))
         assert changed == {
             "structure": options["structure"],
             "chains": options["chains"],

@@ -24,9 +24,9 @@ from lipmotion_lab.evaluation.held_out import (
     TEST_LIST,
     WITH_TRANSCRIPT,
     ComparedClip,
-    compare_with_recorded,
-    held_out_recordings,
-    speech_of_condition,
+    generate_compared,
+    load_held_out,
+    make_speech,
 )
 
 BILABIAL = VISEMES["bi"]
@@ -78,20 +78,25 @@ def figures_of(clips: Sequence[ComparedClip], recordings: Compared, seed: int) -
     overall = ~is_eigenlips if not is_eigenlips.all() else is_eigenlips
     spread = np.where(overall, np.concatenate(original).std(axis=0), 0)
     leading = compared.index(OPENING) if OPENING in compared else int(spread.argmax())
+
+    def distance(columns: NDArray[np.bool_]) -> float:
+        return curves.mean_distance([clip[:, columns] for clip in generated], [clip[:, columns] for clip in original])
+
     figures = {
         "channels": {name: row for name, row in per_channel.items() if name not in eigenlips},
         "acc": float(acc[overall].mean()),
-        "amse": curves.mean_distance(*([clip[:, overall] for clip in side] for side in (generated, original))),
+        "amse": distance(overall),
         "leading": compared[leading],
         "lag_ms": curves.lag_ms(
-            *([clip[:, leading : leading + 1] for clip in side] for side in (generated, original)), rate_hz
+            [clip[:, leading : leading + 1] for clip in generated],
+            [clip[:, leading : leading + 1] for clip in original],
+            rate_hz,
         ),
     }
     if eigenlips:  # means over channels: Xie & Liu 2007, Eq. 21, for the correlation
         rows = list(eigenlips.values())
         means = {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
-        amse = curves.mean_distance(*([clip[:, is_eigenlips] for clip in side] for side in (generated, original)))
-        figures["eigenlips"] = means | {"amse": amse, "channels": eigenlips}
+        figures["eigenlips"] = means | {"amse": distance(is_eigenlips), "channels": eigenlips}
     if threshold is None:
         return figures
     return figures | _opening_figures(clips, compared.index(OPENING), threshold, rate_hz, seed)
@@ -177,7 +182,7 @@ def evaluate(
     >>> folder.cleanup()
     """
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
-    recordings = held_out_recordings(
+    recordings = load_held_out(
         corpus,
         phones,
         selection=selection,
@@ -191,10 +196,10 @@ def evaluate(
     engine, conditions = model.engine, {}
     without = engine.without_closures()
     for name in recordings.conditions:
-        speech = speech_of_condition(recordings, name, engine, model.learned)
-        row = figures_of(compare_with_recorded(recordings, speech, engine, model.learned), recordings, seed)
+        speech = make_speech(recordings, name, engine, model.learned)
+        row = figures_of(generate_compared(recordings, speech, engine, model.learned), recordings, seed)
         if without != engine and recordings.closed_under is not None:
-            clips = compare_with_recorded(recordings, speech, without, model.learned)
+            clips = generate_compared(recordings, speech, without, model.learned)
             row["unpinned"] = figures_of(clips, recordings, seed)
         conditions[name] = row
     figures = {

@@ -114,7 +114,7 @@ class ComparedClip:
     spoken: tuple[tuple[float, float, str], ...]
 
 
-def held_out_recordings(  # noqa: PLR0913
+def load_held_out(  # noqa: PLR0913
     corpus: Corpus,
     phones: Recogniser,
     *,
@@ -131,7 +131,7 @@ def held_out_recordings(  # noqa: PLR0913
 
     phones    : the recogniser
     selection : the utterances; by default those of the list ``test``
-    channels  : the channels to compare, whether they move or not; None: from ``compared_channels``
+    channels  : the channels to compare, whether they move or not; None: from ``choose_channels``
     visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
     prior     : the model on which the evaluated one stands, or None
     speakers  : maps of the people whom the evaluated model knows, or None
@@ -140,7 +140,7 @@ def held_out_recordings(  # noqa: PLR0913
     utterances = [
         with_visual_channels(corpus.utterance(name), visual, eigenlips) for name in corpus.selected(selection)
     ]
-    compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
+    compared, still = (tuple(channels), ()) if channels is not None else choose_channels(utterances)
     warn_of_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     aligned = with_progress(utterances, "phones: alignment", sub_monitor(monitor, 0, 0.4))
     reference = []
@@ -166,7 +166,7 @@ def held_out_recordings(  # noqa: PLR0913
     )
 
 
-def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def choose_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names of the channels to compare, and of those that are left out because they do not move.
 
     All eigenlips are compared, whether they move or not: their figures are means over a known number.
@@ -188,7 +188,7 @@ def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...],
     return moving, tuple(name for name in names if name not in moving)
 
 
-def compared_clips(
+def generate_clips(
     recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
     """Return recorded and generated motion of all utterances under a condition.
@@ -196,11 +196,11 @@ def compared_clips(
     learned : the engine's model of motion
     Raises CorpusError: the model has other channels.
     """
-    speech = speech_of_condition(recordings, condition, engine, learned)
-    return compare_with_recorded(recordings, speech, engine, learned)
+    speech = make_speech(recordings, condition, engine, learned)
+    return generate_compared(recordings, speech, engine, learned)
 
 
-def speech_of_condition(
+def make_speech(
     recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[Speech]:
     """Return the speech of all utterances under a condition, as ``animate`` gives it to the engine."""
@@ -222,12 +222,12 @@ def speech_of_condition(
     return speech
 
 
-def compare_with_recorded(
+def generate_compared(
     recordings: HeldOutRecordings, speech: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
     """Return recorded and generated motion of all utterances.
 
-    speech  : from ``speech_of_condition``, one for each utterance
+    speech  : from ``make_speech``, one for each utterance
     learned : the engine's model of motion
     Raises CorpusError: the model has other channels.
     """

@@ -67,7 +67,18 @@ class Table:
 
     def records(self) -> list[dict[str, Any]]:
         """Return the rows as flat records with the same keys in each; intervals as two figures."""
-        return [{self.head: name} | self._record(row) for name, row in self.rows.items()]
+        endings = ((INTERVAL, ""), (DIFFERENCE, "_difference"))
+        records = []
+        for head, row in self.rows.items():
+            record: dict[str, Any] = {self.head: head}
+            for column in self.columns:
+                record[column.key] = row.get(column.key)
+                for ending, name in endings:
+                    if any(column.key + ending in each for each in self.rows.values()):
+                        low, high = row.get(column.key + ending) or (None, None)
+                        record |= {f"{column.key}{name}_low": low, f"{column.key}{name}_high": high}
+            records.append(record)
+        return records
 
     def as_csv(self) -> str:
         """Return the records as CSV; what is not defined is empty."""
@@ -89,7 +100,10 @@ class Table:
 
         folder : beside the page, that has the folder ``tables`` with its files
         """
-        heads = [element("th", self.head, scope="col"), *map(_head, self.columns)]
+        heads = [
+            element("th", self.head, scope="col"),
+            *(element("th", each.title, scope="col", class_="number" if each.form else None) for each in self.columns),
+        ]
         lines = [
             element("tr", element("th", name, scope="row"), *(_cell(column, row) for column in self.columns))
             for name, row in self.rows.items()
@@ -100,32 +114,18 @@ class Table:
             element("thead", element("tr", *heads)),
             element("tbody", *lines),
         )
-        scrolls = element("div", table, class_="scroll", tabindex="0", role="region", aria_label=self.caption)
-        return joined(scrolls, element("div", *self._notes(folder), class_="note"))
-
-    def _record(self, row: Row) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for column in self.columns:
-            found[column.key] = row.get(column.key)
-            for ending, name in ((INTERVAL, ""), (DIFFERENCE, "_difference")):
-                if any(column.key + ending in each for each in self.rows.values()):
-                    low, high = row.get(column.key + ending) or (None, None)
-                    found |= {f"{column.key}{name}_low": low, f"{column.key}{name}_high": high}
-        return found
-
-    def _notes(self, folder: str) -> list[Html]:
-        """Return the star, the files, and what the columns are."""
+        # the star, the files, and what the columns are
         files = [element("a", kind.upper(), href=f"{folder}/tables/{self.name}.{kind}") for kind in ("csv", "json")]
         star = f"*: the 95 % interval of the difference from {self.reference} leaves out 0. " if self.reference else ""
         notes = [joined(element("dt", each.title), element("dd", each.note)) for each in self.columns if each.note]
-        return [
+        about = element(
+            "div",
             element("p", star, "This table as ", files[0], " and ", files[1], "."),
             element("details", element("summary", "What the columns are"), element("dl", *notes)),
-        ]
-
-
-def _head(column: Column) -> Html:
-    return element("th", column.title, scope="col", class_="number" if column.form else None)
+            class_="note",
+        )
+        scrolls = element("div", table, class_="scroll", tabindex="0", role="region", aria_label=self.caption)
+        return joined(scrolls, about)
 
 
 def _cell(column: Column, row: Row) -> Html:
@@ -174,7 +174,7 @@ class Section:
         return [self.table, *(table for _, table in self.more)]
 
 
-def warning_of(clips: int) -> dict[str, list[str]]:
+def warn_of_few(clips: int) -> dict[str, list[str]]:
     """Return a warning, as words of a section, where so few recordings were compared that intervals are too narrow."""
     if clips >= FEW_CLIPS:
         return {}
@@ -184,11 +184,6 @@ def warning_of(clips: int) -> dict[str, list[str]]:
             "here tells systems apart for sure."
         ]
     }
-
-
-def named(names: Sequence[str]) -> str:
-    """Return names as a list in words; ``none`` for an empty one."""
-    return ", ".join(names) or "none"
 
 
 def difference(one: float | None, other: float | None) -> float | None:
@@ -240,29 +235,44 @@ class PaperOrder:
 
     def verdict(self) -> str:
         """Return in two sentences whether the paper's order held, and which system is best."""
-        held, reverse, left_open = (len(self._with(sign)) for sign in (1, -1, 0))
-        told = (
-            f"{self.figure}: of the paper's {len(self.pairs)} pairs {held} held, {reverse} reversed, {left_open} open"
-        )
+        signs = [pair.sign for pair in self.pairs]
+        held, reverse = signs.count(1), signs.count(-1)
+        verdict = f"{self.figure}: of the paper's {len(signs)} pairs {held} held, {reverse} reversed, "
+        verdict += f"{signs.count(0)} open: "
         if held or reverse:
             outcomes = ("as many held as reversed", "more held than reversed", "more reversed than held")
-            outcome = outcomes[(held > reverse) - (held < reverse)]
-            told += f": {'all held' if held == len(self.pairs) else outcome}"
+            verdict += "all held" if held == len(signs) else outcomes[(held > reverse) - (held < reverse)]
         else:
-            told += ": these recordings say nothing of its order"
-        here = ", ".join(_best(self.here, self.is_error)) or "none"
-        return f"{told}. Best in print: {_best(self.paper, self.is_error)[0]}; here: {here}."
+            verdict += "these recordings say nothing of its order"
+        here = ", ".join(self._best(self.here)) or "none"
+        return f"{verdict}. Best in print: {self._best(self.paper)[0]}; here: {here}."
 
     def sentences(self) -> list[str]:
         """Return what held and what did not, sentence by sentence."""
-        found = [f"In print: {self._listed(self.paper)}.", f"Here: {self._listed(self.here)}.", *self._of_the_best()]
+        found = [f"In print: {self._list(self.paper)}.", f"Here: {self._list(self.here)}."]
+        best, here = self._best(self.paper)[0], self._best(self.here)
+        pair = next((each for each in self.pairs if here and {each.better, each.worse} == {best, here[0]}), None)
+        if best not in here and pair is not None and pair.difference is not None:
+            low, high = pair.interval
+            lies = "" if low is None or high is None else f", 95 % interval {low:{self.form}} to {high:{self.form}}"
+            found.append(
+                f"The paper's best is {-pair.difference:{self.form.replace('+', '')}} behind the best here: {best} "
+                f"against {here[0]} {pair.difference:{self.form}}{lies}, where print has it above 0."
+            )
         for sign, what in (
             (1, "Held: the interval of the difference is on the paper's side of 0"),
             (-1, "Reversed: it is on the other side"),
             (0, "Open: it contains 0"),
         ):
-            if pairs := self._with(sign):
-                found.append(f"{what} ({len(pairs)} of {len(self.pairs)} pairs): {self._named(pairs)}.")
+            grouped: dict[str, list[str]] = {}  # pairs of the same first system together; the better one here first
+            pairs = [pair for pair in self.pairs if pair.sign == sign]
+            for pair in pairs:
+                first, second = (pair.worse, pair.better) if sign < 0 else (pair.better, pair.worse)
+                grouped.setdefault(first, []).append(second)
+            if pairs:
+                joint = "over" if sign else "and"
+                names = "; ".join(f"{first} {joint} {', '.join(others)}" for first, others in grouped.items())
+                found.append(f"{what} ({len(pairs)} of {len(self.pairs)} pairs): {names}.")
         agreeing = sum((pair.difference or 0) > 0 for pair in self.pairs)
         found.append(
             f"Intervals aside, {agreeing} of {len(self.pairs)} differences have the paper's sign. Of {len(self.pairs)} "
@@ -270,41 +280,15 @@ class PaperOrder:
         )
         return found
 
-    def _with(self, sign: int) -> list[PaperPair]:
-        return [pair for pair in self.pairs if pair.sign == sign]
-
-    def _named(self, pairs: Sequence[PaperPair]) -> str:
-        """Return pairs in words, those of the same first system together; the better one here stands first."""
-        grouped: dict[str, list[str]] = {}
-        for pair in pairs:
-            first, second = (pair.worse, pair.better) if pair.sign < 0 else (pair.better, pair.worse)
-            grouped.setdefault(first, []).append(second)
-        joint = "and" if not pairs[0].sign else "over"
-        return "; ".join(f"{first} {joint} {', '.join(others)}" for first, others in grouped.items())
-
-    def _of_the_best(self) -> list[str]:
-        """Return how far the paper's best system is from the best one here; nothing where it is the best."""
-        best, here = _best(self.paper, self.is_error)[0], _best(self.here, self.is_error)
-        pair = next((each for each in self.pairs if here and {each.better, each.worse} == {best, here[0]}), None)
-        if best in here or pair is None or pair.difference is None:
-            return []
-        low, high = pair.interval
-        lies = "" if low is None or high is None else f", 95 % interval {low:{self.form}} to {high:{self.form}}"
-        return [
-            f"The paper's best is {-pair.difference:{self.form.replace('+', '')}} behind the best here: {best} against "
-            f"{here[0]} {pair.difference:{self.form}}{lies}, where print has it above 0."
-        ]
-
-    def _listed(self, values: Mapping[str, float | None]) -> str:
+    def _list(self, values: Mapping[str, float | None]) -> str:
         """Return names with their values, from the best to the worst; those without a value are left out."""
         known = [(name, value) for name, value in values.items() if value is not None]
         form = self.form.replace("+", "")
         known.sort(key=lambda pair: pair[1], reverse=not self.is_error)
         return ", ".join(f"{name} {value:{form}}" for name, value in known)
 
-
-def _best(values: Mapping[str, float | None], is_error: bool) -> list[str]:
-    """Return the names of the best value; none where none is defined."""
-    known = {name: value for name, value in values.items() if value is not None}
-    best = (min if is_error else max)(known.values(), default=None)
-    return [name for name, value in known.items() if value == best]
+    def _best(self, values: Mapping[str, float | None]) -> list[str]:
+        """Return the names of the best value; none where none is defined."""
+        known = {name: value for name, value in values.items() if value is not None}
+        best = (min if self.is_error else max)(known.values(), default=None)
+        return [name for name, value in known.items() if value == best]

@@ -23,7 +23,7 @@ from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
 from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, LoudnessRegression, MeanPose, import_torch
 from lipmotion_lab.comparison import correlation_statistic, distance_statistic
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, compared_clips
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
 
 Options = Mapping[str, Any]
 FREE = {"unseen_loss": 0.0, "start_asynchrony": 4}
@@ -88,7 +88,7 @@ class TrainedSystem:
     tried: Sequence[Trial] = field(default_factory=tuple)
 
 
-def alternatives(options: Options, tuning: TuningOptions) -> list[list[dict[str, Any]]]:
+def list_alternatives(options: Options, tuning: TuningOptions) -> list[list[dict[str, Any]]]:
     """Return the kinds of settings that are tried for a system, in order, each with its values."""
     factorial = options["structure"] == FACTORIAL
     most = tuning.pair_mixtures if factorial else tuning.mixtures
@@ -100,7 +100,7 @@ def alternatives(options: Options, tuning: TuningOptions) -> list[list[dict[str,
     return [*kinds, [{"states": states} for states in tuning.states]]
 
 
-def tuned(
+def search_settings(
     options: Options, kinds: Sequence[Sequence[Options]], attempt: Callable[[Options], Sequence[Trial]]
 ) -> list[Trial]:
     """Return all trials of a search that takes one kind of setting after another; the best is ``best_trial`` of them.
@@ -121,7 +121,7 @@ def best_trial(trials: Sequence[Trial]) -> Trial:
     return max(trials, key=lambda trial: trial.acc)
 
 
-def trained_on_the_way(
+def train_stages(
     options: Options, examples: Sequence[Example], monitor: Monitor = silent_monitor
 ) -> Iterator[TrainedSystem]:
     """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options.
@@ -136,7 +136,7 @@ def trained_on_the_way(
         count *= 2
 
 
-def judged(
+def judge_systems(
     systems: Iterable[TrainedSystem], validation: HeldOutRecordings, conversions: Sequence[Options] = ({},)
 ) -> Iterator[tuple[Trial, TrainedSystem]]:
     """Yield every system with its figures on validation recordings.
@@ -146,7 +146,7 @@ def judged(
     for system in systems:
         for conversion in conversions:
             engine = CoupledEngine(replace(system.engine.config, **conversion))
-            made = compared_clips(validation, AUDIO_ONLY, engine, system.model)
+            made = generate_clips(validation, AUDIO_ONLY, engine, system.model)
             generated, original = [clip.generated for clip in made], [clip.original for clip in made]
             acc = correlation_statistic(generated, original).value
             amse = distance_statistic(generated, original).value
@@ -154,10 +154,10 @@ def judged(
             yield trial, replace(system, engine=engine)
 
 
-def chosen_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
+def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
     """Return the system of which something is highest, as the ACC of its trial; with all trials.
 
-    found : from ``judged``
+    found : from ``judge_systems``
     """
     pairs = list(found)
     _, best = max(pairs, key=lambda pair: of(pair[0]))
@@ -165,21 +165,17 @@ def chosen_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, Trained
 
 
 def as_row(trial: Trial) -> dict[str, Any]:
-    """Return a trial as figures; its options are those that ``changed_options`` returns."""
-    return asdict(trial) | {"options": changed_options(CoupledConfig.parsed(trial.options))}
+    """Return a trial as figures; its options are those that ``list_changed_options`` returns."""
+    return asdict(trial) | {"options": list_changed_options(CoupledConfig.parsed(trial.options))}
 
 
-def changed_options(config: CoupledConfig) -> dict[str, Any]:
+def list_changed_options(config: CoupledConfig) -> dict[str, Any]:
     """Return the options that are not those of the paper's system of the same structure and chains, as printed."""
     of = {"structure": config.structure, "chains": config.chains}
     printed = next(options for options in SYSTEMS.values() if options.items() >= of.items())
     as_printed = CoupledConfig.parsed(printed).as_mapping()
-    options = config.as_mapping()
-    return of | {
-        name: value
-        for name, value in options.items()
-        if as_printed.get(name, value) != value or (name not in as_printed)
-    }
+    missing = object()
+    return of | {name: value for name, value in config.as_mapping().items() if as_printed.get(name, missing) != value}
 
 
 REFERENCE_SYSTEM = "ph-vi-CHMM"
@@ -252,7 +248,7 @@ The paper's six are those of ``train --preset``; ``tuned``: with the settings th
 """
 
 
-def selected_systems(names: Sequence[str] | None) -> list[str]:
+def select_systems(names: Sequence[str] | None) -> list[str]:
     """Return the names of the systems to compare, in the table's order; always with ``REFERENCE_SYSTEM``.
 
     names : None: all but those that are compared only ``when_named``
@@ -271,7 +267,7 @@ def selected_systems(names: Sequence[str] | None) -> list[str]:
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 
-def tuned_options(
+def tune_options(
     name: str, examples: Sequence[Example], validation: HeldOutRecordings, tuning: TuningOptions, monitor: Monitor
 ) -> list[Trial]:
     """Return all settings that were tried for a system of the paper.
@@ -281,10 +277,10 @@ def tuned_options(
     judges = validation.first(tuning.judges)
 
     def attempt(options: Mapping[str, Any]) -> list[Trial]:
-        on_the_way = trained_on_the_way(options, examples, monitor)
-        return [trial for trial, _ in judged(on_the_way, judges, CONVERSIONS)]
+        on_the_way = train_stages(options, examples, monitor)
+        return [trial for trial, _ in judge_systems(on_the_way, judges, CONVERSIONS)]
 
-    return tuned(SYSTEMS[name], alternatives(SYSTEMS[name], tuning), attempt)
+    return search_settings(SYSTEMS[name], list_alternatives(SYSTEMS[name], tuning), attempt)
 
 
 def with_inputs_of(name: str, examples: Sequence[Example], corpus: Corpus) -> Sequence[Example]:
@@ -320,21 +316,21 @@ def train_system(
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
     if not system.tunes or validation is None:
-        *_, last = trained_on_the_way(system.options, examples, monitor)
+        *_, last = train_stages(system.options, examples, monitor)
         return last
     options = best_trial(trials[system.tunes]).options
     if name != MATCHED:
         printed = trained[system.tunes]
         same = CoupledConfig.parsed(options) == printed.engine.config
-        on_the_way = () if same else trained_on_the_way(options, examples, monitor)
-        return chosen_by(lambda trial: trial.acc, judged([printed, *on_the_way], validation))
+        on_the_way = () if same else train_stages(options, examples, monitor)
+        return choose_by(lambda trial: trial.acc, judge_systems([printed, *on_the_way], validation))
     wanted = trained["ph-vi-FHMM" + TUNED].model.chains.parameters
     most = max(trial.options["mixtures"] for trial in trials[system.tunes])
-    larger = trained_on_the_way({**options, "mixtures": most, "visual_mixtures": most}, examples, monitor)
-    return chosen_by(lambda trial: -abs(trial.parameters - wanted), judged(larger, validation))
+    larger = train_stages({**options, "mixtures": most, "visual_mixtures": most}, examples, monitor)
+    return choose_by(lambda trial: -abs(trial.parameters - wanted), judge_systems(larger, validation))
 
 
-def stored_system(system: TrainedSystem) -> dict[str, NDArray[Any]]:
+def system_to_arrays(system: TrainedSystem) -> dict[str, NDArray[Any]]:
     """Return the coupled chains of a system as arrays, from which ``system_from_arrays`` makes it again."""
     about = {"config": system.engine.config.as_mapping(), "seconds": system.seconds}
     about["tried"] = [asdict(trial) for trial in system.tried]
@@ -342,7 +338,7 @@ def stored_system(system: TrainedSystem) -> dict[str, NDArray[Any]]:
 
 
 def system_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> TrainedSystem:
-    """Return the system that ``stored_system`` stored."""
+    """Return the system that ``system_to_arrays`` stored."""
     about = json.loads(str(arrays[ABOUT]))
     engine = CoupledEngine(CoupledConfig.parsed(about["config"]))
     model = engine.from_arrays({name: array for name, array in arrays.items() if name != ABOUT})
