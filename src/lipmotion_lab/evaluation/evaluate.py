@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.kernels.threads import one_thread
