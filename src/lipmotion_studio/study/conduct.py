@@ -1,16 +1,46 @@
-"""Answers of a study as the table that spreadsheets and statistics programs read."""
+"""Conducting a study: it is served over HTTP, its answers are exported, and raters are forgotten."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import closing
 from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import Answer, write_answers
-from lipmotion_studio.study.manifest import Study, read_study
+from lipmotion_studio.study.manifest import Study, check_videos, read_study
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name, rater_number
 from lipmotion_studio.study.trials import questions_of, trials_of
+from lipmotion_studio.web.listening import HOST, check_installed, listening, serve
+
+PORT = 8000
+
+
+def serve_study(
+    folder: Path,
+    *,
+    host: str = HOST,
+    port: int = PORT,
+    names: Collection[str] = (),
+    started: Callable[[str], object] | None = None,
+) -> None:
+    """Let raters take part in a study, until the process is stopped.
+
+    host    : address to listen at; the default can be reached from this machine alone
+    port    : 0: any that is free
+    names   : of the server as raters call it, where another passes their requests on, as ``study.example.org``
+    started : called with the address of the page once raters can come
+    Every answer is on the disk before the rater's page learns that it is stored. A stopped study goes on where it was.
+    Raises InputError: no study, a video is missing or has changed, or the address cannot be listened at.
+    Raises MissingDependencyError: a package of the extra ``study`` is not installed.
+    """
+    check_installed("serving a study", "study")
+    from lipmotion_studio.study.application import study_application
+
+    study = read_study(folder)
+    videos = check_videos(study, folder)
+    with listening(host, port) as place, closing(StudyStore(folder)) as store:
+        serve(study_application(study, videos, store, names), place, host=host, started=started)
 
 
 def collected_answers(folder: Path) -> list[Answer]:
