@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from lipmotion_faces.portrait.outlines import Path, Points, symmetric
+from lipmotion_faces.portrait.outlines import Path, Points, mirror_curve
 
 Colour = tuple[int, int, int]
-
+Knots = tuple[tuple[float, float], ...]
+"""Points of the edge of a lid of the right eye, from the inner to the outer corner."""
 WHITE: Colour = (255, 255, 255)
 
 
@@ -94,20 +95,8 @@ class EyeDesign:
     x: float = 0.345
     y: float = -0.014
     iris: float = 0.1
-    upper: tuple[tuple[float, float], ...] = (
-        (0.175, 0.03),
-        (0.245, -0.053),
-        (0.35, -0.093),
-        (0.455, -0.073),
-        (0.51, -0.012),
-    )
-    lower: tuple[tuple[float, float], ...] = (
-        (0.175, 0.03),
-        (0.26, 0.062),
-        (0.37, 0.071),
-        (0.465, 0.04),
-        (0.51, -0.012),
-    )
+    upper: Knots = ((0.175, 0.03), (0.245, -0.053), (0.35, -0.093), (0.455, -0.073), (0.51, -0.012))
+    lower: Knots = ((0.175, 0.03), (0.26, 0.062), (0.37, 0.071), (0.465, 0.04), (0.51, -0.012))
     lashes: float = 1.0
     brow: Path = "0.155 -0.262, 0.28 -0.288, 0.42 -0.296, 0.575 -0.25"
     brow_widths: tuple[float, ...] = (0.014, 0.038, 0.044, 0.034, 0.006)
@@ -170,4 +159,4 @@ class Design:
     @property
     def skull(self) -> Points:
         """The outline of the bald head."""
-        return symmetric(self.head)
+        return mirror_curve(self.head)

@@ -38,13 +38,13 @@ def open_curve(path: Path) -> Points:
     return np.vstack([_chain(points[:-1], before, points[1:], beyond), points[-1:]])
 
 
-def symmetric(path: Path) -> Points:
+def mirror_curve(path: Path) -> Points:
     """Return the smooth closed curve through a path down the right side and its mirror image.
 
     The path begins and ends on the axis x = 0.
     """
     right = path_points(path)
-    return closed_curve([(x, y) for x, y in np.vstack([right, mirrored(right)[-2:0:-1]]).tolist()])
+    return closed_curve([(x, y) for x, y in np.vstack([right, both_sides(right)[1][-2:0:-1]]).tolist()])
 
 
 def stroke(line: Points, widths: Sequence[float]) -> Points:
@@ -62,17 +62,12 @@ def ellipse(x: float, y: float, radius_x: float, radius_y: float) -> Points:
     return np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
 
 
-def mirrored(points: Points) -> Points:
-    """Return the outline mirrored to the other side of the face."""
-    return points * np.array([-1.0, 1.0])
-
-
 def both_sides(right: Points) -> tuple[Points, Points]:
-    """Return an outline and its mirror image."""
-    return right, mirrored(right)
+    """Return an outline and its mirror image on the other side of the face."""
+    return right, right * np.array([-1.0, 1.0])
 
 
-def lowered(points: Points, distance: float) -> Points:
+def move_down(points: Points, distance: float) -> Points:
     """Return the outline moved down by a distance."""
     return points + np.array([0.0, distance])
 
