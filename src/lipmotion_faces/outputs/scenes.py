@@ -130,7 +130,7 @@ def head_scene(
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
     from lipmotion_faces.head.figure import PIVOT
-    from lipmotion_faces.head.performance import posed
+    from lipmotion_faces.head.pose import pose_head
     from lipmotion_faces.head.shape_fit import mouth_weights
     from lipmotion_faces.head.stage import figure, mesh_of_figure
 
@@ -139,7 +139,7 @@ def head_scene(
     around, kept = _around(frames, MARGIN)
     mouth = spoken_mouth(motion, units, hertz) if frames is None else _mouth_in(motion, units, around)
     moved = alive(times_s[around], motion, units, staging, prosody)
-    poses = posed(mouth, moved)
+    poses = pose_head(mouth, moved)
     character, mesh = (
         figure(),
         mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
