@@ -44,7 +44,7 @@ def moved_part(scale: int) -> Mask:
     return (np.abs(x) / SIDE_PX[1]) ** 4 + (np.abs(y - middle) / (bottom - middle)) ** 4 <= 1
 
 
-def with_chin_moved(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
+def move_chin(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
     """Return pictures of the lower face whose chin is lower, or higher.
 
     pictures : [shape=(T, 128 · scale, 128 · scale, 3)], uint8
@@ -55,20 +55,22 @@ def with_chin_moved(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pict
     scale = pictures.shape[1] // HEIGHT
     result = pictures.copy()
     room = np.maximum(chin_px - ABOVE_PX - STILL_PX, 0)
-    drops = np.clip(
-        drops_px, -np.minimum(LARGEST_PX, LARGEST_RISE_SHARE * room), np.minimum(LARGEST_PX, LARGEST_DROP_SHARE * room)
+    highest, lowest = (
+        -np.minimum(LARGEST_PX, LARGEST_RISE_SHARE * room),
+        np.minimum(LARGEST_PX, LARGEST_DROP_SHARE * room),
     )
+    drops = np.clip(drops_px, highest, lowest)
     across = (np.arange(WIDTH * scale) + 0.5) / scale + CORNER[0]
     share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _rise(np.abs(across), *SIDE_PX))
     columns = np.flatnonzero(share > 0)
     for frame in np.flatnonzero(np.abs(drops) >= LEAST_PX):
-        result[frame, :, columns] = _moved(
-            pictures[frame][:, columns], float(chin_px[frame]), float(drops[frame]) * share[columns], scale
-        ).swapaxes(0, 1)
+        by = float(drops[frame]) * share[columns]
+        moved = _move_columns(pictures[frame][:, columns], float(chin_px[frame]), by, scale)
+        result[frame, :, columns] = moved.swapaxes(0, 1)
     return result
 
 
-def _moved(picture: Pictures, chin_px: float, drops: Array, scale: int) -> Pictures:
+def _move_columns(picture: Pictures, chin_px: float, drops: Array, scale: int) -> Pictures:
     """Return one picture whose columns are moved down by ``drops`` [shape=(W,)] at the chin."""
     down = (np.arange(len(picture)) + 0.5) / scale + CORNER[1]
     tip = chin_px + drops  # where the tip is afterwards
@@ -82,7 +84,11 @@ def _moved(picture: Pictures, chin_px: float, drops: Array, scale: int) -> Pictu
     column, pixels = np.arange(picture.shape[1]), picture.reshape(-1, picture.shape[2])
     for tap in range(-1, 3):
         rows = np.clip(first + tap, 0, len(picture) - 1)
-        levels += _weight(np.abs(part - tap))[:, :, None] * pixels.take(rows * picture.shape[1] + column, axis=0)
+        away = np.abs(part - tap)
+        near = ((A + 2) * away - (A + 3)) * away**2 + 1
+        far = A * (((away - 5) * away + 8) * away - 4)
+        weight = np.where(away <= 1, near, np.where(away < 2, far, 0)).astype(np.float32)
+        levels += weight[:, :, None] * pixels.take(rows * picture.shape[1] + column, axis=0)
     result = picture.copy()
     result[moved] = np.clip(np.rint(levels), 0, 255)
     return result
@@ -92,9 +98,3 @@ def _rise(values: Array, start: Array | float, stop: Array | float) -> Array:
     """Return 0 up to ``start``, 1 from ``stop`` on, and a smooth rise between (3t² − 2t³)."""
     share = np.clip((values - start) / (np.asarray(stop) - start), 0, 1)
     return share * share * (3 - 2 * share)
-
-
-def _weight(distance: NDArray[np.float32]) -> NDArray[np.float32]:
-    near = ((A + 2) * distance - (A + 3)) * distance**2 + 1
-    far = A * (((distance - 5) * distance + 8) * distance - 4)
-    return np.where(distance <= 1, near, np.where(distance < 2, far, 0)).astype(np.float32)

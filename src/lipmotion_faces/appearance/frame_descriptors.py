@@ -60,12 +60,14 @@ class FrameDescriptors:
                  is aligned, and counts as it is
         Whole frame, upper face and place of the face have the same weight [shape=(T, A + B + 6)].
         """
-        groups = [
-            rows / (frames * max(_ordinary(rows, scenes), least * np.sqrt(rows.shape[1])))
-            for rows, least, frames in zip(
-                (self.whole, self.face, self.place), LEAST_ORDINARY, (fade, 1, fade), strict=True
-            )
-        ]
+        groups = []
+        for rows, least, frames in zip(
+            (self.whole, self.face, self.place), LEAST_ORDINARY, (fade, 1, fade), strict=True
+        ):
+            steps = [np.linalg.norm(np.diff(rows[start:stop], axis=0), axis=1) for start, stop in scenes]
+            different = np.concatenate([part[part > 0] for part in steps])
+            ordinary = float(np.median(different)) if len(different) else 0.0
+            groups.append(rows / (frames * max(ordinary, least * np.sqrt(rows.shape[1]))))
         return np.concatenate(groups, axis=1) / np.sqrt(len(groups))
 
 
@@ -89,12 +91,16 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
         if not size:
             size, cell = frame.shape, max(1, round(max(frame.shape[:2]) / FRAME_CELLS))
         grey = frame[:, :, 1].astype(np.float32)  # green, of which a camera has most pixels
-        thumbnail = _cells(grey, cell)
-        hidden = _inside(face_to_image[n], LOWER_FACE, thumbnail.shape, cell)
+        thumbnail = _average_cells(grey, cell)
+        rows, columns = np.mgrid[: thumbnail.shape[0], : thumbnail.shape[1]]
+        centres = np.stack([(columns.ravel() + 0.5) * cell, (rows.ravel() + 0.5) * cell])
+        x, y = np.linalg.solve(face_to_image[n][:, :2], centres - face_to_image[n][:, 2:])
+        left, top, right, bottom = LOWER_FACE
+        hidden = ((x > left) & (x < right) & (y > top) & (y < bottom)).reshape(thumbnail.shape)
         lower = hidden if lower is None else lower | hidden
         whole.append(thumbnail)
-        face.append(_sampled(grey, face_to_image[n], UPPER_FACE, FACE_STEP))
-        eyes.append(_sampled(grey, face_to_image[n], EYES, EYES_STEP))
+        face.append(_sample(grey, face_to_image[n], UPPER_FACE, FACE_STEP))
+        eyes.append(_sample(grey, face_to_image[n], EYES, EYES_STEP))
     if len(whole) != len(face_to_image) or lower is None:
         raise InputError(f"{len(whole)} frames with {len(face_to_image)} maps, required as many, at least one")
     points = np.array([[-45.0, 0, 1], [45, 0, 1], [0, 76, 1]]).T
@@ -111,14 +117,7 @@ def row_distances(rows: Array) -> Array:
     return np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
 
 
-def _ordinary(rows: Array, scenes: Scenes) -> float:
-    """Return the median distance of neighbouring frames that are not equal, 0 if all are."""
-    steps = [np.linalg.norm(np.diff(rows[start:stop], axis=0), axis=1) for start, stop in scenes]
-    different = np.concatenate([part[part > 0] for part in steps])
-    return float(np.median(different)) if len(different) else 0.0
-
-
-def _cells(grey: Floats, cell: int) -> Floats:
+def _average_cells(grey: Floats, cell: int) -> Floats:
     """Return means of square cells; pixels beyond the last whole cell are left out."""
     height, width = (side // cell for side in grey.shape)
     if not height or not width:
@@ -129,38 +128,19 @@ def _cells(grey: Floats, cell: int) -> Floats:
     return rows.reshape(height, width, cell).sum(axis=2) / cell**2
 
 
-def _sampled(grey: Floats, to_image: Array, box: tuple[float, float, float, float], step: float) -> Floats:
+def _sample(grey: Floats, to_image: Array, box: tuple[float, float, float, float], step: float) -> Floats:
     """Return a region of the aligned face on a grid, each sample the mean of about its part [shape=(N,)]."""
     left, top, right, bottom = box
     scale = float(np.sqrt(abs(np.linalg.det(to_image[:, :2]))))
     shrink = max(1, int(scale * step / 2))
     x, y = np.meshgrid(np.arange(left + step / 2, right, step), np.arange(top + step / 2, bottom, step))
     columns, rows = (to_image[:, :2] @ np.stack([x.ravel(), y.ravel()]) + to_image[:, 2:]) / shrink - 0.5
-    small = _cells(grey, shrink)
-    return _between(small, rows, columns)
-
-
-def _between(image: Floats, rows: Array, columns: Array) -> Floats:
-    """Return bilinear samples of a picture; outside it is as at its edge."""
-    height, width = image.shape
+    image = _average_cells(grey, shrink)
+    height, width = image.shape  # bilinear samples; outside, the picture is as at its edge
     rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
-    top, left = (
-        np.minimum(values.astype(int), max(side - 2, 0)) for values, side in ((rows, height), (columns, width))
-    )
+    top, left = np.minimum(rows.astype(int), max(height - 2, 0)), np.minimum(columns.astype(int), max(width - 2, 0))
     below, beside = np.minimum(top + 1, height - 1), np.minimum(left + 1, width - 1)
     down, across = rows - top, columns - left
     upper = (1 - across) * image[top, left] + across * image[top, beside]
     under = (1 - across) * image[below, left] + across * image[below, beside]
     return (1 - down) * upper + down * under
-
-
-def _inside(
-    to_image: Array, box: tuple[float, float, float, float], shape: tuple[int, ...], cell: int
-) -> NDArray[np.bool_]:
-    """Return which cells of a frame show a region of the face."""
-    rows, columns = np.mgrid[: shape[0], : shape[1]]
-    points = np.stack([(columns.ravel() + 0.5) * cell, (rows.ravel() + 0.5) * cell]) - to_image[:, 2:]
-    x, y = np.linalg.solve(to_image[:, :2], points)
-    left, top, right, bottom = box
-    inside: NDArray[np.bool_] = (x > left) & (x < right) & (y > top) & (y < bottom)
-    return inside.reshape(shape[:2])

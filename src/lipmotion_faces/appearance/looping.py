@@ -116,7 +116,7 @@ def loop_order(
     if count <= longest[1] - longest[0]:
         starts = np.arange(longest[0], longest[1] - count + 1)
         start = int(starts[np.argmin(plan.restless[starts] + plan.restless[starts + count - 1])])
-        return _as_order([(start, 1, count)], (), count, 0)
+        return _make_order([(start, 1, count)], (), count, 0)
     draws = np.random.default_rng(seed)
     orders = [plan.order(count, longest, draws) for _ in range(TRIES)]
     return min(orders, key=plan.blemish)
@@ -145,13 +145,19 @@ class _Plan:
         self._scene_of = np.full(len(allowed), -1)
         for index, (start, stop) in enumerate(self.scenes):
             self._scene_of[start:stop] = index
-        self.busy = _busy(descriptors.eyes, rate_hz, self.scenes)
-        self.restless = _restlessness(descriptors.standardised(self.scenes), self.scenes) + BUSY_COST * self.busy
+        self.busy = _find_blinks(descriptors.eyes, rate_hz, self.scenes)
+        self.restless = _measure_restlessness(descriptors, self.scenes) + BUSY_COST * self.busy
         self._least = max(1, round(LEAST_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
         self._repeat = REPEAT_S * rate_hz
         self._fade = fade_frames(rate_hz)
-        self._jumps = self._best_jumps(descriptors)
+        count = len(descriptors)
+        if count > MOST_COMPARED_FRAMES:
+            none = np.full((count, 1), -1), np.full((count, 1), np.inf)
+            self._jumps = {1: none, -1: none}
+        else:
+            distance = row_distances(descriptors.standardised(self.scenes, self._fade))
+            self._jumps = {way: self._find_jumps(distance, way) for way in (1, -1)}
 
     def order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
         """Return one order of frames, drawn by chance."""
@@ -161,9 +167,10 @@ class _Plan:
         runs: list[tuple[int, int, int]] = []
         joins: list[Join] = []
         while shown < count:
-            options = self._joins_from(at, way)
+            options = self._list_joins(at, way)
             lengths = np.abs(options.ends - at) + 1
-            seen = self._last_seen(options, way, last_shown)
+            following = options.nexts[:, None] + way * np.arange(self._least)
+            seen = last_shown[np.clip(following, 0, len(last_shown) - 1)].max(axis=1)  # -inf: never
             ages = np.where(options.nexts < 0, 0, shown + lengths - seen)
             costs = options.costs + self._usual / lengths + REPEAT_COST * np.exp(-ages / self._repeat)
             chosen = int(draws.choice(np.flatnonzero(costs <= costs.min() + CHOICE_COST_RANGE)))
@@ -173,14 +180,12 @@ class _Plan:
             last_shown[at : end + way if end + way >= 0 else None : way] = shown
             if shown >= count:
                 break
-            is_turn = after < 0
-            joins.append(Join(shown, "turn" if is_turn else "jump", float(options.costs[chosen])))
-            if is_turn:
+            joins.append(Join(shown, "turn" if after < 0 else "jump", float(options.costs[chosen])))
+            if after < 0:
                 way = -way
-                at = end + way if self._room(end, way) else end
-            else:
-                at = after
-        return _as_order(runs, tuple(joins), count, self._fade)
+                after = end + way if self._room(end, way) else end
+            at = after
+        return _make_order(runs, tuple(joins), count, self._fade)
 
     def blemish(self, order: LoopOrder) -> float:
         """Return how bad an order is: the cost of its worst join, how restless its last frame is, and its repeats."""
@@ -189,7 +194,7 @@ class _Plan:
         again = (np.diff(order.first[shown]) == 0) & (np.diff(shown) < self._repeat)
         return worst + REPEATS_COST * float(again.sum()) / len(order)
 
-    def _joins_from(self, at: int, way: int) -> _Joins:
+    def _list_joins(self, at: int, way: int) -> _Joins:
         room = self._room(at, way)
         least = min(self._least, max(room, 1))
         lengths = np.arange(least, room + 1) if room >= least else np.array([room])
@@ -202,30 +207,16 @@ class _Plan:
             np.concatenate([np.full(len(ends), -1), targets[row, scene]]),
         )
 
-    def _last_seen(self, options: _Joins, way: int, last_shown: Array) -> Array:
-        """Return when any of the frames that would follow a join was shown last, -inf for never [shape=(K,)]."""
-        following = options.nexts[:, None] + way * np.arange(self._least)
-        newest: Array = last_shown[np.clip(following, 0, len(last_shown) - 1)].max(axis=1)
-        return newest
-
     def _room(self, at: int, way: int) -> int:
         """Return how many frames there are behind a frame, in its scene."""
         start, stop = self.scenes[int(self._scene_of[at])]
         return stop - 1 - at if way > 0 else at - start
 
-    def _best_jumps(self, descriptors: FrameDescriptors) -> dict[int, tuple[Numbers, Array]]:
+    def _find_jumps(self, distance: Array, way: int) -> tuple[Numbers, Array]:
         """Return the frame of each scene to which each frame is best followed by a jump, -1 for none, and the cost.
 
-        For both ways [each shape=(T, S)].
+        distance : of frames [shape=(T, T)];  way : 1 or -1. Both results have the shape (T, S).
         """
-        count = len(descriptors)
-        if count > MOST_COMPARED_FRAMES:
-            return {way: (np.full((count, 1), -1), np.full((count, 1), np.inf)) for way in (1, -1)}
-        distance = row_distances(descriptors.standardised(self.scenes, self._fade))
-        return {way: self._best_jumps_on(distance, way) for way in (1, -1)}
-
-    def _best_jumps_on(self, distance: Array, way: int) -> tuple[Numbers, Array]:
-        """Return the same for one direction, from the distances of frames [shape=(T, T)]."""
         count = len(distance)
         frames = np.arange(count)
         power = np.zeros((count, count))
@@ -264,7 +255,7 @@ def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int
     return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]
 
 
-def _busy(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
+def _find_blinks(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
     """Return the frames in a blink, or near one: the eyes change much [shape=(T,)]."""
     from scipy.ndimage import binary_dilation
 
@@ -277,20 +268,20 @@ def _busy(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDA
     return binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
 
 
-def _restlessness(rows: Array, scenes: Sequence[tuple[int, int]]) -> Array:
+def _measure_restlessness(descriptors: FrameDescriptors, scenes: Sequence[tuple[int, int]]) -> Array:
     """Return the speed of the background at each frame, relative to the median [shape=(T,)]."""
     from scipy.ndimage import gaussian_filter1d
 
+    rows = descriptors.standardised(scenes)
     speed = np.zeros(len(rows))
     for start, stop in scenes:
         if stop - start > 1:
             smooth = gaussian_filter1d(rows[start:stop], 1.0, axis=0, mode="nearest")
             speed[start:stop] = np.linalg.norm(np.gradient(smooth, axis=0), axis=1)
-    median = float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0
-    return speed / median
+    return speed / (float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0)
 
 
-def _as_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], count: int, fade: int) -> LoopOrder:
+def _make_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], count: int, fade: int) -> LoopOrder:
     """Return the order of some runs (first frame, direction, number of frames), of which ``count`` frames are shown.
 
     fade : frames over which a jump is cross-faded, smoothly (3s² − 2s³)

@@ -20,7 +20,7 @@ from lipmotion_faces.appearance.candidates import (
     LARGEST_DETAIL,
     Candidates,
     choose_candidates,
-    drawn_to_recorded,
+    draw_to_recorded,
     make_candidates,
     recorded_details,
     squared_distances,
@@ -31,7 +31,7 @@ from lipmotion_faces.appearance.lower_face import (
     cheek_light,
     mouth_ellipse,
     mouth_part,
-    relit,
+    relight,
     replaced_part,
 )
 from lipmotion_faces.appearance.motion_map import LEAST_DEVIATION, MotionMap, channel_values, fit_motion_map
@@ -148,21 +148,21 @@ class Appearance:
     @cached_property
     def mouth_candidates(self) -> Candidates:
         """The recorded mouths as eigenlips and detail."""
-        return make_candidates(enlarged(self.mouth, self.scale), self.mouths, self.mouth_codes)
+        return make_candidates(enlarge(self.mouth, self.scale), self.mouths, self.mouth_codes)
 
     @cached_property
     def jaw_candidates(self) -> Candidates:
         """The recorded lower faces as components and detail."""
-        details, _ = recorded_details(enlarged(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        details, _ = recorded_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
         return Candidates(self.jaw_codes, details)
 
     def mouth_refiner(self, options: RefinementOptions) -> Refiner:
         """Return what makes pictures of the mouth from eigenlips."""
-        return Refiner(enlarged(self.mouth, self.scale), self.mouth_candidates, options)
+        return Refiner(enlarge(self.mouth, self.scale), self.mouth_candidates, options)
 
     def jaw_refiner(self, options: RefinementOptions = JAW_OPTIONS) -> Refiner:
         """Return what makes pictures of the lower face from components of the jaw."""
-        return Refiner(enlarged(self.jaw, self.scale), self.jaw_candidates, options)
+        return Refiner(enlarge(self.jaw, self.scale), self.jaw_candidates, options)
 
     def of_motion(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
         """Return the lower face for motion of tracked points.
@@ -172,16 +172,16 @@ class Appearance:
         """
         values = self.from_motion.predict(motion)
         count = self.mouth_codes.shape[1]
-        mouth = self._recorded_mouths(values[:, :count], motion, contact)
+        mouth = self._mix_mouths(values[:, :count], motion, contact)
         return FaceCodes(mouth, values[:, count:-1], values[:, -1])
 
-    def _recorded_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
+    def _mix_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
         """Return mixtures of recorded mouths [shape=(T, 90)] that look as predicted and are as open and as wide as the
         motion, as far as this person has been; in closures, recorded mouths that are closed.
         """
         measured = self.mouth_distances
         if measured is None:
-            return drawn_to_recorded(predicted, self.mouth_codes)
+            return draw_to_recorded(predicted, self.mouth_codes)
         middle = measured.mean(axis=0)
         wanted = middle + DISTANCE_GAINS * (channel_values(motion, LIP_DISTANCES) - middle)
         wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
@@ -190,10 +190,13 @@ class Appearance:
             np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
             for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
         )
-        mouths = drawn_to_recorded(sought, recorded)[:, : predicted.shape[1]]
+        mouths = draw_to_recorded(sought, recorded)[:, : predicted.shape[1]]
         if contact is None:
             return mouths
-        for first, stop in _closures(contact, motion.rate_hz):
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
+        for first, stop in ends.tolist():
+            if stop - first > max(1, LONGEST_CLOSURE_S * motion.rate_hz):
+                continue
             closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
             apart = squared_distances(sought[first:stop], recorded).mean(axis=0)
             pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
@@ -203,7 +206,7 @@ class Appearance:
 
     def of_mouths(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
-        codes = self.mouth.project(relit(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
+        codes = self.mouth.project(relight(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
         values = codes @ self.from_mouth[1:] + self.from_mouth[0]
         return FaceCodes(codes, values[:, :-1], values[:, -1])
 
@@ -216,39 +219,31 @@ class Appearance:
         return FaceCodes(codes.mouth, values[:, :-1], values[:, -1])
 
 
-def _closures(contact: Array, rate_hz: float) -> list[tuple[int, int]]:
-    """Return the closures of at most ``LONGEST_CLOSURE_S``: the first frame of each, and the one after its last."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
-    return [(first, stop) for first, stop in ends.tolist() if stop - first <= max(1, LONGEST_CLOSURE_S * rate_hz)]
-
-
 def learn_appearance(footage: FootagePictures) -> Appearance:
     """Return the appearance of a person.
 
     Raises InputError: no pictures, or motion of another number of frames.
     Cost: about 10 s for four minutes of footage; 100 kB a frame.
     """
-    pictures, light, reference = _in_one_light(footage)
+    pictures, light, reference = _equalise_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
-    mouth = fit_eigenlips(mouths[evenly_spaced(TRAINING_PICTURES, len(mouths))], COMPONENTS)
+    training = evenly_spaced(TRAINING_PICTURES, len(pictures))
+    mouth = fit_eigenlips(mouths[training], COMPONENTS)
     codes = mouth.project(mouths)
-    around = pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))].mean(axis=0, dtype=np.float32)
-    faces = _jaw_alone(pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))], around, footage.shape)
-    jaw = fit_eigenlips(faces, JAW_COMPONENTS)
-    jaw_codes = np.concatenate(
-        [
-            jaw.project(_jaw_alone(pictures[start : start + PICTURES_PER_BLOCK], around, footage.shape))
-            for start in range(0, len(pictures), PICTURES_PER_BLOCK)
-        ]
-    )
-    chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
+    around = pictures[training].mean(axis=0, dtype=np.float32)
+    jaw = fit_eigenlips(_isolate_jaw(pictures[training], around, footage.shape), JAW_COMPONENTS)
+    blocks = (pictures[start : start + PICTURES_PER_BLOCK] for start in range(0, len(pictures), PICTURES_PER_BLOCK))
+    jaw_codes = np.concatenate([jaw.project(_isolate_jaw(block, around, footage.shape)) for block in blocks])
+    chosen = choose_candidates(codes, CANDIDATES)
+    undamaged = recorded_details(mouth, mouths[chosen], codes[chosen])[1] <= LARGEST_DETAIL
+    chosen = chosen[undamaged] if undamaged.any() else chosen
     chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
     names = [channel.name for channel in footage.channels]
 
     def recorded(frames: Index) -> Pictures:
         if footage.scale == 1:
             return pictures[frames]
-        return relit(footage.finer(frames), reference / light[frames])
+        return relight(footage.finer(frames), reference / light[frames])
 
     chosen_faces = recorded(chosen_jaws)
     jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
@@ -262,16 +257,16 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         codes[chosen],
         footage.motion[chosen][:, [names.index(name) for name in LIP_DISTANCES]],
         jaw,
-        _jaw_alone(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
+        _isolate_jaw(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
         jaw_codes[chosen_jaws],
         fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
-        _regression(codes, jaw_and_chin),
-        _regression(footage.levels_db[:, None], jaw_and_chin),
+        _fit_regression(codes, jaw_and_chin),
+        _fit_regression(footage.levels_db[:, None], jaw_and_chin),
         estimate_noise(np.split(mouths, ends)),
     )
 
 
-def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
+def _equalise_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
     """Return all pictures in the same light, their own light [shape=(N, 3)], and that light [shape=(3,)]."""
     count = sum(len(clip) for clip in footage.clips)
     if not count or len(footage.motion) != count or len(footage.levels_db) != count:
@@ -282,16 +277,15 @@ def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
     part = (slice(None), *mouth_part(1))
     light = np.maximum(np.concatenate([cheek_light(clip[part]) for clip in footage.clips]), 1.0)
     reference = np.median(light, axis=0)
-    pictures = np.empty((count, *footage.clips[0].shape[1:]), np.uint8)
-    start = 0
+    pictures, start = np.empty((count, *footage.clips[0].shape[1:]), np.uint8), 0
     for clip in footage.clips:
         inside = slice(start, start + len(clip))
-        pictures[inside] = relit(clip, reference / light[inside])
+        pictures[inside] = relight(clip, reference / light[inside])
         start += len(clip)
     return pictures, light, reference
 
 
-def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
+def _isolate_jaw(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
     """Return lower faces that differ in the jaw alone: mouth and surroundings are the mean ones [shape=(H, W, 3)]."""
     from scipy.ndimage import binary_dilation
 
@@ -302,13 +296,7 @@ def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
     return result
 
 
-def _undamaged(space: Eigenlips, pictures: Pictures, codes: Floats, chosen: Index) -> Index:
-    """Return those of the chosen pictures that are like what their components restore: damaged video is not."""
-    whole = recorded_details(space, pictures[chosen], codes[chosen])[1] <= LARGEST_DETAIL
-    return chosen[whole] if whole.any() else chosen
-
-
-def _regression(inputs: Values, targets: Values) -> Floats:
+def _fit_regression(inputs: Values, targets: Values) -> Floats:
     """Return the coefficients of a ridge regression on 1 and the inputs [shape=(1 + F, V)]."""
     centre, middle = inputs.mean(axis=0, dtype=np.float64), targets.mean(axis=0, dtype=np.float64)
     x = inputs - centre
@@ -318,7 +306,7 @@ def _regression(inputs: Values, targets: Values) -> Floats:
     return np.concatenate([(middle - centre @ slopes)[None], slopes]).astype(np.float32)
 
 
-def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
+def enlarge(eigenlips: Eigenlips, scale: int) -> Eigenlips:
     """Return eigenlips that restore larger pictures from the same coefficients, by cubic interpolation.
 
     scale : pixels of the new pictures for each of the old ones, along each side; 1: the same eigenlips

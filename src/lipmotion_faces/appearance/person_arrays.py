@@ -86,11 +86,11 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
             scale,
             stored["light"],
             mouth,
-            _decoded(stored["mouths"], len(stored["mouth_codes"]), MOUTH_HEIGHT * scale, MOUTH_WIDTH * scale),
+            _decode(stored["mouths"], len(stored["mouth_codes"]), MOUTH_HEIGHT * scale, MOUTH_WIDTH * scale),
             stored["mouth_codes"],
             stored.arrays.get("mouth_distances"),
             jaw,
-            _decoded(stored["jaws"], len(stored["jaw_codes"]), HEIGHT * scale, WIDTH * scale),
+            _decode(stored["jaws"], len(stored["jaw_codes"]), HEIGHT * scale, WIDTH * scale),
             stored["jaw_codes"],
             motion_map_from_arrays(inner["from_motion"], codes + jaw_codes + 1),
             stored["from_mouth"],
@@ -119,7 +119,7 @@ def _check_size(name: str, space: Eigenlips, size: tuple[int, int]) -> None:
         raise ValueError(f"pictures of the {name} of {space.size} px, required {size}")
 
 
-def _decoded(data: Pictures, count: int, height: int, width: int) -> Pictures:
+def _decode(data: Pictures, count: int, height: int, width: int) -> Pictures:
     pictures = decode_pictures(data)
     if pictures.shape != (count, height, width, 3):
         raise ValueError(f"pictures of shape {pictures.shape}, required ({count}, {height}, {width}, 3)")

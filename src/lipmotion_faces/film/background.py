@@ -17,18 +17,17 @@ from lipmotion.stats.pca import evenly_spaced
 from lipmotion.storage.coded_video import encode_video
 from lipmotion.storage.frame_groups import FrameGroups
 from lipmotion_faces.appearance.frame_descriptors import FrameDescriptors, describe_frames, row_distances
-from lipmotion_faces.appearance.identity import SAME_PERSON_LIKENESS, face_signature, likeness
 from lipmotion_faces.appearance.looping import JUMP_LIMIT, LoopOrder, fade_frames, loop_order, scenes_of
 from lipmotion_faces.appearance.lower_face import HEIGHT as REGION_HEIGHT
+from lipmotion_faces.appearance.lower_face import SAME_PERSON_LIKENESS, face_signature, likeness, region_map
 from lipmotion_faces.appearance.lower_face import WIDTH as REGION_WIDTH
-from lipmotion_faces.appearance.lower_face import region_map
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.appearance.placing import cut, feather, inverse_map
 from lipmotion_faces.filmed.face import StoredBackground
 from lipmotion_faces.filmed.renderer import Background
 from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, track_footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
-from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
+from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
 
 LOG = logging.getLogger("lipmotion")
 
@@ -276,7 +275,7 @@ def chin_px(footage: Footage) -> NDArray[np.float64]:
 
 def placed_maps(footage: Footage) -> NDArray[np.float64]:
     """Return where the face is in every frame of some footage, without the noise of tracking [shape=(T, 2, 3)]."""
-    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts, noise_px=REGISTERED_NOISE_PX)
+    return steady_maps(register_maps(footage), footage.rate_hz, footage.cuts, noise_px=REGISTERED_NOISE_PX)
 
 
 def _mixed(one: Background, other: Background, weight: float) -> Background:

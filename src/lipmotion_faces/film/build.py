@@ -17,8 +17,15 @@ from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
-from lipmotion_faces.appearance.identity import SAME_PERSON_LIKENESS, face_signature
-from lipmotion_faces.appearance.lower_face import HEIGHT, WIDTH, best_scale, face_shape, region_map
+from lipmotion_faces.appearance.lower_face import (
+    HEIGHT,
+    SAME_PERSON_LIKENESS,
+    WIDTH,
+    best_scale,
+    face_shape,
+    face_signature,
+    region_map,
+)
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px

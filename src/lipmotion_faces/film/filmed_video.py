@@ -27,7 +27,7 @@ from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import BackgroundSequence, open_background, stored_sequence
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, BATCH, STITCHING, Stitcher, StitchingOptions
-from lipmotion_faces.tracking.footage import untracked_frames
+from lipmotion_faces.tracking.footage import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_faces.video.synthetic_mark import mark_frames, mark_metadata
 
@@ -138,7 +138,7 @@ def film_of(  # noqa: PLR0913
     eigenlips = model.eigenlips if model is not None else None
     said = motion, Timeline(()) if units is None else units
     if options.overlay == "inset" and speech is not None:
-        frames, rate_hz = untracked_frames(speech)
+        frames, rate_hz = read_video_frames(speech)
         codes = _codes(face, said, sound, rate_hz, eigenlips, options)
         mouths = Stitcher(face.appearance, _stitching(options)).mouths(codes)
         first, frames = _first_of(_even(frames), speech)

@@ -313,8 +313,8 @@ class Figure:
     def _bake_light(self) -> Real:
         """Return the parts of sky and key light that reach the vertices at rest [shape=(V, 2)]."""
         places, normals = self.place(REST)
-        eyes = ["catchlights", "right catchlights", "lashes", "right lashes"]
-        fully_lit = [self._wall, *(self.rows[name] for name in ("tongue", "teeth", "upper teeth", *eyes))]
+        inner = ("tongue", "teeth", "upper teeth", "catchlights", "right catchlights", "lashes", "right lashes")
+        fully_lit: list[slice | NDArray[np.intp]] = [self._wall, *(self.rows[name] for name in inner)]
         hiding = np.ones(len(places), bool)
         for rows in (*fully_lit, self.rows["eye"], self.rows["right eye"]):
             hiding[rows] = False

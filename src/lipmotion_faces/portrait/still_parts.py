@@ -122,12 +122,9 @@ def paint_head(window: Window, design: Design) -> Layer:
                 layer.fill(spot, colours.beard, opacity=design.beard, blur=0.09, within=skull)
             layer.fill(ellipse(0, y - 0.15, 0.26, 0.07), colours.beard, opacity=0.8 * design.beard, blur=0.05)
         _paint_nose(layer, design)
-    brow = stroke(open_curve(design.eyes.brow), design.eyes.brow_widths)
-    for side in both_sides(brow):
-        if design.flat:
-            layer.fill(side, colours.hair_dark)
-        else:
-            layer.fill(side, colours.hair, opacity=0.92, blur=0.007)
+    brow_colour, strength, soft = (colours.hair_dark, 1.0, 0.0) if design.flat else (colours.hair, 0.92, 0.007)
+    for brow in both_sides(stroke(open_curve(design.eyes.brow), design.eyes.brow_widths)):
+        layer.fill(brow, brow_colour, opacity=strength, blur=soft)
     return layer
 
 

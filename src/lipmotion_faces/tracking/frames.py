@@ -99,9 +99,8 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
             stated_s = max(min(stated_s, span.end_s) - span.start_s, 0.0)
         if longest_px is not None:
             stream.thread_type = "AUTO"
-        with closing(
-            _frames(container, stream, path, span, longest_px, damage)
-        ) as frames:  # decoding from a closed container would crash
+        frames = _frames(container, stream, path, span, longest_px, damage)
+        with closing(frames):  # decoding from a closed container would crash
             yield OpenVideo(frames, tuple(rates), stated_s, damage)
 
 
@@ -175,31 +174,23 @@ def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
                     damage.append("a damaged picture")
                 else:
                     yield picture
-        except StopIteration:
-            return
-        except av.EOFError:
+        except (StopIteration, av.EOFError):
             return
         except av.FFmpegError as error:
             damage.append(str(error.strerror))
 
 
 def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:
-    """Raise InputError for pictures that are too small or too large.
-
-    pixel_shape : width of a pixel over its height
-    """
+    """Raise InputError for pictures that are too small or too large; ``pixel_shape``: width of a pixel over height."""
     if not width or not height:  # FFmpeg gives no size for pictures that it refuses
         raise InputError(f"{path}: pictures of no size, or of more than {MOST_PIXELS} pixels; scale the video")
     shown = round(width * pixel_shape)
     if not (LEAST_SIDE_PX <= shown <= LONGEST_SIDE_PX and LEAST_SIDE_PX <= height <= LONGEST_SIDE_PX):
-        raise InputError(
-            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_SIDE_PX} to {LONGEST_SIDE_PX}; scale "
-            "the video"
-        )
+        sides = f"{LEAST_SIDE_PX} to {LONGEST_SIDE_PX}"
+        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {sides}; scale the video")
     if shown * height > MOST_PIXELS:
-        raise InputError(
-            f"{path}: pictures of {shown} × {height} pixels, required at most {MOST_PIXELS} in all; scale the video"
-        )
+        most = f"at most {MOST_PIXELS} in all"
+        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {most}; scale the video")
 
 
 def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
@@ -217,5 +208,4 @@ def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) ->
         return image
     cv2 = import_opencv()
     turn = (cv2.ROTATE_90_COUNTERCLOCKWISE, cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE)[quarter_turns - 1]
-    rotated: NDArray[np.uint8] = cv2.rotate(image, turn)
-    return rotated
+    return cv2.rotate(image, turn)

@@ -35,7 +35,7 @@ class PointFinder(AbstractContextManager["PointFinder"], Protocol):
         """Return the points of every face in the next picture.
 
         image : uint8 array [shape=(H, W, 3)], RGB
-        Returns one array a face [shape=(len(TRACKED_POINTS), 3)], in the order of ``vision.landmarks.TRACKED_POINTS``:
+        Returns one array a face [shape=(len(TRACKED_POINTS), 3)], in the order of ``landmarks.TRACKED_POINTS``:
         px, x to the right, y down, z away from the camera.
         """
 

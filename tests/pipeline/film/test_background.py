@@ -127,7 +127,7 @@ def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.long
 def test_the_best_background_is_one_part(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of at most some seconds, without cuts, in which the face is seen."""
-    monkeypatch.setattr(background, "registered_maps", lambda footage: footage.face_to_image)
+    monkeypatch.setattr(background, "register_maps", lambda footage: footage.face_to_image)
     monkeypatch.setattr(background, "MOST_BACKGROUND_S", 1.0)
     monkeypatch.setattr(background, "MOST_PART_S", 1.0)
     best = best_background([footage_of(video)])
