@@ -51,13 +51,13 @@ def separate_sound(recording: SourceRecording) -> SeparateSound | None:
     if recording.offset_s is not None:
         return SeparateSound(audio, recording.offset_s, GIVEN)
     try:
-        found = sound_offset(read_audio(recording.file), audio)
+        offset = sound_offset(read_audio(recording.file), audio)
     except InputError as error:
         raise InputError(f"{recording.recorder}: {error}") from error
-    return SeparateSound(audio, found.late_s, found.how)
+    return SeparateSound(audio, offset.late_s, offset.how)
 
 
-def on_own_time(sound: SeparateSound, duration_s: float) -> Audio:
+def align_sound(sound: SeparateSound, duration_s: float) -> Audio:
     """Return the part of a sound in the time of the motion; silence where it had not begun, or had ended."""
     rate = sound.audio.rate_hz
     shift, count = round(sound.late_s * rate), round(duration_s * rate)
@@ -66,7 +66,7 @@ def on_own_time(sound: SeparateSound, duration_s: float) -> Audio:
     return Audio(np.pad(overlapping, (front, max(count - front - len(overlapping), 0))), rate)
 
 
-def in_step(sound: SeparateSound, track: Track) -> tuple[Audio, Track, float]:
+def trim_to_shared(sound: SeparateSound, track: Track) -> tuple[Audio, Track, float]:
     """Return what sound and motion share: the sound, the motion, and the time of the motion at which both begin.
 
     Motion is cut at whole frames, the sound at the same times. Raises InputError: they share hardly anything.
@@ -83,14 +83,14 @@ def in_step(sound: SeparateSound, track: Track) -> tuple[Audio, Track, float]:
             f"{max(shared_s, 0):.2f} s, required {LEAST_SHARED_S:g}"
         )
     samples = samples[: max(round(shared_s * rate), WINDOW)]
-    kept = slice(first, last)
-    motion = replace(track.motion, values=track.motion.values[kept])
-    crops = None if track.crops is None else track.crops[kept]
+    shared = slice(first, last)
+    motion = replace(track.motion, values=track.motion.values[shared])
+    crops = None if track.crops is None else track.crops[shared]
     notes = (*track.notes, sound.note)
-    return Audio(np.ascontiguousarray(samples), rate), Track(motion, track.seen[kept], crops, notes), start_s
+    return Audio(np.ascontiguousarray(samples), rate), Track(motion, track.seen[shared], crops, notes), start_s
 
 
-def earlier_phones(phones: Timeline[Unit] | None, by_s: float) -> Timeline[Unit] | None:
+def shift_phones(phones: Timeline[Unit] | None, by_s: float) -> Timeline[Unit] | None:
     """Return labelled phones that much earlier, from 0 s on; None where none are left, or there are no labels."""
     if phones is None or by_s <= 0:
         return phones

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -34,8 +33,13 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
     """Return file names and digests of motion, phones and sound that are supplied with a recording, by key."""
     digests = {}
     if recording.motion_file is not None:
-        digests["motion_file"] = recording.motion_file.file.name
-        digests["motion_sha256"] = _motion_digest(recording.motion_file.file)
+        file = recording.motion_file.file
+        digests["motion_file"] = file.name
+        if file.suffix == MESH:  # a sequence of meshes
+            meshes = "\n".join(map(sha256_of, mesh_files(file)))
+            digests["motion_sha256"] = hashlib.sha256(meshes.encode()).hexdigest()
+        else:
+            digests["motion_sha256"] = sha256_of(file)
     if recording.recorder is not None:
         digests["recorder_file"] = recording.recorder.name
         digests["recorder_sha256"] = sha256_of(recording.recorder)
@@ -43,13 +47,6 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
         text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
         digests["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()
     return digests
-
-
-def _motion_digest(file: Path) -> str:
-    """Return the digest of a motion file, of a sequence of meshes that of all their digests."""
-    if file.suffix != MESH:
-        return sha256_of(file)
-    return hashlib.sha256("\n".join(map(sha256_of, mesh_files(file))).encode()).hexdigest()
 
 
 def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
@@ -104,35 +101,24 @@ def supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[U
     clipped = [replace(s, start_s=min(s.start_s, duration_s), end_s=min(s.end_s, duration_s)) for s in recording.phones]
     before = Span(0.0, clipped[0].start_s, Unit(SILENCE))
     after = Span(clipped[-1].end_s, duration_s, Unit(SILENCE))
-    whole = _merged([span for span in (before, *clipped, after) if span.duration_s > 0])
-    if _contain_speech(recording.phones) and not _contain_speech(whole):
-        raise InputError(
-            f"{recording.file}: none of its {len(recording.phones)} labels is a phone that lasts longer than 0 s"
-        )
-    return Timeline(tuple(_with_silence_named(span, inside=0 < i < len(whole) - 1) for i, span in enumerate(whole)))
+    spans: list[Span[Unit]] = []
+    for span in (before, *clipped, after):
+        if span.duration_s <= 0:
+            continue
+        if spans and is_silent(span.label.phone) and is_silent(spans[-1].label.phone):
+            spans[-1] = replace(spans[-1], end_s=span.end_s)
+        else:
+            spans.append(span)
+    if _contain_speech(recording.phones) and not _contain_speech(spans):
+        labels = f"none of its {len(recording.phones)} labels"
+        raise InputError(f"{recording.file}: {labels} is a phone that lasts longer than 0 s")
+    for n, span in enumerate(spans):
+        if is_silent(span.label.phone):
+            is_pause = 0 < n < len(spans) - 1 and span.duration_s < SHORT_PAUSE_S
+            spans[n] = replace(span, label=Unit(PAUSE if is_pause else SILENCE))
+    return Timeline(tuple(spans))
 
 
 def _contain_speech(spans: Iterable[Span[Unit]]) -> bool:
     """Return whether any label is not silence."""
     return any(not is_silent(span.label.phone) for span in spans)
-
-
-def _merged(spans: list[Span[Unit]]) -> list[Span[Unit]]:
-    """Return the spans, with neighbouring silences merged into one."""
-    merged: list[Span[Unit]] = []
-    for span in spans:
-        if merged and is_silent(span.label.phone) and is_silent(merged[-1].label.phone):
-            merged[-1] = replace(merged[-1], end_s=span.end_s)
-        else:
-            merged.append(span)
-    return merged
-
-
-def _with_silence_named(span: Span[Unit], *, inside: bool) -> Span[Unit]:
-    """Return a span; silence gets the phone of a pause or of longer silence.
-
-    inside : whether the span is between phones
-    """
-    if not is_silent(span.label.phone):
-        return span
-    return replace(span, label=Unit(PAUSE if inside and span.duration_s < SHORT_PAUSE_S else SILENCE))

@@ -51,20 +51,37 @@ def utterance_spans(
     quietest   : finds the best place to divide where there is no pause
     Between neighbours, the pause is shared; of one longer than twice ``MARGIN_S``, the middle belongs to nobody.
     """
-    parts = [part for stretch in _in_order(stretches) for part in _divided_at_cuts(stretch, cuts_s)]
-    parts = [piece for part in parts for piece in _divided_in_speech(part, quietest)]
     groups: list[list[SpokenPart]] = []
-    for part in parts:
-        if groups and not _is_border(groups[-1][-1], part, cuts_s):
-            groups[-1].append(part)
+    for stretch in _separate_overlaps(stretches):
+        edges = [stretch.start_s, stretch.end_s]
+        if stretch.words is None:
+            edges[1:1] = [t for t in cuts_s if stretch.start_s + ROUNDING_S < t < stretch.end_s - ROUNDING_S]
+        for start_s, end_s in pairwise(edges):
+            for part in _divide_speech(replace(stretch, start_s=start_s, end_s=end_s), quietest):
+                before = groups[-1][-1] if groups else None
+                is_pause = before is not None and part.start_s - before.end_s <= LONGEST_PAUSE_S
+                if before is not None and is_pause and not _is_cut_between(before, part, cuts_s):
+                    groups[-1].append(part)
+                else:
+                    groups.append([part])
+    pieces: list[SpokenPart] = []
+    for piece in (_join(parts) for group in groups for parts in _divide(group)):
+        before = pieces[-1] if pieces else None
+        if (
+            before is not None
+            and min(before.duration_s, piece.duration_s) < SHORTEST_S
+            and piece.end_s - before.start_s <= LONGEST_S
+            and piece.start_s - before.end_s <= LONGEST_PAUSE_S
+            and not _is_cut_between(before, piece, cuts_s)
+        ):
+            pieces[-1] = _join([before, piece])
         else:
-            groups.append([part])
-    pieces = [_joined(piece) for group in groups for piece in _divided(group)]
-    wanted = [piece for piece in _without_short_ones(pieces, cuts_s) if piece.duration_s >= LEAST_S]
-    return _with_margins(wanted, cuts_s, duration_s, quietest)
+            pieces.append(piece)
+    wanted = [piece for piece in pieces if piece.duration_s >= LEAST_S]
+    return _add_margins(wanted, cuts_s, duration_s, quietest)
 
 
-def _in_order(stretches: Sequence[SpokenPart]) -> list[SpokenPart]:
+def _separate_overlaps(stretches: Sequence[SpokenPart]) -> list[SpokenPart]:
     """Return stretches without overlap: lines of a transcript may be shown together, or a little too long."""
     ordered: list[SpokenPart] = []
     for stretch in sorted(stretches, key=lambda stretch: stretch.start_s):
@@ -75,27 +92,14 @@ def _in_order(stretches: Sequence[SpokenPart]) -> list[SpokenPart]:
     return ordered
 
 
-def _divided_at_cuts(stretch: SpokenPart, cuts_s: Sequence[float]) -> list[SpokenPart]:
-    """Return the parts of a stretch between cuts; all of it if it has words."""
-    if stretch.words is not None:
-        return [stretch]
-    inside = [t for t in cuts_s if stretch.start_s + ROUNDING_S < t < stretch.end_s - ROUNDING_S]
-    edges = [stretch.start_s, *inside, stretch.end_s]
-    return [SpokenPart(*pair) for pair in pairwise(edges)]
-
-
-def _divided_in_speech(stretch: SpokenPart, quietest: Quietest) -> list[SpokenPart]:
+def _divide_speech(stretch: SpokenPart, quietest: Quietest) -> list[SpokenPart]:
     """Return the parts of a stretch that is too long, divided where it is quietest in its middle third."""
     if stretch.words is not None or stretch.duration_s <= LONGEST_S:
         return [stretch]
     third = stretch.duration_s / 3
     border_s = quietest(stretch.start_s + third, stretch.end_s - third)
     halves = replace(stretch, end_s=border_s), replace(stretch, start_s=border_s)
-    return [part for half in halves for part in _divided_in_speech(half, quietest)]
-
-
-def _is_border(before: SpokenPart, after: SpokenPart, cuts_s: Sequence[float]) -> bool:
-    return after.start_s - before.end_s > LONGEST_PAUSE_S or _is_cut_between(before, after, cuts_s)
+    return [part for half in halves for part in _divide_speech(half, quietest)]
 
 
 def _is_cut_between(before: SpokenPart, after: SpokenPart, cuts_s: Sequence[float]) -> bool:
@@ -103,12 +107,12 @@ def _is_cut_between(before: SpokenPart, after: SpokenPart, cuts_s: Sequence[floa
     return following < len(cuts_s) and cuts_s[following] <= after.start_s + ROUNDING_S
 
 
-def _joined(parts: Sequence[SpokenPart]) -> SpokenPart:
+def _join(parts: Sequence[SpokenPart]) -> SpokenPart:
     words = [word for part in parts for word in part.words or ()]
     return SpokenPart(parts[0].start_s, parts[-1].end_s, tuple(words) if parts[0].words is not None else None)
 
 
-def _divided(group: list[SpokenPart]) -> list[list[SpokenPart]]:
+def _divide(group: list[SpokenPart]) -> list[list[SpokenPart]]:
     """Return the parts of a group, none longer than ``LONGEST_S`` unless it is one stretch."""
     if len(group) < 2 or group[-1].end_s - group[0].start_s <= LONGEST_S:
         return [group]
@@ -120,28 +124,10 @@ def _divided(group: list[SpokenPart]) -> list[list[SpokenPart]]:
         return is_long, pause_s if is_long else -abs(group[n].start_s - middle_s)
 
     at = max(range(1, len(group)), key=worth)
-    return _divided(group[:at]) + _divided(group[at:])
+    return _divide(group[:at]) + _divide(group[at:])
 
 
-def _without_short_ones(pieces: list[SpokenPart], cuts_s: Sequence[float]) -> list[SpokenPart]:
-    """Return the pieces, with those that are too short joined to a neighbour where a short pause is between."""
-    joined: list[SpokenPart] = []
-    for piece in pieces:
-        before = joined[-1] if joined else None
-        if (
-            before is not None
-            and min(before.duration_s, piece.duration_s) < SHORTEST_S
-            and piece.end_s - before.start_s <= LONGEST_S
-            and piece.start_s - before.end_s <= LONGEST_PAUSE_S
-            and not _is_cut_between(before, piece, cuts_s)
-        ):
-            joined[-1] = _joined([before, piece])
-        else:
-            joined.append(piece)
-    return joined
-
-
-def _with_margins(
+def _add_margins(
     pieces: list[SpokenPart], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
 ) -> list[SpokenPart]:
     """Return the pieces with silence at both ends, not beyond a neighbour, a cut or the recording."""

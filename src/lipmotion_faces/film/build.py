@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +28,7 @@ from lipmotion_faces.appearance.lower_face import (
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px
-from lipmotion_faces.film.takes import Take, takes_of
+from lipmotion_faces.film.takes import Take, choose_takes
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
 
@@ -95,8 +94,8 @@ def build_face(
     >>> lipmotion.save_face(face, "anna.face")  # doctest: +SKIP
     """
     source, processes = Path(source), process_count(workers)
-    takes = takes_of(source, None if recordings is None else Path(recordings), speaker)
-    filmed = _filmed(takes, processes, monitor)
+    takes = choose_takes(source, None if recordings is None else Path(recordings), speaker)
+    filmed = _film_all(takes, processes, monitor)
     seconds = sum(len(take.used) / take.footage.rate_hz * _step(take.footage) for take in filmed)
     if seconds < LEAST_FOOTAGE_S:
         raise InputError(
@@ -111,7 +110,7 @@ def build_face(
             GOOD_FOOTAGE_S,
         )
     monitor(Progress("learning the face", 0, 1, 0.6))
-    appearance = learn_appearance(_pictures(filmed))
+    appearance = learn_appearance(_gather_pictures(filmed))
     monitor(Progress("choosing the background", 0, 1, 0.9))
     background = best_background([take.footage for take in filmed])
     about = {
@@ -125,12 +124,12 @@ def build_face(
         stated = sorted({dict(take.rights)[key] for take in takes if key in dict(take.rights)})
         about |= {key: stated} if stated else {}
     monitor(Progress("choosing the background", 1, 1, 1.0))
-    return FilmedFace(appearance, background, _spoken(filmed), about)
+    return FilmedFace(appearance, background, select_speech(filmed), about)
 
 
-def _filmed(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Filmed]:
-    """Return all takes in which the face is found. Raises InputError: there are none."""
-    found: list[_Filmed] = []
+def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Filmed]:
+    """Return all takes that show the person whom most takes show; others are reported. Raises InputError: none."""
+    filmed: list[_Filmed] = []
     problems: list[str] = []
     with worker_pool(min(workers, len(takes))) as team:
         for number, result in enumerate(team.ordered_map(_film, takes)):
@@ -139,29 +138,23 @@ def _filmed(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Film
                 problems.append(result)
                 monitor(Item(takes[number].name, "skipped", result))
             else:
-                found.append(result)
-    if not found:
+                filmed.append(result)
+    if not filmed:
         raise InputError(f"none of {len(takes)} recordings can be used; the first: {problems[0]}")
-    found = _of_one_person(found, monitor)
-    sizes = sorted({take.footage.size for take in found})
-    if len(sizes) > 1:
-        LOG.warning("the recordings have pictures of %d sizes; the background is one of them", len(sizes))
-    return found
-
-
-def _of_one_person(filmed: Sequence[_Filmed], monitor: Monitor) -> list[_Filmed]:
-    """Return the takes that show the person whom most takes show; the others are reported, and left out."""
     signatures = np.stack([face_signature(take.pictures) for take in filmed])
     alike = signatures @ signatures.T
     person = int((alike >= SAME_PERSON_LIKENESS).sum(axis=1).argmax())
-    kept = []
+    of_person = []
     for take, value in zip(filmed, alike[person].tolist(), strict=True):
         if value >= SAME_PERSON_LIKENESS:
-            kept.append(take)
+            of_person.append(take)
             continue
         reason = f"shows another face than most recordings (likeness {value:.2f}, required {SAME_PERSON_LIKENESS})"
         monitor(Item(take.footage.path.name, "skipped", reason))
-    return kept
+    sizes = sorted({take.footage.size for take in of_person})
+    if len(sizes) > 1:
+        LOG.warning("the recordings have pictures of %d sizes; the background is one of them", len(sizes))
+    return of_person
 
 
 def _film(take: Take) -> _Filmed | str:
@@ -169,23 +162,23 @@ def _film(take: Take) -> _Filmed | str:
     try:
         footage = track_footage(take.file, take.span)
         used = np.flatnonzero(footage.track.seen)[:: _step(footage)]
-        pictures = _lower_faces(footage, used, 1)
-        sound = _sound(take)
+        pictures = _cut_lower_faces(footage, used, 1)
+        sound = read_sound(take)
     except (InputError, CorpusError) as error:
         return str(error)
     return _Filmed(footage, used, pictures, sound)
 
 
-def _sound(take: Take) -> Audio | None:
+def read_sound(take: Take) -> Audio | None:
     """Return the sound of a take; None if the video has none, or only silence."""
     try:
-        whole = read_audio(take.file, warn=False)
+        audio = read_audio(take.file, warn=False)
     except InputError:
         return None
-    first = round(take.span.start_s * whole.rate_hz)
-    last = len(whole.samples) if np.isinf(take.span.end_s) else round(take.span.end_s * whole.rate_hz)
-    part = whole.samples[first:last]
-    return Audio(part, whole.rate_hz) if len(part) and part.any() else None
+    first = round(take.span.start_s * audio.rate_hz)
+    last = len(audio.samples) if np.isinf(take.span.end_s) else round(take.span.end_s * audio.rate_hz)
+    part = audio.samples[first:last]
+    return Audio(part, audio.rate_hz) if len(part) and part.any() else None
 
 
 def _step(footage: Footage) -> int:
@@ -193,7 +186,7 @@ def _step(footage: Footage) -> int:
     return max(1, int(np.ceil(footage.rate_hz / MOST_PICTURES_HZ - 1e-6)))
 
 
-def _lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDArray[np.uint8]:
+def _cut_lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDArray[np.uint8]:
     """Return pictures of the lower face in some frames, rising [shape=(n, 128 · scale, 128 · scale, 3)]."""
     size = HEIGHT * scale, WIDTH * scale
     maps = region_map(footage.face_to_image, scale)
@@ -209,9 +202,8 @@ def _lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDAr
     return result
 
 
-def _pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
-    values = [np.asarray(take.footage.track.motion.values)[take.used] for take in filmed]
-    motion = np.concatenate(values)
+def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
+    motion = np.concatenate([np.asarray(take.footage.track.motion.values)[take.used] for take in filmed])
     channels = filmed[0].footage.track.motion.channels
     used = [n for n, channel in enumerate(channels) if not channel.name.startswith(UNUSED_AXIS)]
     names = [channel.name for channel in channels]
@@ -220,38 +212,34 @@ def _pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
     maps = np.concatenate([take.footage.face_to_image[take.used] for take in filmed])
     scale = best_scale(maps)
     starts = np.cumsum([0, *(len(take.used) for take in filmed)])
+    levels = [
+        np.full(len(take.used), QUIETEST_DB)
+        if take.sound is None
+        else levels_db_at(take.sound, take.used / take.footage.rate_hz)
+        for take in filmed
+    ]
+
+    def read_finer(numbers: NDArray[np.intp]) -> NDArray[np.uint8]:
+        parts = []
+        for take, start in zip(filmed, starts, strict=False):
+            inside = numbers[(numbers >= start) & (numbers < start + len(take.used))] - start
+            if len(inside):
+                parts.append(_cut_lower_faces(take.footage, take.used[inside], scale))
+        return np.concatenate(parts)
+
     return FootagePictures(
         tuple(take.pictures for take in filmed),
         motion[:, used],
         tuple(channels[n] for n in used),
-        np.concatenate([_levels(take) for take in filmed]),
+        np.concatenate(levels),
         chin,
         face_shape(float(np.median(left - right)) / 2, chin),
         scale,
-        partial(_finer, filmed, starts, scale),
+        read_finer,
     )
 
 
-def _finer(
-    filmed: Sequence[_Filmed], starts: NDArray[np.intp], scale: int, numbers: NDArray[np.intp]
-) -> NDArray[np.uint8]:
-    """Return pictures of some of the frames of all takes, rising, with ``scale`` samples a pixel."""
-    parts = []
-    for take, start in zip(filmed, starts, strict=False):
-        inside = numbers[(numbers >= start) & (numbers < start + len(take.used))] - start
-        if len(inside):
-            parts.append(_lower_faces(take.footage, take.used[inside], scale))
-    return np.concatenate(parts)
-
-
-def _levels(take: _Filmed) -> NDArray[np.float64]:
-    """Return the level of the sound at the frames that are used, dB [shape=(n,)]."""
-    if take.sound is None:
-        return np.full(len(take.used), QUIETEST_DB)
-    return levels_db_at(take.sound, take.used / take.footage.rate_hz)
-
-
-def _spoken(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:
+def select_speech(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:
     """Return the first ``SPOKEN_TAKES_S`` of the takes with sound, and their motion; none where no take has sound."""
     takes: list[SpokenTake] = []
     left_s = SPOKEN_TAKES_S

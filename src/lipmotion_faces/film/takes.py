@@ -48,7 +48,7 @@ class Take:
     rights: tuple[tuple[str, str], ...]
 
 
-def takes_of(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
+def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
     """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly.
 
     source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
@@ -62,50 +62,41 @@ def takes_of(source: Path, recordings: Path | None = None, speaker: str = "") ->
     if source.is_file():
         check_source(source, "video")
         whole = SourceRecording(source.stem, source, None, speaker=speaker)
-        return [_take(whole, source.parent, seconds=MOST_FOOTAGE_S)]
+        return [_make_take(whole, source.parent, seconds=MOST_FOOTAGE_S)]
     if (source / MANIFEST).is_file():
-        found = _of_corpus(Corpus.open(source), recordings, speaker)
+        takes = _list_corpus(Corpus.open(source), recordings, speaker)
     else:
         folder = [item for item in discover(source).recordings if item.motion_file is None]
-        items = _of_person(folder, speaker, str(source))
-        found = [_take(item, source) for item in [item for item in items if item.split == "train"] or items]
-    if not found:
+        items = _select_person(folder, speaker, str(source))
+        takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
+    if not takes:
         raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
-    return _evenly_used(found)
+    return _select_evenly(takes)
 
 
-def _evenly_used(takes: Sequence[Take]) -> list[Take]:
+def _select_evenly(takes: Sequence[Take]) -> list[Take]:
     """Return takes of about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened before any is left out.
 
     A take that cannot be read may be among them: where it is tracked, the reason is reported.
     """
     durations_s = [_duration_s(takes[index]) for index in evenly_spaced(MOST_MEASURED_RECORDINGS, len(takes))]
-    longest_s = _longest_s(durations_s)
+    longest_s = left_s = MOST_FOOTAGE_S
+    for number, duration_s in enumerate(sorted(durations_s)):
+        share_s = left_s / (len(durations_s) - number)
+        if duration_s > share_s:  # all of them have MOST_FOOTAGE_S together
+            longest_s = max(share_s, LONG_S)
+            break
+        left_s -= duration_s
     mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
     chosen = evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
+    used = [takes[index] for index in chosen]
     if max(durations_s) <= longest_s:
-        return [takes[index] for index in chosen]
-    return [_shortened(takes[index], longest_s) for index in chosen]
+        return used
+    spans = [VideoSpan(each.span.start_s, min(each.span.end_s, each.span.start_s + longest_s)) for each in used]
+    return [replace(take, span=span) for take, span in zip(used, spans, strict=True)]
 
 
-def _longest_s(durations_s: Sequence[float]) -> float:
-    """Return how long takes may be so that all of them have ``MOST_FOOTAGE_S`` together, but at least ``LONG_S``."""
-    left_s = MOST_FOOTAGE_S
-    rising = sorted(durations_s)
-    for number, duration_s in enumerate(rising):
-        share_s = left_s / (len(rising) - number)
-        if duration_s > share_s:
-            return max(share_s, LONG_S)
-        left_s -= duration_s
-    return MOST_FOOTAGE_S
-
-
-def _shortened(take: Take, longest_s: float) -> Take:
-    start_s, end_s = take.span.start_s, take.span.end_s
-    return replace(take, span=VideoSpan(start_s, min(end_s, start_s + longest_s)))
-
-
-def _of_person(items: Sequence[SourceRecording], speaker: str, where: str) -> list[SourceRecording]:
+def _select_person(items: Sequence[SourceRecording], speaker: str, where: str) -> list[SourceRecording]:
     """Return the recordings of one person. Raises InputError: there are several people, or no such person."""
     people = sorted({item.speaker for item in items})
     if (speaker and speaker not in people) or (not speaker and len(people) > 1):
@@ -115,7 +106,7 @@ def _of_person(items: Sequence[SourceRecording], speaker: str, where: str) -> li
     return [item for item in items if not speaker or item.speaker == speaker]
 
 
-def _of_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[Take]:
+def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[Take]:
     if recordings is None:
         raise InputError(
             f"{corpus.path}: a corpus holds the pictures of mouths, but not of faces; name the folder of its videos "
@@ -130,30 +121,21 @@ def _of_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[Ta
     for name in corpus.names("train") or corpus.names():
         entry = read_entry(corpus.folder(name))
         stated = entry["source"]
-        file = _same_file(files.get(str(stated.get("file", "")), []), stated)
+        file = _find_file(files.get(str(stated.get("file", "")), []), stated)
         if file is None:
             continue
         rights = {key: str(stated[key]) for key in RIGHTS if key in stated}
         start_s, end_s = float(stated.get("start_s", 0.0)), stated.get("end_s")
-        items.append(
-            SourceRecording(
-                name,
-                file,
-                None,
-                rights=rights,
-                speaker=str(entry.get("speaker", "")),
-                start_s=start_s,
-                end_s=None if end_s is None else float(end_s),
-            )
-        )
+        item = SourceRecording(name, file, None, rights=rights, speaker=str(entry.get("speaker", "")))
+        items.append(replace(item, start_s=start_s, end_s=None if end_s is None else float(end_s)))
         collections[name] = str(stated.get("collection", ""))
     if not items:
         raise InputError(f"{recordings}: holds none of the videos of {corpus.path}; give the folder that they are in")
-    chosen = _of_person(items, speaker, str(corpus.path))
-    return [_take(item, recordings, collections[item.name]) for item in chosen]
+    chosen = _select_person(items, speaker, str(corpus.path))
+    return [_make_take(item, recordings, collections[item.name]) for item in chosen]
 
 
-def _same_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
+def _find_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
     """Return the file from which an utterance was prepared, of those of its name; None: it is not among them.
 
     People of a corpus may share names of files: size and, of several files, content tell which one is meant.
@@ -165,7 +147,9 @@ def _same_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
     return next(iter(same), None)
 
 
-def _take(item: SourceRecording, folder: Path, collection: str | None = None, seconds: float = float("inf")) -> Take:
+def _make_take(
+    item: SourceRecording, folder: Path, collection: str | None = None, seconds: float = float("inf")
+) -> Take:
     end_s = float("inf") if item.end_s is None else item.end_s
     named = "/".join(folder.resolve().parts[-2:]).strip("/") if collection is None else collection
     rights = tuple(sorted((key, value) for key, value in item.rights.items() if key in RIGHTS))
