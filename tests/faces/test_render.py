@@ -133,10 +133,7 @@ def test_a_transparent_background_shows_through_around_the_figure_only(face):
 
 
 def test_unusable_settings_are_refused():
-    unusable: dict[str, tuple[Any, ...]] = {
-        "size": (62, 129, 5000),
-        "background": ("blue", "#12345"),
-    }
+    unusable: dict[str, tuple[Any, ...]] = {"size": (62, 129, 5000), "background": ("blue", "#12345")}
     for name, values in unusable.items():
         for value in values:
             with pytest.raises(InputError, match="required"):

@@ -11,16 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.meshes.model.surface import normals_of
 from lipmotion.meshes.model.textures import linear
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.eyes import (
-    LASHES,
-    LID_SIDE,
-    brow,
-    catchlights,
-    eyeball,
-    lash_triangles,
-    lashes,
-    shift_brow,
-)
+from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
 from lipmotion_faces.head.forms import EYE
 from lipmotion_faces.head.hair import hair
 from lipmotion_faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
