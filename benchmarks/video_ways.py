@@ -30,7 +30,7 @@ from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion_faces.registry import face_named
 from lipmotion_faces.tracking.footage import footage_frames, track_footage
 from lipmotion_faces.tracking.head_pose import region_to_image
-from lipmotion_faces.tracking.landmarks import LIP_POINTS
+from lipmotion_faces.tracking.trackers import LIP_POINTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -5,8 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion_faces.appearance.chin import LARGEST_PX, LEAST_PX, NECK_PX, SIDE_PX, STILL_PX, move_chin, moved_part
-from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceShape, replaced_part
+from lipmotion_faces.appearance.lower_face import (
+    CORNER,
+    HEIGHT,
+    LARGEST_PX,
+    LEAST_PX,
+    NECK_PX,
+    SIDE_PX,
+    STILL_PX,
+    WIDTH,
+    FaceShape,
+    move_chin,
+    moved_part,
+    replaced_part,
+)
 
 CHIN_PX = 118.0
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion_faces.portrait.outlines import STEPS, closed_curve, mirror_curve, open_curve, path_points, stroke
+from lipmotion_faces.portrait.design import STEPS, closed_curve, mirror_curve, open_curve, path_points, stroke
 
 PATH = "0 0, 1 0.5, 2 -0.5, 3 0"
 

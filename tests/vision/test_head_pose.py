@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from lipmotion_faces.tracking.head_pose import fit_similarities, remove_head_motion
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking.trackers import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 FRAMES = 40

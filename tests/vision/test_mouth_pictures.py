@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lipmotion_faces.tracking.head_pose import crop_mouth, eyes_to_image, face_to_image, region_to_image
-from lipmotion_faces.tracking.landmarks import FOREHEAD_SLOPE_DEG, LIP_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking.trackers import FOREHEAD_SLOPE_DEG, LIP_POINTS, TRACKED_POINTS
 
 pytestmark = pytest.mark.video
 cv2 = pytest.importorskip("cv2")

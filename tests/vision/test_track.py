@@ -10,8 +10,8 @@ import pytest
 from children import run_child
 from lipmotion.errors import InputError
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.landmarks import JAW_POINTS, LIP_POINTS
 from lipmotion_faces.tracking.track import CHANNELS, measure_motion, track
+from lipmotion_faces.tracking.trackers import JAW_POINTS, LIP_POINTS
 from vision.scripted import COLUMN, face, script
 
 

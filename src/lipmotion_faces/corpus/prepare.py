@@ -28,8 +28,15 @@ from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, divide_long_videos, single_video
-from lipmotion_faces.corpus.separate_sound import separate_sound, shift_phones, trim_to_shared
-from lipmotion_faces.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
+from lipmotion_faces.corpus.supplied import (
+    DIGESTS,
+    separate_sound,
+    shift_phones,
+    source_digests,
+    supplied_phones,
+    supplied_track,
+    trim_to_shared,
+)
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.trackers import MEDIAPIPE, tracker_named

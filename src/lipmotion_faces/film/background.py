@@ -16,8 +16,15 @@ from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.storage.coded_video import encode_video
 from lipmotion.storage.frame_groups import FrameGroups
-from lipmotion_faces.appearance.frame_descriptors import describe_frames, row_distances
-from lipmotion_faces.appearance.looping import JUMP_LIMIT, LoopOrder, fade_frames, loop_order, scenes_of
+from lipmotion_faces.appearance.looping import (
+    JUMP_LIMIT,
+    LoopOrder,
+    describe_frames,
+    fade_frames,
+    loop_order,
+    row_distances,
+    scenes_of,
+)
 from lipmotion_faces.appearance.lower_face import HEIGHT as REGION_HEIGHT
 from lipmotion_faces.appearance.lower_face import SAME_PERSON_LIKENESS, face_signature, likeness, region_map
 from lipmotion_faces.appearance.lower_face import WIDTH as REGION_WIDTH

@@ -1,20 +1,29 @@
-"""Building of a filmed face: ``build_face(footage) → face``."""
+"""Building of a filmed face, ``build_face(footage) → face``: which recordings are used, and what is learned."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.entry import read_entry
+from lipmotion.corpora.source_recordings import SourceRecording, video_files
+from lipmotion.corpora.store import MANIFEST, Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
+from lipmotion.stats.pca import evenly_spaced
+from lipmotion.storage.files import check_source, sha256_of
+from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance.lower_face import (
     HEIGHT,
@@ -28,9 +37,162 @@ from lipmotion_faces.appearance.lower_face import (
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px
-from lipmotion_faces.film.takes import Take, choose_takes
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
+from lipmotion_faces.tracking.frames import VideoSpan
+
+MOST_FOOTAGE_S = 240.0
+"""Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
+LONG_S = 10.0
+"""Recordings are used whole if they are no longer; of longer ones the beginning, at least so much."""
+MOST_MEASURED_RECORDINGS = 240
+"""The durations of at most so many recordings are read."""
+RIGHTS = ("licence", "attribution")
+"""What is kept of the rights of a recording."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """One recording of a person.
+
+    name       : of the recording
+    file       : the video
+    span       : the part of it
+    collection : the folder that it is in, by its last two names
+    speaker    : name of the person; empty where it is not known
+    rights     : licence and attribution, where known
+    """
+
+    name: str
+    file: Path
+    span: VideoSpan
+    collection: str
+    speaker: str
+    rights: tuple[tuple[str, str], ...]
+
+
+def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
+    """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly.
+
+    source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
+                 training list
+    recordings : of a corpus, the folder of the videos that it was prepared from
+    speaker    : whose, where there are several people
+    Raises InputError: no such file, several people, no such person, no videos, or a corpus without ``recordings``.
+    """
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder; give a video of the person, or a folder of videos")
+    if source.is_file():
+        check_source(source, "video")
+        whole = SourceRecording(source.stem, source, None, speaker=speaker)
+        return [_make_take(whole, source.parent, seconds=MOST_FOOTAGE_S)]
+    if (source / MANIFEST).is_file():
+        takes = _list_corpus(Corpus.open(source), recordings, speaker)
+    else:
+        folder = [item for item in discover(source).recordings if item.motion_file is None]
+        items = _select_person(folder, speaker, str(source))
+        takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
+    if not takes:
+        raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
+    return _select_evenly(takes)
+
+
+def _select_evenly(takes: Sequence[Take]) -> list[Take]:
+    """Return takes of about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened before any is left out.
+
+    A take that cannot be read may be among them: where it is tracked, the reason is reported.
+    """
+    durations_s = [_duration_s(takes[index]) for index in evenly_spaced(MOST_MEASURED_RECORDINGS, len(takes))]
+    longest_s = left_s = MOST_FOOTAGE_S
+    for number, duration_s in enumerate(sorted(durations_s)):
+        share_s = left_s / (len(durations_s) - number)
+        if duration_s > share_s:  # all of them have MOST_FOOTAGE_S together
+            longest_s = max(share_s, LONG_S)
+            break
+        left_s -= duration_s
+    mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
+    chosen = evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
+    used = [takes[index] for index in chosen]
+    if max(durations_s) <= longest_s:
+        return used
+    spans = [VideoSpan(each.span.start_s, min(each.span.end_s, each.span.start_s + longest_s)) for each in used]
+    return [replace(take, span=span) for take, span in zip(used, spans, strict=True)]
+
+
+def _select_person(items: Sequence[SourceRecording], speaker: str, where: str) -> list[SourceRecording]:
+    """Return the recordings of one person. Raises InputError: there are several people, or no such person."""
+    people = sorted({item.speaker for item in items})
+    if (speaker and speaker not in people) or (not speaker and len(people) > 1):
+        found = f"no speaker {speaker!r}" if speaker else f"{len(people)} speakers"
+        known = ", ".join(name or "one without a name" for name in people)
+        raise InputError(f"{where}: {found}, a face is that of one person; name it (--speaker): {known}")
+    return [item for item in items if not speaker or item.speaker == speaker]
+
+
+def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[Take]:
+    if recordings is None:
+        raise InputError(
+            f"{corpus.path}: a corpus holds the pictures of mouths, but not of faces; name the folder of its videos "
+            "as well: --recordings FOLDER"
+        )
+    if not recordings.is_dir():
+        raise InputError(f"{recordings}: no such folder; give the one of the videos of the corpus")
+    files: dict[str, list[Path]] = {}
+    for path in video_files(recordings.rglob("*")):
+        files.setdefault(path.name, []).append(path)
+    items, collections = [], {}
+    for name in corpus.names("train") or corpus.names():
+        entry = read_entry(corpus.folder(name))
+        stated = entry["source"]
+        file = _find_file(files.get(str(stated.get("file", "")), []), stated)
+        if file is None:
+            continue
+        rights = {key: str(stated[key]) for key in RIGHTS if key in stated}
+        start_s, end_s = float(stated.get("start_s", 0.0)), stated.get("end_s")
+        item = SourceRecording(name, file, None, rights=rights, speaker=str(entry.get("speaker", "")))
+        items.append(replace(item, start_s=start_s, end_s=None if end_s is None else float(end_s)))
+        collections[name] = str(stated.get("collection", ""))
+    if not items:
+        raise InputError(f"{recordings}: holds none of the videos of {corpus.path}; give the folder that they are in")
+    chosen = _select_person(items, speaker, str(corpus.path))
+    return [_make_take(item, recordings, collections[item.name]) for item in chosen]
+
+
+def _find_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
+    """Return the file from which an utterance was prepared, of those of its name; None: it is not among them.
+
+    People of a corpus may share names of files: size and, of several files, content tell which one is meant.
+    """
+    size = stated.get("bytes")
+    same = [file for file in files if size is None or str(file.stat().st_size) == str(size)]
+    if len(same) > 1 and "sha256" in stated:
+        same = [file for file in same if sha256_of(file) == stated["sha256"]]
+    return next(iter(same), None)
+
+
+def _make_take(
+    item: SourceRecording, folder: Path, collection: str | None = None, seconds: float = float("inf")
+) -> Take:
+    end_s = float("inf") if item.end_s is None else item.end_s
+    named = "/".join(folder.resolve().parts[-2:]).strip("/") if collection is None else collection
+    rights = tuple(sorted((key, value) for key, value in item.rights.items() if key in RIGHTS))
+    span = VideoSpan(item.start_s, min(end_s, item.start_s + seconds))
+    return Take(item.name, item.file, span, named, item.speaker, rights)
+
+
+def _duration_s(take: Take) -> float:
+    """Return the duration of a take, as the file states it; ``LONG_S`` if it states none, or cannot be read."""
+    import av
+
+    if take.span.end_s < float("inf"):
+        return take.span.end_s - take.span.start_s
+    try:
+        with open_media(take.file) as container:
+            streams = video_streams(container)
+            return (stated_duration_s(container, streams[0]) if streams else 0.0) or LONG_S
+    except (av.FFmpegError, ValueError, OSError):
+        return LONG_S
+
 
 LOG = logging.getLogger("lipmotion")
 

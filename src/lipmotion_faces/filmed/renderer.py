@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion_faces.appearance.camera_noise import NoiseSource
-from lipmotion_faces.appearance.chin import move_chin, moved_part
 from lipmotion_faces.appearance.lower_face import (
     HEIGHT,
     WIDTH,
     cheek_light,
     mouth_ellipse,
     mouth_part,
+    move_chin,
+    moved_part,
     region_map,
     relight,
     replaced_part,

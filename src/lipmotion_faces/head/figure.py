@@ -19,8 +19,7 @@ from lipmotion_faces.head.lips import ACROSS, RINGS, VISIBLE_RINGS, closed_share
 from lipmotion_faces.head.part import Part, grid_triangles, part, tube
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import AT_CORNER, REST, Skin, move_jaw
-from lipmotion_faces.rendering.lighting import Finish, Lighting
-from lipmotion_faces.rendering.occlusion import reaches
+from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
 from lipmotion_faces.turning import turned
 
 Real = NDArray[np.float64]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from lipmotion_faces.portrait.design import Design, EyeDesign, LipDesign, Lock, Palette
-from lipmotion_faces.portrait.outlines import closed_curve, mirror_curve
+from lipmotion_faces.portrait.design import Design, EyeDesign, LipDesign, Lock, Palette, closed_curve, mirror_curve
 
 MAN = Design(
     palette=Palette(

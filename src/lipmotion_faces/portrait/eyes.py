@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion_faces.kernels.painting import warp
-from lipmotion_faces.portrait.design import WHITE, Design, Knots
+from lipmotion_faces.portrait.design import WHITE, Design, Knots, Points, ellipse, open_curve, stroke
 from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, Window
-from lipmotion_faces.portrait.outlines import Points, ellipse, open_curve, stroke
 
 LID_POSITIONS = 16
 MOOD_LIDS = 8

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.mouth import upper_share
-from lipmotion_faces.portrait.design import LipDesign
-from lipmotion_faces.portrait.outlines import open_curve
+from lipmotion_faces.portrait.design import LipDesign, open_curve
 
 Heights = NDArray[np.float64]
 

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.portrait.design import Colour
-from lipmotion_faces.portrait.outlines import Points
+from lipmotion_faces.portrait.design import Colour, Points
 
 SUPERSAMPLING = 4
 Pixels = NDArray[np.floating[Any]]

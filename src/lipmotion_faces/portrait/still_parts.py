@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from lipmotion_faces.portrait.design import WHITE, Colour, Design
-from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, Window
-from lipmotion_faces.portrait.outlines import (
+from lipmotion_faces.portrait.design import (
+    WHITE,
+    Colour,
+    Design,
     Points,
     both_sides,
     closed_curve,
@@ -16,6 +17,7 @@ from lipmotion_faces.portrait.outlines import (
     path_points,
     stroke,
 )
+from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, Window
 
 
 def paint_wall(window: Window, design: Design) -> Layer:

@@ -10,9 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.tracking.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion_faces.tracking.packages import import_opencv
-from lipmotion_faces.tracking.trackers import MEDIAPIPE, BoxFinder, FaceBox, LandmarkTracker, PointFinder, tracker_named
+from lipmotion_faces.tracking.trackers import (
+    EYE_CORNERS,
+    MEDIAPIPE,
+    TRACKED_POINTS,
+    BoxFinder,
+    FaceBox,
+    LandmarkTracker,
+    PointFinder,
+    tracker_named,
+)
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.storage.frame_groups import MOST_DECODED_BYTES, FrameGroups
 from lipmotion.types import Track
-from lipmotion_faces.tracking.frames import WHOLE, VideoSpan, open_video
+from lipmotion_faces.tracking.frames import WHOLE, VideoSpan, nearest_indices, open_video, resample_to_constant_rate
 from lipmotion_faces.tracking.head_pose import face_to_image
-from lipmotion_faces.tracking.timing import nearest_indices, resample_to_constant_rate
 from lipmotion_faces.tracking.track import TrackedFrames, make_track, track_frames
 
 Array = NDArray[np.float64]

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT, WIDTH
-from lipmotion_faces.tracking.landmarks import (
+from lipmotion_faces.tracking.packages import import_opencv
+from lipmotion_faces.tracking.trackers import (
     EYE_CORNERS,
     FOREHEAD,
     FOREHEAD_SLOPE_DEG,
@@ -21,7 +22,6 @@ from lipmotion_faces.tracking.landmarks import (
     RIGID_POINTS,
     TRACKED_POINTS,
 )
-from lipmotion_faces.tracking.packages import import_opencv
 
 Array = NDArray[np.float64]
 

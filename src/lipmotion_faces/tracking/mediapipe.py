@@ -13,9 +13,8 @@ from typing import Any, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking.landmarks import TRACKED_POINTS
 from lipmotion_faces.tracking.packages import import_face_detection, import_face_mesh, import_opencv, missing
-from lipmotion_faces.tracking.trackers import MEDIAPIPE, FaceBox, LandmarkTracker
+from lipmotion_faces.tracking.trackers import MEDIAPIPE, TRACKED_POINTS, FaceBox, LandmarkTracker
 
 GraphT = TypeVar("GraphT", bound="_Graph")
 Image = NDArray[np.uint8]

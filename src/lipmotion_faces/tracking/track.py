@@ -12,18 +12,21 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Track
 from lipmotion_faces.tracking.face_follower import FaceFollower
-from lipmotion_faces.tracking.frames import WHOLE, OpenVideo, VideoSpan, damage_notes, open_video
-from lipmotion_faces.tracking.head_pose import crop_mouth, eyes_to_image, face_to_image, remove_head_motion
-from lipmotion_faces.tracking.image_similarity import mouth_thumbnail, occluded_mouths
-from lipmotion_faces.tracking.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
-from lipmotion_faces.tracking.timing import (
+from lipmotion_faces.tracking.frames import (
+    WHOLE,
+    OpenVideo,
+    VideoSpan,
     check_rate,
+    damage_notes,
     frame_count,
     nearest_indices,
     nominal_rate_hz,
+    open_video,
     resample_to_constant_rate,
 )
-from lipmotion_faces.tracking.trackers import MEDIAPIPE
+from lipmotion_faces.tracking.head_pose import crop_mouth, eyes_to_image, face_to_image, remove_head_motion
+from lipmotion_faces.tracking.image_similarity import mouth_thumbnail, occluded_mouths
+from lipmotion_faces.tracking.trackers import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, MEDIAPIPE, TRACKED_POINTS
 
 Array = NDArray[np.float64]
 

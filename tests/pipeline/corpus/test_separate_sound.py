@@ -15,7 +15,7 @@ from lipmotion.formats.base import write_motion
 from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
-from lipmotion_faces.corpus.separate_sound import SeparateSound, align_sound, separate_sound, trim_to_shared
+from lipmotion_faces.corpus.supplied import SeparateSound, align_sound, separate_sound, trim_to_shared
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 RATE = 60.0

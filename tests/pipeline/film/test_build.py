@@ -13,8 +13,7 @@ from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion_faces.film import build
-from lipmotion_faces.film.build import build_face
-from lipmotion_faces.film.takes import Take
+from lipmotion_faces.film.build import Take, build_face
 from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan

@@ -12,8 +12,8 @@ from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import toy_utterances
-from lipmotion_faces.film import takes
-from lipmotion_faces.film.takes import MOST_FOOTAGE_S, choose_takes
+from lipmotion_faces.film import build as takes
+from lipmotion_faces.film.build import MOST_FOOTAGE_S, choose_takes
 from speech.sounds import tone, write_sound
 
 MakeVideos = Callable[..., Path]
