@@ -199,7 +199,7 @@ def _channel_figures(made: Motion, original: Motion) -> tuple[dict[str, dict[str
         "jerk": curves.jerk_ratio(generated, reference),
         "modulation_db": modulation_distance_db(generated, reference, rate_hz),
     }
-    moves = curves.moving(reference, [channel.unit for channel in original.channels])
+    moves = curves.select_moving(reference, [channel.unit for channel in original.channels])
     rows = {
         channel.name: {
             "unit": channel.unit,

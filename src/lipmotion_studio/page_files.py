@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from lipmotion.formats.web_page import coloured
+from lipmotion.formats.web_page import colour_code
 
 FIRST = "studio.html"
 """The page itself."""
@@ -51,5 +51,5 @@ def _found(folder: Traversable, before: str) -> Iterator[tuple[str, PageFile]]:
         elif kind is not None:
             content = each.read_bytes()
             if each.name.endswith(".css"):
-                content = coloured(content.decode("utf-8")).encode()
+                content = colour_code(content.decode("utf-8")).encode()
             yield f"{before}{each.name}", PageFile(content, kind)

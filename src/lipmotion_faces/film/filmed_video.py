@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import FULL_DEFICIT_GAP, closed_lips, gap_in, in_pictures, opening_of
+from lipmotion.articulation.contact import FULL_DEFICIT_GAP, close_lips, gap_to_opening, read_gap, sample_pictures
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.eigenlips import Eigenlips
@@ -194,7 +194,7 @@ def face_codes(
 ) -> FaceCodes:
     """Return what the lower face is like in ``count`` frames at the rate of a video.
 
-    units : the phones in time; in every p, b and m the lips touch (``contact.closed_lips``)
+    units : the phones in time; in every p, b and m the lips touch (``contact.close_lips``)
     Raises InputError: motion without the channels that the face needs.
     """
     shown, contact = _with_contact(motion, units, count, rate_hz)
@@ -220,10 +220,10 @@ def _with_contact(
     values = motion.at(time_s)
     if "opening" not in motion.names or not np.isfinite(motion.values).all():
         return Motion(values, rate_hz, motion.channels), None
-    gap = closed_lips(gap_in(motion), motion, units)
-    gap = in_pictures(gap, gap == 0, motion.rate_hz, time_s)
+    gap = close_lips(read_gap(motion), motion, units)
+    gap = sample_pictures(gap, gap == 0, motion.rate_hz, time_s)
     column = motion.column("opening")
-    values[:, column] = np.minimum(values[:, column], opening_of(gap))
+    values[:, column] = np.minimum(values[:, column], gap_to_opening(gap))
     return Motion(values, rate_hz, motion.channels), 1 - np.clip(gap / FULL_DEFICIT_GAP, 0, 1)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import read_entry
-from lipmotion.corpora.source_recordings import SourceRecording, video_files
+from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
 from lipmotion.corpora.store import MANIFEST, Corpus
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import evenly_spaced
@@ -124,7 +124,7 @@ def _of_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[Ta
     if not recordings.is_dir():
         raise InputError(f"{recordings}: no such folder; give the one of the videos of the corpus")
     files: dict[str, list[Path]] = {}
-    for path in video_files(recordings.rglob("*")):
+    for path in filter_videos(recordings.rglob("*")):
         files.setdefault(path.name, []).append(path)
     items, collections = [], {}
     for name in corpus.names("train") or corpus.names():

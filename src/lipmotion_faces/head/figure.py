@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.surface import normals_of
+from lipmotion.meshes.model.surface import compute_normals
 from lipmotion.meshes.model.textures import linear
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyelids import LID_SIDE
@@ -260,7 +260,7 @@ class Figure:
         places, normals = self._places.copy(), self._normals.copy()
         places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.posed(pose)
         licked = tongue(pose)
-        places[self.rows["tongue"]], normals[self.rows["tongue"]] = licked, normals_of(licked, tongue_triangles())
+        places[self.rows["tongue"]], normals[self.rows["tongue"]] = licked, compute_normals(licked, tongue_triangles())
         places[self.rows["teeth"]] = jaw_moved(places[self.rows["teeth"]], lower_drop(pose))
         for name in ("brow", "right brow"):
             places[self.rows[name]] += brow_shift(places[self.rows[name]], pose)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.surface import normals_of
+from lipmotion.meshes.model.surface import compute_normals
 from lipmotion.meshes.model.textures import linear
 from lipmotion_faces.rendering.lighting import Finish
 
@@ -51,7 +51,7 @@ def part(
 ) -> Part:
     """Return a part of one sRGB colour, or of one a vertex [shape=(V, 3)]; normals are those of its triangles."""
     colours = np.broadcast_to(linear(colour), places.shape).copy()
-    return Part(name, places, triangles, colours, finish, normals_of(places, triangles), strands)
+    return Part(name, places, triangles, colours, finish, compute_normals(places, triangles), strands)
 
 
 def joined_parts(name: str, parts: list[Part]) -> Part:

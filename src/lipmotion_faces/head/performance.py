@@ -9,7 +9,7 @@ from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import SpokenMouth, spoken_mouth, upper_share
 from lipmotion.articulation.phone_targets import TIP_UP
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion_faces.base import Staging, alive
+from lipmotion_faces.base import Staging, stage_liveliness
 from lipmotion_faces.head.pose import CharacterPose
 
 Curve = NDArray[np.float64]
@@ -39,7 +39,7 @@ def head_poses(
     Raises InputError: as ``spoken_mouth``.
     """
     mouth = spoken_mouth(motion, units, fps)
-    return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
+    return posed(mouth, stage_liveliness(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
 
 
 def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:

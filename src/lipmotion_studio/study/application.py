@@ -23,7 +23,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from lipmotion.errors import InputError
-from lipmotion.formats.web_page import coloured
+from lipmotion.formats.web_page import colour_code
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED
 from lipmotion_studio.study.limits import RateLimit
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial
@@ -73,7 +73,9 @@ def study_application(
 
     desk = _Desk(study, store)
     folder = files("lipmotion_studio.study") / "page"
-    page = {name: (coloured((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()}
+    page = {
+        name: (colour_code((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()
+    }
 
     async def packaged(request: Request) -> Response:
         content, kind = page[request.url.path.removeprefix("/")]

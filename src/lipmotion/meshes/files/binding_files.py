@@ -103,7 +103,7 @@ def write_weights(path: Path, binding: ControlBinding) -> None:
 
 
 def read_weights(path: Path) -> dict[int, dict[int, float]]:
-    """Return a table of weights: for each vertex that it names, the weight of each point; for ``painted``.
+    """Return a table of weights: for each vertex that it names, the weight of each point; for ``paint_weights``.
 
     A vertex that follows nothing has one row, with any point and weight 0.
     Raises InputError: no such file, other columns, a row that is damaged, or a vertex and point that occur twice.
@@ -132,7 +132,7 @@ def write_points(path: Path, placement: LipPlacement) -> None:
 
 
 def read_points(path: Path) -> dict[int, int]:
-    """Return the vertices of lip points from a table ``point,vertex``, for ``placed_by_points``.
+    """Return the vertices of lip points from a table ``point,vertex``, for ``place_lips_by_points``.
 
     Raises InputError: no such file, other columns, a row that is damaged, or a point that occurs twice.
     """

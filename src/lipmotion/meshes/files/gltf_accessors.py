@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.gltf_container import GltfDocument
 from lipmotion.meshes.files.gltf_schema import COMPONENTS, COMPRESSION, LARGEST_NUMBER, WIDTHS
-from lipmotion.meshes.files.meshopt import decoded_attributes, decoded_exponents, decoded_indices, decoded_triangles
+from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
 from lipmotion.meshes.model.file_limits import Budget
 
 
@@ -116,9 +116,9 @@ def _decoded(data: memoryview, packed: dict[str, Any], budget: Budget) -> bytes:
     if kind not in {"NONE", "EXPONENTIAL"}:
         raise InputError(f"a compressed array under the filter {shortened(kind)!r}, which is not read")
     if mode == "ATTRIBUTES":
-        elements = decoded_attributes(bytes(data), count, stride)
-        return decoded_exponents(elements).tobytes() if kind == "EXPONENTIAL" else elements.tobytes()
+        elements = decode_attributes(bytes(data), count, stride)
+        return decode_exponents(elements).tobytes() if kind == "EXPONENTIAL" else elements.tobytes()
     if stride not in {2, 4}:
         raise InputError(f"compressed indices of {stride} bytes, required 2 or 4; export without compression")
-    indices = (decoded_triangles if mode == "TRIANGLES" else decoded_indices)(bytes(data), count)
+    indices = (decode_triangles if mode == "TRIANGLES" else decode_indices)(bytes(data), count)
     return indices.astype("<u2" if stride == 2 else "<u4").tobytes()

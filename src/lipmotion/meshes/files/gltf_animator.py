@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_container import GltfDocument, read_gltf_document, write_container
-from lipmotion.meshes.files.gltf_scene import mesh_target_names
+from lipmotion.meshes.files.gltf_scene import name_mesh_targets
 from lipmotion.meshes.files.gltf_writer import sound_extras
-from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
+from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.types import Motion
 
 FLOAT = 5126
@@ -46,7 +46,7 @@ def write_animated_gltf(
     json = document.json
     body = bytearray(binary[: document.items("buffers")[0].get("byteLength", len(binary))])
     chosen = [name in stepped for name in weights.names]
-    time_s, rows = keys_of(weights.time_s, weights.values.astype(np.float64), chosen, thinning)
+    time_s, rows = place_keys(weights.time_s, weights.values.astype(np.float64), chosen, thinning)
     times = _added(json, body, time_s, limits=True)
     samplers: dict[tuple[str, ...], dict[str, Any]] = {}
     channels: list[dict[str, Any]] = []
@@ -76,7 +76,7 @@ def _moved_nodes(document: GltfDocument, weights: Motion) -> list[tuple[int, tup
     found = []
     for number, node in enumerate(document.items("nodes")):
         mesh = document.items("meshes")[node["mesh"]] if "mesh" in node else {}
-        names = mesh_target_names(document, mesh)
+        names = name_mesh_targets(document, mesh)
         if set(names) & set(weights.names):
             found.append((number, names))
     return found

@@ -31,7 +31,7 @@ class PlacedNode:
     kinds: Mapping[str, int]
 
 
-def placed_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
+def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
     """Return the nodes of the scene by their numbers; without scenes, all that hang on a node that hangs on none.
 
     Raises InputError: a node is in the scene twice, too deep, or too far away.

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
-from lipmotion.meshes.files.gltf_nodes import PlacedNode, placed_nodes
+from lipmotion.meshes.files.gltf_nodes import PlacedNode, place_nodes
 from lipmotion.meshes.files.gltf_schema import COMPONENTS, LARGEST_NUMBER, MOST_GROUPS, WIDTHS
 from lipmotion.meshes.files.vrm import expression_shapes, looks_backwards
-from lipmotion.meshes.model.bones import Bone, merged_bones
+from lipmotion.meshes.model.bones import Bone, merge_bones
 from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Material, Mesh, MeshPart, PartNames
 from lipmotion.meshes.model.textures import Texture, linear, read_texture
 
@@ -143,14 +143,14 @@ def vertex_tints(document: GltfDocument, arrays: GltfArrays, number: int, count:
     return tints
 
 
-def counted(tints: Array, material: Material) -> Array:
+def drop_hidden_opacity(tints: Array, material: Material) -> Array:
     """Return tints [shape=(N, 4)] as a material counts them: where it hides what is behind, their opacity is 1."""
     if material.alpha != OPAQUE:
         return tints
     return np.concatenate([tints[:, :3], np.ones((len(tints), 1))], axis=1)
 
 
-def tinted(colours: Array, tints: Array) -> Array:
+def tint_colours(colours: Array, tints: Array) -> Array:
     """Return colours, sRGB, 0 to 1 [shape=(N, 3)], whose light is multiplied by tints [shape=(N, 4)]."""
     light = linear(colours) * tints[:, :3]
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
@@ -190,7 +190,7 @@ def read_skin(document: GltfDocument, number: int, arrays: GltfArrays, nodes: Ma
     return GltfSkin(joints, matrices[:, :3])
 
 
-def skin_weights(
+def read_skin_weights(
     skin: GltfSkin, arrays: GltfArrays, attributes: Mapping[str, int], count: int
 ) -> tuple[Numbers, Matrix]:
     """Return the joints that every vertex follows, as rows of the skin's list, and how far [shape=(N, W), both].
@@ -210,10 +210,10 @@ def skin_weights(
     return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
 
 
-def skinned_frames(skin: GltfSkin, joints: Numbers, weights: Matrix) -> tuple[Matrix, Matrix]:
+def blend_skin(skin: GltfSkin, joints: Numbers, weights: Matrix) -> tuple[Matrix, Matrix]:
     """Return how a skin at rest maps every vertex: matrices [shape=(N, 3, 3)] and shifts [shape=(N, 3)].
 
-    joints, weights : as of ``skin_weights``
+    joints, weights : as of ``read_skin_weights``
     """
     blended = np.zeros((len(weights), 3, 4))
     for column in range(weights.shape[1]):
@@ -232,7 +232,7 @@ def head_bones(
 ) -> Iterator[Bone]:
     """Yield the bones of the head that vertices follow, or whose parts they follow.
 
-    joints, weights : as of ``skin_weights``;  first : number of the first vertex in the whole mesh
+    joints, weights : as of ``read_skin_weights``;  first : number of the first vertex in the whole mesh
     """
     total = np.maximum(weights.sum(axis=1), LEAST_WEIGHT)
     for kind in sorted({kind for joint in skin.joints for kind in joint.kinds}):
@@ -292,7 +292,7 @@ class _SceneSurface:
         self._document, self._budget = document, document.budget
         self._arrays = GltfArrays(document)
         self._materials = GltfMaterials(document, self._arrays)
-        self._nodes = placed_nodes(document)
+        self._nodes = place_nodes(document)
         self._skins: dict[int, GltfSkin] = {}
         self._blocks: dict[Any, _SharedVertices] = {}
         self._triangles: list[NDArray[np.int64]] = []
@@ -320,7 +320,7 @@ class _SceneSurface:
                         shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
                         if shared not in self._blocks:
                             self._blocks[shared] = self._block(
-                                number, primitive, target_names(self._document, mesh, primitive)
+                                number, primitive, name_targets(self._document, mesh, primitive)
                             )
                         self._add_primitive(primitive, name, self._blocks[shared])
         if not self._triangles:
@@ -341,7 +341,7 @@ class _SceneSurface:
             tuple(shapes),
             np.concatenate(self._uv) if self._mapped else None,
             np.concatenate([block.colours for block in blocks]),
-            tuple(replace(bone, place=bone.place * turn) for bone in merged_bones(self._bones)),
+            tuple(replace(bone, place=bone.place * turn) for bone in merge_bones(self._bones)),
             np.concatenate([block.tints for block in blocks]) if self._tinted else None,
         )
 
@@ -363,7 +363,9 @@ class _SceneSurface:
         tints = None
         if "COLOR_0" in attributes:
             material = material if "material" in primitive else replace(material, colour=WHITE)
-            tints = counted(vertex_tints(self._document, self._arrays, attributes["COLOR_0"], count)[used], material)
+            tints = drop_hidden_opacity(
+                vertex_tints(self._document, self._arrays, attributes["COLOR_0"], count)[used], material
+            )
             block.tints[used] = tints
             self._tinted = True
         colours = np.tile(material.colour, (len(used), 1))
@@ -375,7 +377,7 @@ class _SceneSurface:
             self._mapped = True
             if material.texture is not None:
                 colours = material.texture.at(in_texture[used])[:, :3] * material.colour
-        block.colours[used] = colours if tints is None else tinted(colours, tints)
+        block.colours[used] = colours if tints is None else tint_colours(colours, tints)
         self._triangles.append(corners.reshape(-1, 3) + block.first)
         self._parts.append((self._names.unused(name, material.name), material))
         self._uv.append(mapped)
@@ -388,8 +390,8 @@ class _SceneSurface:
         vertices = self._arrays.floats(attributes["POSITION"], 3)
         if "skin" in node:
             skin = self._skin(node["skin"])
-            joints, weights = skin_weights(skin, self._arrays, attributes, count)
-            linear, shift = skinned_frames(skin, joints, weights)
+            joints, weights = read_skin_weights(skin, self._arrays, attributes, count)
+            linear, shift = blend_skin(skin, joints, weights)
             self._bones += head_bones(skin, joints, weights, self._nodes, self._count)
         else:
             placed = self._nodes[number]
@@ -437,7 +439,7 @@ def _mapped(linear: Matrix, vectors: Matrix) -> Matrix:
     return mapped
 
 
-def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
+def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
     """Return the names of the morph targets of a primitive: those of the mesh, or else of its arrays.
 
     Targets without a name, or with that of another before, are numbered.
@@ -454,8 +456,8 @@ def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
     return names
 
 
-def mesh_target_names(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
+def name_mesh_targets(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the morph targets of a mesh; some of its primitives may have none."""
-    named = [target_names(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
+    named = [name_targets(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
     longest = max(named, key=len, default=[])
     return tuple(longest)

@@ -20,9 +20,9 @@ from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
-from lipmotion.meshes.files.gltf_nodes import placed_nodes
-from lipmotion.meshes.files.gltf_scene import mesh_target_names
-from lipmotion.meshes.files.steady_rate import exact_rate, strongest_columns
+from lipmotion.meshes.files.gltf_nodes import place_nodes
+from lipmotion.meshes.files.gltf_scene import name_mesh_targets
+from lipmotion.meshes.files.steady_rate import choose_columns, exact_rate
 from lipmotion.meshes.model.bones import HEAD, NECK, bone_kind
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
@@ -136,7 +136,7 @@ def _motion(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _T
         for name, curve in zip(track.names, track.at(time_s).T, strict=True)
         for known in KNOWN_AS.get(name, (name,))
     ]
-    kept = strongest_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
+    kept = choose_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
     curves = dict(every[column] for column in kept)
     channels = [Channel(name, WEIGHT) for name in curves]
     if turns:
@@ -154,7 +154,7 @@ def _turned(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) 
     """
     from scipy.spatial.transform import Rotation
 
-    placed, whole = placed_nodes(document), Rotation.identity()
+    placed, whole = place_nodes(document), Rotation.identity()
     try:
         for number, track in turns.items():
             if number in placed:
@@ -219,7 +219,7 @@ def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any
     for node, path, sampler in _targets(document, animation):
         if path.startswith("weights"):
             owner, one = document.items("nodes")[node].get("mesh", -1), path.partition("/")[2]
-            names = mesh_target_names(document, document.items("meshes")[owner]) if owner >= 0 else ()
+            names = name_mesh_targets(document, document.items("meshes")[owner]) if owner >= 0 else ()
             names = names[int(one) :][:1] if one else names
             if names:
                 yield _track(arrays, sampler, names, 1)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_container import read_gltf_document, write_container
 from lipmotion.meshes.model.mesh import Blendshape, MeshPart
-from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
+from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, compute_shading_normals
 from lipmotion.storage.files import as_text
 
 AUDIO = "audio"
@@ -30,7 +30,7 @@ def sound_extras(sound: str, start_s: float) -> dict[str, Any]:
     return {AUDIO: {"uri": quote(as_text(sound), safe="/"), "start_s": start_s}}
 
 
-def named_sound(path: Path) -> tuple[Path, float] | None:
+def find_named_sound(path: Path) -> tuple[Path, float] | None:
     """Return the path of the sound that a glTF file names, and where it begins, in seconds; None: it names none.
 
     Only paths from the folder of the file count; whether the sound is there is not looked at.
@@ -121,7 +121,7 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
     Raises ExportError: the file cannot be written.
     """
     buffer = GltfBuffer()
-    document = _document(scene, buffer, shading_normals(scene.mesh, split=scene.split))
+    document = _document(scene, buffer, compute_shading_normals(scene.mesh, split=scene.split))
     write_container(path, document, b"".join(buffer.chunks))
 
 

@@ -23,7 +23,7 @@ FIFO = 16
 _DAMAGED = "its compressed data is damaged; export it again, without compression"
 
 
-def decoded_attributes(data: bytes, count: int, stride: int) -> Bytes:
+def decode_attributes(data: bytes, count: int, stride: int) -> Bytes:
     """Return the elements of a stream of vertex attributes [shape=(count, stride)].
 
     stride : bytes of an element, a multiple of 4 up to 256
@@ -84,7 +84,7 @@ def _unpacked(data: bytes, position: int, end: int, count: int) -> tuple[Bytes, 
     return values.reshape(-1)[:count], position
 
 
-def decoded_exponents(elements: Bytes) -> NDArray[np.float32]:
+def decode_exponents(elements: Bytes) -> NDArray[np.float32]:
     """Return the numbers of elements under the filter EXPONENTIAL: 24 bits of mantissa and 8 of exponent."""
     whole = np.ascontiguousarray(elements).view("<i4")
     exponents = whole >> 24
@@ -93,7 +93,7 @@ def decoded_exponents(elements: Bytes) -> NDArray[np.float32]:
         return np.ldexp(mantissas.astype(np.float32), exponents)
 
 
-def decoded_indices(data: bytes, count: int) -> NDArray[np.uint32]:
+def decode_indices(data: bytes, count: int) -> NDArray[np.uint32]:
     """Return the numbers of a stream of indices without triangles [shape=(count,)].
 
     Raises InputError: another version, or data that is too short.
@@ -206,7 +206,7 @@ class _Triangles:
         return a, b, c
 
 
-def decoded_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
+def decode_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
     """Return the vertices of a stream of triangles [shape=(count,)]; ``count`` is three times their number.
 
     Raises InputError: another version, or data that is too short.

@@ -105,7 +105,7 @@ def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
             )
 
 
-def nearest(name: str, names: Iterable[str]) -> str:
+def suggest_names(name: str, names: Iterable[str]) -> str:
     """Return what a message says where there is no such name: the nearest ones, or else the first ones."""
     known = list(dict.fromkeys(names))
     by_lower = {each.lower(): each for each in reversed(known)}
@@ -113,7 +113,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
     return f"nearest: {', '.join(near)}" if near else f"there are {shortened(', '.join(known)) or 'none'}"
 
 
-def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
+def apply_rig(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
     """Return the controls of a rig over time, in the order of the table.
 
     sources : curves by name, blendshapes of ARKit, visemes, channels of motion [each shape=(T,)]
@@ -125,7 +125,7 @@ def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float6
         if row.source and row.source not in sources:
             raise InputError(
                 f"the control {shortened(row.control)!r} follows {shortened(row.source)!r}, which is no curve; "
-                f"{nearest(row.source, sources)}"
+                f"{suggest_names(row.source, sources)}"
             )
         value = row.gain * sources[row.source] if row.source else np.zeros(len(next(iter(sources.values()))))
         curves[row.control] = curves.get(row.control, 0.0) + value + row.offset
@@ -161,10 +161,11 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
     for row in read_rig_table(path):
         control, source = shortened(row.control), shortened(row.source)
         if row.control not in mesh.shape_names:
-            raise InputError(f"{path}: there is no blendshape {control!r}; {nearest(row.control, mesh.shape_names)}")
+            near = suggest_names(row.control, mesh.shape_names)
+            raise InputError(f"{path}: there is no blendshape {control!r}; {near}")
         if row.source not in {"", row.control, *SOURCES}:
             raise InputError(
-                f"{path}: {control!r} follows {source!r}, which is no curve; {nearest(row.source, SOURCES)}"
+                f"{path}: {control!r} follows {source!r}, which is no curve; {suggest_names(row.source, SOURCES)}"
             )
         if row.control in found:
             raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")

@@ -60,7 +60,7 @@ def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
     return television if television and abs(television - hertz) <= off_hz else hertz
 
 
-def rate_in_step(rate_hz: float, frames: int, duration_s: float) -> float:
+def match_sound_rate(rate_hz: float, frames: int, duration_s: float) -> float:
     """Return the rate of motion that lasts as long as its sound but for 1001 / 1000, else the same rate.
 
     duration_s : of the sound
@@ -74,7 +74,7 @@ def rate_in_step(rate_hz: float, frames: int, duration_s: float) -> float:
     return rate_hz
 
 
-def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
+def even_out_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     """Return rows at a steady rate that begin at the first time, and the rate in hertz.
 
     time_s : increasing, seconds [shape=(N,)];  rows : one for each time [shape=(N, P)]
@@ -119,13 +119,13 @@ def column_key(name: str) -> str:
     return re.sub(r"[\s_()\[\].-]+", "", name).lower()
 
 
-def tabulated(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], Array]:
+def tabulate_frames(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], Array]:
     """Return the names of all curves of some frames, and their values [shape=(N, P)]; NaN where a frame has none."""
     names = [name for name in dict.fromkeys(name for frame in frames for name in frame) if name != "_neutral"]
     return names, np.array([[frame.get(name, np.nan) for name in names] for frame in frames], float)
 
 
-def in_seconds(times: Array, key: str) -> Array:
+def times_to_seconds(times: Array, key: str) -> Array:
     """Return times in seconds; their size shows the unit where the name of their column (``column_key``) does not.
 
     Raises InputError: one is no number.
@@ -140,7 +140,7 @@ def in_seconds(times: Array, key: str) -> Array:
     return np.asarray(times / per_second)
 
 
-def motion_at_times(
+def resample_rows(
     names: Sequence[str], time_s: Array, values: Array, unit: str = WEIGHT
 ) -> tuple[Motion, NDArray[np.bool_]]:
     """Return curves at a steady rate from the first time on, and in which frames they were measured.
@@ -149,7 +149,7 @@ def motion_at_times(
     unit   : of curves that are neither blendshapes nor angles
     Before the first face and after the last one weights are 0 and other curves still; between faces is a straight line.
     Rows that are not later than all before are left out, frames that were lost and uneven times evened out
-    (``steady_rows``). A warning says how many rows each of this was.
+    (``even_out_rows``). A warning says how many rows each of this was.
     Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
     """
     ordered = _in_order(time_s)
@@ -163,14 +163,14 @@ def motion_at_times(
     names = [name for name, there in zip(names, measured, strict=True) if there]
     values = values[:, measured]
     channels = [_channel(name, unit) for name in names]
-    kept = strongest_columns([channel.name for channel in channels], values)
+    kept = choose_columns([channel.name for channel in channels], values)
     values, channels = values[:, kept], [channels[column] for column in kept]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     if not seen.all():
         if not seen.any():
             raise InputError("0 rows with values of all curves, required two or more")
         _bridge(time_s, values, seen, np.array([channel.unit == WEIGHT for channel in channels]))
-    rows, rate_hz = steady_rows(time_s, np.concatenate([values, seen[:, None]], axis=1))
+    rows, rate_hz = even_out_rows(time_s, np.concatenate([values, seen[:, None]], axis=1))
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
 
 
@@ -180,7 +180,7 @@ def _channel(name: str, unit: str) -> Channel:
     return Channel(arkit_name(name) or name, WEIGHT if is_known(name) else unit)
 
 
-def strongest_columns(names: Sequence[str], values: Array) -> list[int]:
+def choose_columns(names: Sequence[str], values: Array) -> list[int]:
     """Return one column of each name, in order: where several have it, the one that moves most, with a warning."""
     if len(set(names)) == len(names):
         return list(range(len(names)))

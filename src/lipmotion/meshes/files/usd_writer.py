@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.files.usd_text import asset, matrix, numbers, prim, prim_names, rows_of, tokens, triple, whole
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
-from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
+from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, compute_shading_normals
 from lipmotion.meshes.model.textures import linear
 from lipmotion.storage.files import whole_file
 
@@ -34,7 +34,7 @@ def write_usda(path: Path, scene: Scene) -> None:
     Textures are not written.
     Raises ExportError: the file cannot be written.
     """
-    normals = shading_normals(scene.mesh, split=scene.split)
+    normals = compute_shading_normals(scene.mesh, split=scene.split)
     with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
         for line in _lines(scene, normals):
             file.write(line + "\n")

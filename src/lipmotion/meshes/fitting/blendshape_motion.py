@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import GAP, LEAST_GAP, opening_of
+from lipmotion.articulation.contact import GAP, LEAST_GAP, gap_to_opening
 from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_EDGE, RIGHT_CORNER, UPPER_EDGE, mouth_template
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.meshes.model.face_shapes import FaceShapes
-from lipmotion.meshes.model.other_shapes import OPENS, as_arkit
+from lipmotion.meshes.model.other_shapes import OPENS, convert_to_arkit
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion
 
@@ -58,7 +58,7 @@ def with_mouth(motion: Motion) -> Motion:
     gap = np.maximum(rows @ mouth.gap, 0.0)
     gap[gap < LEAST_GAP / 2] = 0.0
     distances = {
-        "opening": opening_of(gap),
+        "opening": gap_to_opening(gap),
         GAP: gap,
         "width": _apart(places, LEFT_CORNER, RIGHT_CORNER),
         "outer": _apart(places, UPPER_EDGE, LOWER_EDGE),
@@ -93,11 +93,11 @@ def arkit_weights(motion: Motion) -> dict[str, Array]:
         if known is not None:
             found.setdefault(known, np.clip(motion[name].astype(np.float64), 0, 1))
     if OPENS not in found:
-        found |= {name: np.clip(curve, 0, 1) for name, curve in as_arkit(motion).items()}
+        found |= {name: np.clip(curve, 0, 1) for name, curve in convert_to_arkit(motion).items()}
     return found
 
 
-def given_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
+def find_own_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
     """Return the weights that a motion has for the blendshapes of a mesh, by the mesh's names; None: it has none.
 
     A blendshape is found by its own name, or else by ARKit's; at least one of those that are found must open the mouth.

@@ -30,7 +30,9 @@ class CurveCosts:
     smooth: float = 1e-1
 
 
-def bounded_curves(matrix: Array, targets: Array, costs: CurveCosts | None = None, ties: Array | None = None) -> Array:
+def fit_bounded_curves(
+    matrix: Array, targets: Array, costs: CurveCosts | None = None, ties: Array | None = None
+) -> Array:
     """Return weights w between 0 and 1 that minimise the distance of ``w @ matrix`` from targets [shape=(T, S)].
 
     matrix  : what each of S shapes adds at weight 1 [shape=(S, D)]

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import LEAST_GAP, in_pictures
-from lipmotion.articulation.expression import moods_shown
+from lipmotion.articulation.contact import LEAST_GAP, sample_pictures
+from lipmotion.articulation.expression import read_moods
 from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
@@ -22,20 +22,20 @@ from lipmotion.meshes.files.rig_tables import RigRow, read_character_table, tabl
 from lipmotion.meshes.fitting.facial_animation import expression_weights
 from lipmotion.meshes.fitting.lip_placement import (
     LipPlacement,
-    opening_shape,
-    placed_by_points,
-    placed_by_shape,
-    surface_of_named,
+    find_opening_shape,
+    part_named_lips,
+    place_lips_by_points,
+    place_lips_by_shape,
 )
-from lipmotion.meshes.fitting.own_curves import OwnCurves, own_curves, plain_row, rows_found
-from lipmotion.meshes.fitting.point_motion import point_motion
-from lipmotion.meshes.fitting.shape_weights import shape_weights
-from lipmotion.meshes.model.binding import ControlBinding, bind, painted
+from lipmotion.meshes.fitting.own_curves import OwnCurves, assign_own_curves, list_rows, plain_row
+from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
+from lipmotion.meshes.model.binding import ControlBinding, bind, paint_weights
 from lipmotion.meshes.model.bones import JAW
-from lipmotion.meshes.model.face_shapes import FaceShapes, face_shapes, numbers_by_name
+from lipmotion.meshes.model.face_shapes import FaceShapes, find_face_shapes, numbers_by_name
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name
-from lipmotion.meshes.model.surface import mesh_surface
+from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import Motion, Timeline, Unit
 
 JAW_OPEN = "jawOpen"
@@ -62,7 +62,7 @@ def with_jaw(mesh: Mesh) -> Mesh:
 
 def _opens(mesh: Mesh) -> bool:
     try:
-        opening_shape(mesh)
+        find_opening_shape(mesh)
     except InputError:
         return False
     return True
@@ -102,7 +102,7 @@ class DrivenCharacter:
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
 
-        Raises InputError: the character has no blendshapes of the mouth, or as ``shape_weights``.
+        Raises InputError: the character has no blendshapes of the mouth, or as ``solve_shape_weights``.
         """
         if self.shapes is None:
             raise InputError(
@@ -110,7 +110,7 @@ class DrivenCharacter:
                 "motion without --character"
             )
         if self._own_curves is None:
-            return shape_weights(motion, units, self.shapes)
+            return solve_shape_weights(motion, units, self.shapes)
         return self._own_curves.weights(motion, units, self.shapes)
 
     def poses(
@@ -120,21 +120,21 @@ class DrivenCharacter:
 
         others : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
                  not have are left out; None: they stay at rest
-        A closure between two times is shown at the nearer one (``articulation.contact.shown_contact``).
-        Raises InputError: as ``point_motion``.
+        A closure between two times is shown at the nearer one (``articulation.contact.show_contact``).
+        Raises InputError: as ``move_points``.
         """
-        points = point_motion(motion, units)
+        points = move_points(motion, units)
         count = len(time_s)
         columns = [*self.beside(others or {}, count).values(), *(np.zeros(count) for _ in self._expressions)]
         beside = np.stack(columns, axis=1) if columns else np.zeros((count, 0))
         moved, contact = points.expressed, points.mouth.contact
         if self.shapes is not None:
             moved = self.weights(motion, units).values.astype(np.float64)
-        rows = in_pictures(moved, contact, motion.rate_hz, time_s)
+        rows = sample_pictures(moved, contact, motion.rate_hz, time_s)
         moods = self.expressions(motion, points.mouth)
         if moods:
             table = np.stack([moods.get(name, np.zeros(len(contact))) for name in self._expressions.values()], axis=1)
-            beside[:, len(self._other_rows) :] = in_pictures(table, contact, motion.rate_hz, time_s)
+            beside[:, len(self._other_rows) :] = sample_pictures(table, contact, motion.rate_hz, time_s)
         return list(map(DrivenPose, rows, beside))
 
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
@@ -142,7 +142,7 @@ class DrivenCharacter:
 
         None, where the character has finer shapes, or no expressions. Those that part the lips vanish in p, b and m.
         """
-        found = expression_weights(moods_shown(motion)) if self._expressions else {}
+        found = expression_weights(read_moods(motion)) if self._expressions else {}
         shown = [(name, own) for name, own in self._expressions.items() if name in found]
         curves = {own: self.table.get(own, plain_row(own, name)).alone(found[name]) for name, own in shown}
         return {
@@ -215,7 +215,7 @@ class DrivenCharacter:
             shape.name: shape.called.lower() for shape in self.mesh.shapes if shape.called.lower() in VRM_EMOTIONS
         }
         beside |= {row.control: row.source for row in self._other_rows}
-        found = rows_found(self.mesh, self.shapes, beside)
+        found = list_rows(self.mesh, self.shapes, beside)
         return tuple(self.table.get(row.control, row) for row in found)
 
     @property
@@ -227,7 +227,7 @@ class DrivenCharacter:
 
     @cached_property
     def _own_curves(self) -> OwnCurves | None:
-        return own_curves(self.mesh, self.placement, self.shapes, self.table) if self.shapes else None
+        return assign_own_curves(self.mesh, self.placement, self.shapes, self.table) if self.shapes else None
 
     @cached_property
     def _mouth_names(self) -> tuple[str, ...]:
@@ -260,7 +260,7 @@ class DrivenCharacter:
         return self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
 
 
-def driven_character(
+def load_character(
     path: str | Path, *, points: Path | None = None, binding: Path | None = None, by_points: bool = False
 ) -> DrivenCharacter:
     """Return a character from its files, ready to be moved; with the table beside it, if there is one.
@@ -282,16 +282,16 @@ def driven_character(
             return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
         if points is not None:
             named = read_points(points)
-            surface = surface_of_named(mesh, named)
-            placement = placed_by_points(mesh, surface, named)
+            surface = part_named_lips(mesh, named)
+            placement = place_lips_by_points(mesh, surface, named)
         else:
-            surface = mesh_surface(mesh)
-            placement = placed_by_shape(mesh, surface)
+            surface = build_surface(mesh)
+            placement = place_lips_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement), None, path, table)
+            return DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None, path, table)
         bound = bind(mesh, surface, placement)
         if binding is not None:
-            bound = painted(bound, mesh, read_weights(binding))
+            bound = paint_weights(bound, mesh, read_weights(binding))
         return DrivenCharacter(mesh, placement, None, bound, path, table)
     except InputError as error:
         text = str(error)

@@ -52,7 +52,7 @@ SPOKEN_SMILE, FULL_SMILE = 0.3, 0.75
 CORNERS = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthFrown") for side in SIDES)
 
 
-def given_movements(motion: Motion, time_s: Array) -> dict[str, Array]:
+def find_movements(motion: Motion, time_s: Array) -> dict[str, Array]:
     """Return what a motion says of eyes, brows, cheeks, nose, head and corners of the lips, at some times.
 
     Each has the shape (len(time_s),).
@@ -75,7 +75,7 @@ def moves_by_itself(part: str, given: Mapping[str, Array]) -> bool:
     return not {*MOVED_BY[part]} & {*given}
 
 
-def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
+def with_movements(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
     """Return movements of moods, and of what a face moves by itself, with those that are given.
 
     Faces that move both sides alike show the mean of both.
@@ -97,7 +97,7 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
         turn = np.stack([given.get(name, none) for name in ANGLES], axis=1)
         gaze = gaze - np.clip(GAZE_COUNTER_SHARE * turn[:, :2], -LARGEST_COUNTER_RAD, LARGEST_COUNTER_RAD)
     if not moves_by_itself("gaze", given):
-        gaze = given_gaze(given)
+        gaze = weights_to_gaze(given)
     of_mood = eye_and_brow_weights(moved)
     added = {unit: np.clip(moved.unit(unit) + units.get(unit, 0), 0, 1) for unit in {*moved.units, *units}}
     return replace(
@@ -115,7 +115,7 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
     )
 
 
-def given_gaze(given: Mapping[str, Array]) -> Array:
+def weights_to_gaze(given: Mapping[str, Array]) -> Array:
     """Return where both eyes look in the mean, to the character's left and upwards, in radians [shape=(F, 2)].
 
     given : the weights of ARKit's blendshapes that turn the eyes, all of them [each shape=(F,)]
@@ -126,7 +126,7 @@ def given_gaze(given: Mapping[str, Array]) -> Array:
     return FULL_LOOK_RAD / 2 * np.stack([across, upwards], axis=1)
 
 
-def gaze_weights(gaze: Array) -> dict[str, Array]:
+def gaze_to_weights(gaze: Array) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes that turn the eyes, 0 to 1 [each shape=(F,)].
 
     gaze : of both eyes, to the character's left and upwards, in radians [shape=(F, 2)]
@@ -141,7 +141,7 @@ def gaze_weights(gaze: Array) -> dict[str, Array]:
 
 def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(F,)]; given ones as they are."""
-    gaze, raised = gaze_weights(moved.gaze), np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
+    gaze, raised = gaze_to_weights(moved.gaze), np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
     moods: dict[str, Array] = {}  # of both sides alike
     if moved.units:
         moods = {name: moved.unit(number) for number, name in GIVEN_UNITS.items() if name != "mouthFrown"}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.articulation.mouth import SpokenMouth
-from lipmotion.meshes.fitting.point_motion import point_motion
+from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.types import Channel, Motion, Timeline, Unit
 
@@ -107,13 +107,13 @@ PARAMETERS = (
 """The parameters of lips and jaw that points show; left and right are the speaker's own."""
 
 
-def fap_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
+def move_faps(motion: Motion, units: Timeline[Unit]) -> Motion:
     """Return the parameters over time: channels ``fap3_open_jaw``, ..., whole numbers; the rest pose is 0.
 
     Where the lips touch, ``lower_t_midlip`` and ``raise_b_midlip`` add up to 0.
-    Raises InputError: as ``point_motion``.
+    Raises InputError: as ``move_points``.
     """
-    moved = point_motion(motion, units).expressed
+    moved = move_points(motion, units).expressed
     template = mouth_template()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [

@@ -21,7 +21,7 @@ from lipmotion.articulation.lip_points import (
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import arkit_name, viseme_name, vowel_name
-from lipmotion.meshes.model.surface import MeshSurface, mesh_surface
+from lipmotion.meshes.model.surface import MeshSurface, build_surface
 
 Rows = NDArray[np.int64]
 Places = NDArray[np.float64]
@@ -78,14 +78,14 @@ class LipPlacement:
         return displacements @ self.axes / self.scale
 
 
-def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
+def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     """Return where the lip points are, from the blendshape that opens the mouth.
 
     The lips meet where neighbours go apart as the mouth opens; the ends of that line are the inner corners. The
     character must stand upright and look along +z, as files of OBJ and glTF have it.
     Raises InputError: no blendshape opens the mouth, or the lips are not found.
     """
-    shape = opening_shape(mesh)
+    shape = find_opening_shape(mesh)
     drop = np.zeros(len(mesh.vertices))
     drop[shape.rows] = -shape.displacements[:, 1]
     still, moved = drop < 0.1 * drop.max(initial=0.0), drop > 0.5 * drop.max(initial=0.0)
@@ -112,7 +112,7 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     return LipPlacement(template.points, vertices, scale, np.eye(3))
 
 
-def placed_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int]) -> LipPlacement:
+def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int]) -> LipPlacement:
     """Return where the lip points are, from some that are named; the others are the nearest to the template.
 
     named : vertex of each point; the corners (61, 291) and the middles of the inner lips (13, 14) are required.
@@ -146,13 +146,13 @@ def placed_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int])
     return LipPlacement(template.points, vertices, scale, axes)
 
 
-def surface_of_named(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
+def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
     """Return how a mesh hangs together whose lip points are named: its lips are apart, also where they touch.
 
-    Raises InputError: as ``placed_by_points``.
+    Raises InputError: as ``place_lips_by_points``.
     """
     _check_named(named, len(mesh.vertices), mouth_template())
-    surface = mesh_surface(mesh)
+    surface = build_surface(mesh)
     if surface.places[named[UPPER_MIDDLE]] != surface.places[named[LOWER_MIDDLE]]:
         return surface
     right, left = mesh.vertices[named[RIGHT_CORNER]], mesh.vertices[named[LEFT_CORNER]]
@@ -164,10 +164,10 @@ def surface_of_named(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
     off = from_middle - across[:, None] * along
     bend = (1 - np.square(np.clip(2 * across / max(width, 1e-12), -1, 1)))[:, None] * (lips - (lips @ along) * along)
     split = (np.abs(across) < 0.499 * width) & (np.linalg.norm(off - bend, axis=1) < LIP_LINE * width)
-    return mesh_surface(mesh, split)
+    return build_surface(mesh, split)
 
 
-def opening_shape(mesh: Mesh) -> Blendshape:
+def find_opening_shape(mesh: Mesh) -> Blendshape:
     """Return the blendshape that opens the mouth most plainly. Raises InputError: there is none.
 
     ARKit's ``jawOpen``, else the vowel or viseme ``aa``, else another whose name says so.

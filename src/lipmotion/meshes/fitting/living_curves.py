@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.liveliness import Liveliness, liveliness
+from lipmotion.articulation.liveliness import Liveliness, compute_liveliness
 from lipmotion.meshes.fitting.eyes_and_brows import (
     MOVED_BY,
     eye_and_brow_weights,
-    given_movements,
+    find_movements,
     moves_by_itself,
-    with_given,
+    with_movements,
 )
 from lipmotion.meshes.model.head_angles import ANGLES
 from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
@@ -19,7 +19,7 @@ from lipmotion.types.motion import RADIAN, WEIGHT
 from lipmotion.types.staging import Staging
 
 
-def living_curves(
+def compute_living_curves(
     motion: Motion,
     units: Timeline[Unit],
     staging: Staging | None = None,
@@ -34,13 +34,13 @@ def living_curves(
     frames  : those that are wanted
     They are those of all faces with the same seed. Channels are blendshapes (weights), and ``ANGLES`` in radians.
     """
-    moved = alive(motion.time_s[frames], motion, units, staging, prosody)
+    moved = stage_liveliness(motion.time_s[frames], motion, units, staging, prosody)
     curves = eye_and_brow_weights(moved) | dict(zip(ANGLES, moved.turn.T, strict=True))
     channels = tuple(Channel(name, RADIAN if name in ANGLES else WEIGHT) for name in curves)
     return Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
 
 
-def alive(
+def stage_liveliness(
     time_s: NDArray[np.float64],
     motion: Motion,
     units: Timeline[Unit],
@@ -52,6 +52,6 @@ def alive(
     motion, units, prosody : as of ``articulation.liveliness``; blinks, gaze, brows and angles of the head that the
                              motion itself has take the place of what would move on its own
     """
-    chosen, given = staging or Staging(), given_movements(motion, time_s)
+    chosen, given = staging or Staging(), find_movements(motion, time_s)
     moving = {part: getattr(chosen, part) and moves_by_itself(part, given) for part in MOVED_BY}
-    return with_given(liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving), given)
+    return with_movements(compute_liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving), given)

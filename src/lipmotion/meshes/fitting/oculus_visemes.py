@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.crossfade import phone_weights
+from lipmotion.articulation.crossfade import crossfade_phones
 from lipmotion.articulation.mouth import SpokenMouth
-from lipmotion.articulation.pauses import without_short_pauses
+from lipmotion.articulation.pauses import share_short_pauses
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
@@ -52,7 +52,7 @@ def viseme_of(phone: str) -> str:
     return VISEME_OF_PHONE.get(phone, "sil")
 
 
-def viseme_motion(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
+def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
     """Return the weights of the 15 visemes over time, channels ``viseme_sil``, ``viseme_PP``, ...; 0 to 1.
 
     units : phones in time;  mouth : that they move
@@ -79,5 +79,5 @@ def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[st
 
     Pauses in which the mouth goes on (``articulation.pauses``) belong to the phones beside them.
     """
-    said = phone_weights(without_short_pauses(units), time_s, viseme_of)
+    said = crossfade_phones(share_short_pauses(units), time_s, viseme_of)
     return {name: np.clip(said.get(name, np.zeros(len(time_s))), 0.0, 1.0) for name in VISEMES_15}

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import LEAST_GAP
-from lipmotion.meshes.files.rig_tables import RigRow, rig_motion
+from lipmotion.meshes.files.rig_tables import RigRow, apply_rig
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
-from lipmotion.meshes.fitting.shape_weights import shape_weights, with_gap
-from lipmotion.meshes.model.face_shapes import FaceShapes, parted_lips
+from lipmotion.meshes.fitting.shape_weights import solve_shape_weights, with_gap
+from lipmotion.meshes.model.face_shapes import FaceShapes, measure_lip_parting
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import arkit_name, spoken_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
@@ -37,16 +37,16 @@ class OwnCurves:
         Where the lips touch in solved weights they touch with these gains, too; elsewhere they are as far apart as the
         gains make them. What the offsets do to the lips, they do in every frame. Weights that the motion has for
         blendshapes by the mesh's names are such weights already, and stay.
-        Raises InputError: as ``shape_weights``.
+        Raises InputError: as ``solve_shape_weights``.
         """
         parting = np.zeros(len(shapes.names))
         for row, parted in zip(self.rows, self.parted.tolist(), strict=True):
             parting[shapes.names.index(row.source)] += row.gain * parted
         given = self._given(motion)
         if given is not None:
-            solved = shape_weights(given, units, replace(shapes, gap=parting))
+            solved = solve_shape_weights(given, units, replace(shapes, gap=parting))
         else:
-            solved = shape_weights(motion, units, shapes)
+            solved = solve_shape_weights(motion, units, shapes)
             if any(row.gain != 1 for row in self.rows):
                 weights = solved.values.astype(np.float64)
                 gains = [row.gain for row in self.rows]
@@ -58,7 +58,7 @@ class OwnCurves:
                     solved, values=with_gap(weights, replace(shapes, gap=parting), np.where(before > 0, wanted, before))
                 )
         curves = dict(zip(shapes.names, solved.values.astype(np.float64).T, strict=True))
-        moved = rig_motion(self.rows, curves, solved.rate_hz)
+        moved = apply_rig(self.rows, curves, solved.rate_hz)
         return replace(moved, channels=tuple(Channel(name, WEIGHT) for name in moved.names))
 
     def _given(self, motion: Motion) -> Motion | None:
@@ -75,13 +75,13 @@ class OwnCurves:
         return Motion(np.stack(values, axis=1), motion.rate_hz, tuple(channels))
 
 
-def own_curves(
+def assign_own_curves(
     mesh: Mesh, placement: LipPlacement, shapes: FaceShapes, table: Mapping[str, RigRow]
 ) -> OwnCurves | None:
     """Return what moves the blendshapes of a mouth, from the rows of a table by its blendshapes; None: no table."""
     if not table:
         return None
-    parted = parted_lips(mesh, placement)
+    parted = measure_lip_parting(mesh, placement)
     numbers, rows = [], []
     for number, shape in enumerate(mesh.shapes):
         solved = _solved_name(shape, shapes)
@@ -96,7 +96,7 @@ def plain_row(control: str, source: str) -> RigRow:
     return RigRow(control, source, low=0.0, high=1.0)
 
 
-def rows_found(mesh: Mesh, shapes: FaceShapes | None, beside: Mapping[str, str]) -> Iterator[RigRow]:
+def list_rows(mesh: Mesh, shapes: FaceShapes | None, beside: Mapping[str, str]) -> Iterator[RigRow]:
     """Yield the rows of a table that change nothing: every blendshape of a mesh, with the curve that moves it.
 
     shapes : of its mouth;  beside : the curves of eyes and brows by blendshapes

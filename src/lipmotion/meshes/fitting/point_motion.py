@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.articulation.mouth import LEAST_CHIN_DROP_SHARE, SpokenMouth, jaw_drop, spoken_mouth, upper_share
-from lipmotion.articulation.rest import rest_frames
+from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.types import Motion, Timeline, Unit
@@ -46,7 +46,7 @@ class PointMotion:
         return moved
 
 
-def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
+def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     """Return the motion of lip and jaw points away from the rest pose, which is that of the silences.
 
     Motion that has points is taken as it is; of motion with distances alone (``opening``, perhaps ``width``, ``outer``)
@@ -59,7 +59,7 @@ def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     mouth = spoken_mouth(motion, units)
     if not np.isfinite(motion.values).all():
         raise InputError("the motion has values that are not finite; interpolate the missing frames first")
-    rest, template = rest_frames(motion, units), mouth_template()
+    rest, template = find_rest_frames(motion, units), mouth_template()
     names = [[f"{axis}_{point}" for axis in "xyz"] for point in template.points]
     if all(name in motion.names for row in names for name in row):
         places = np.stack([np.stack([motion[name] for name in row], axis=1) for row in names], axis=1)

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import LEAST_GAP, gap_in
+from lipmotion.articulation.contact import LEAST_GAP, read_gap
 from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.articulation.mouth import SpokenMouth
-from lipmotion.meshes.fitting.blendshape_motion import given_weights, with_mouth
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
+from lipmotion.meshes.fitting.blendshape_motion import find_own_weights, with_mouth
+from lipmotion.meshes.fitting.bounded_curves import CurveCosts, fit_bounded_curves
 from lipmotion.meshes.fitting.facial_animation import mood_weights
 from lipmotion.meshes.fitting.oculus_visemes import NEAREST_VOWEL, viseme_curves
-from lipmotion.meshes.fitting.point_motion import PointMotion, point_motion
+from lipmotion.meshes.fitting.point_motion import PointMotion, move_points
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
@@ -33,7 +33,7 @@ SPREADING = tuple(
 """Shapes that draw the corners apart: they vanish in round phones."""
 
 
-def rounded_weights(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
+def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
     """Return weights of blendshapes with lips at least as round as they are protruded [shape=(T, S)].
 
     weights : as solved from the points [shape=(T, S)];  protrusion : 0 to 1 [shape=(T,)]
@@ -80,7 +80,7 @@ class SolverOptions:
     gestures: bool = True
 
 
-def shape_weights(
+def solve_shape_weights(
     motion: Motion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions | None = None
 ) -> Motion:
     """Return the weights of blendshapes over time: one channel a blendshape, by the mesh's names, 0 to 1.
@@ -91,11 +91,11 @@ def shape_weights(
     The lips are together where the spoken mouth has them together, and nowhere else: with ``mouthClose``, where the
     mesh has it, the jaw may stay open behind closed lips. ``mouthClose`` is never more than ``jawOpen`` in solved
     weights.
-    Raises InputError: as ``point_motion``.
+    Raises InputError: as ``move_points``.
     """
     options = options or SolverOptions()
-    points = point_motion(motion, units)
-    given, mood = given_weights(motion, shapes), mood_weights(points.mouth, shapes)
+    points = move_points(motion, units)
+    given, mood = find_own_weights(motion, shapes), mood_weights(points.mouth, shapes)
     if given is not None:
         weights = _closed_as_spoken(given.values.astype(np.float64), with_mouth(motion), points.mouth, shapes, mood)
     else:
@@ -111,7 +111,7 @@ def shape_weights(
                     said[:, row] += curve
             matrix = np.concatenate([_rows(shapes), VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
             targets = np.concatenate([_targets(points), VISEME_WEIGHT * said], axis=1)
-            weights = bounded_curves(matrix, targets, options.costs)
+            weights = fit_bounded_curves(matrix, targets, options.costs)
         else:
             free = points
             if mood is not None:  # what the shapes of a mood do to the width of the mouth is theirs
@@ -137,7 +137,7 @@ def _closed_as_spoken(
     mood   : weights that a mood adds [shape=(T, S)], by which the lips are no further apart than it parts them
     Frames in which the lips of the mesh touch as they should, and that no closure is near, stay as they are.
     """
-    own, said = weights @ shapes.gap, gap_in(motion)
+    own, said = weights @ shapes.gap, read_gap(motion)
     share = np.clip(mouth.gap / np.maximum(said, 1e-9), 0, 1)
     wanted = np.where(said > LEAST_GAP, share * own, own)
     touching, contact = own < LEAST_GAP / 2, mouth.contact
@@ -199,13 +199,13 @@ def _free_weights(points: PointMotion, shapes: FaceShapes, options: SolverOption
     if jaw is not None and close is not None:
         matrix[close] += matrix[jaw]  # as one: the jaw opens behind closed lips
     ties = PAIR_WEIGHT * shapes.pairs()[:, free]
-    solved = bounded_curves(matrix[free], targets - fixed @ _rows(shapes), options.costs, ties)
+    solved = fit_bounded_curves(matrix[free], targets - fixed @ _rows(shapes), options.costs, ties)
     weights = fixed.copy()
     weights[:, free] += solved
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     if options.gestures:
-        weights = rounded_weights(weights, shapes, mouth.protrusion)
+        weights = round_lips(weights, shapes, mouth.protrusion)
     return np.clip(weights, 0.0, 1.0)
 
 

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 
-def skinned(weights: csr_array, matrices: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def skin_vertices(
+    weights: csr_array, matrices: NDArray[np.float64], vertices: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the vertices under the blended transformations of the control points [shape=(N, 3)].
 
     weights  : of each control point on each vertex [shape=(N, C), sparse rows]; a row of sum below 1 leaves the rest of
@@ -104,7 +106,7 @@ class ControlBinding:
         Source: Hofer 2008, Eq. 12.
         """
         vertices = mesh.vertices.copy()
-        vertices[self.rows] = skinned(self.matrix, matrices, mesh.vertices[self.rows])
+        vertices[self.rows] = skin_vertices(self.matrix, matrices, mesh.vertices[self.rows])
         return vertices
 
 
@@ -136,7 +138,7 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
     return ControlBinding(placement, *map(np.concatenate, zip(*parts, strict=True)))
 
 
-def painted(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int, float]]) -> ControlBinding:
+def paint_weights(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int, float]]) -> ControlBinding:
     """Return a binding with the weights of some vertices replaced.
 
     paint : for each vertex the weight of each point, 0 to 1; weights that add up to more than 1 are scaled down to 1

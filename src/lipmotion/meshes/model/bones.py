@@ -46,7 +46,7 @@ def bone_kind(name: str) -> str | None:
     return next((kind for kind in (JAW, HEAD, NECK) if kind in plain), None)
 
 
-def merged_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
+def merge_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
     """Return one bone of each kind: its vertices are those of all bones of this kind, its place that of the first."""
     found: dict[str, list[Bone]] = {}
     for bone in bones:

@@ -73,7 +73,7 @@ def life_scale(mesh: Mesh, placement: LipPlacement) -> float:
     return float(EYES_M * unit) if height / unit <= HEAD_M[1] else placement.scale
 
 
-def face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
+def find_face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     """Return the blendshapes of a mesh that move the mouth.
 
     Visemes and vowels, where a table says what follows them; ARKit's, where the mesh has ``jawOpen`` and five more of
@@ -94,7 +94,7 @@ def face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
             "(docs/meshes.md)"
         )
     names = tuple(mesh.shape_names[numbers[0]] for _, numbers in found)
-    gap = parted_lips(mesh, placement)
+    gap = measure_lip_parting(mesh, placement)
     return FaceShapes(
         names,
         tuple(known for known, _ in found),
@@ -104,7 +104,7 @@ def face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     )
 
 
-def parted_lips(mesh: Mesh, placement: LipPlacement) -> Array:
+def measure_lip_parting(mesh: Mesh, placement: LipPlacement) -> Array:
     """Return how far each blendshape of a mesh parts the middle of the inner lips, eye distances [shape=(S,)]."""
     rows = [[placement.vertices[placement.row(point)] for point in pair] for pair in FACING[:3]]
     moved = placement.to_motion(mesh.displacements(np.ravel(rows))).reshape(len(mesh.shapes), -1, 2, 3)

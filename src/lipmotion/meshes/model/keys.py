@@ -82,7 +82,7 @@ def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Arr
     return np.insert(time_s, changed, time_s[changed] - early_s), np.insert(rows, changed, before, axis=0)
 
 
-def keys_of(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
+def place_keys(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
     """Return the keys of evenly spaced rows, with straight lines between them: times and values.
 
     time_s : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : as of ``with_jumps``

@@ -118,7 +118,7 @@ AUDIO2FACE: Sources = {
 """The 46 blendshapes of NVIDIA Audio2Face's own solver as ARKit's, by their names in FACS; gaze is left out."""
 
 
-def as_arkit(motion: Motion) -> dict[str, Array]:
+def convert_to_arkit(motion: Motion) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes that those of another set in a motion stand for [each shape=(T,)].
 
     The sets are FACEGOOD's, Audio2Face's, visemes and vowels; of several the first that opens the jaw. Names of

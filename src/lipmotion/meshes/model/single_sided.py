@@ -9,7 +9,7 @@ import numpy as np
 from lipmotion.meshes.model.mesh import Mesh
 
 
-def single_sided(mesh: Mesh) -> Mesh:
+def drop_back_sides(mesh: Mesh) -> Mesh:
     """Return a mesh in which parts that hold every triangle twice, the second time turned round, hold it once, and are
     seen from both sides.
 

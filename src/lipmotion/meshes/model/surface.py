@@ -58,7 +58,7 @@ class MeshSurface:
         return np.asarray(dijkstra(self.edges, directed=False, indices=self.places[sources], limit=limit))
 
 
-def mesh_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurface:
+def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurface:
     """Return how the vertices of a mesh hang together.
 
     split : vertices that are places of their own, even where others are at the same place, as along closed lips that no
@@ -100,7 +100,7 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
     return normals / np.where(lengths > 0, lengths, 1.0)
 
 
-def normals_of(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+def compute_normals(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Return the normal of every vertex, the mean of its triangles weighted by their area [shape=(V, 3)], of length 1.
 
     A vertex without triangles gets (0, 0, 1).
