@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.contact import CLOSED_OPENING, opening_to_gap
-from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, find_own_weights, is_of_blendshapes, with_mouth
+from lipmotion.meshes.fitting.blendshape_motion import (
+    arkit_mouth,
+    arkit_weights,
+    find_own_weights,
+    is_of_blendshapes,
+    with_mouth,
+)
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
 from lipmotion.meshes.model.face_shapes import find_face_shapes
 from lipmotion.meshes.model.surface import build_surface

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts, fit_bounded_curves
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves
 
 
 def test_each_frame_is_the_bounded_least_squares_solution():

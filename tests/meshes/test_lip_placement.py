@@ -105,7 +105,7 @@ def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
     mesh = head()
     surface = build_surface(mesh)
     whole = place_lips_by_shape(mesh, surface)
-    monkeypatch.setattr(lip_placement, "MOST_PAIRS", 1500)
+    monkeypatch.setattr(lip_placement, "MAX_PAIRS", 1500)
     thinned = place_lips_by_shape(mesh, surface)
     assert (thinned.vertices != whole.vertices).any()
     assert _offsets(mesh, thinned) < 2 * GRID

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.meshes.fitting.point_motion import move_points
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.meshes.fitting.shape_weights import round_lips, solve_shape_weights
 from meshes.speech import motion, units
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from lipmotion.articulation.crossfade import FADE_S, crossfade_phones
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import rest_in_pauses
-from lipmotion.meshes.fitting.oculus_visemes import MOST_CLOSED_WEIGHT, VISEME_OF_PHONE, weigh_visemes
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.meshes.fitting.oculus_visemes import MAX_CLOSED_WEIGHT, VISEME_OF_PHONE, weigh_visemes
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
@@ -52,7 +52,7 @@ def test_weights_add_up_to_1_and_are_never_negative(phones, rate_hz, opening):
     closed = motion["viseme_sil"] + motion["viseme_PP"]
     contact = spoken_mouth(still, said).contact
     assert closed[contact] == pytest.approx(1)
-    assert closed[~contact].max(initial=0) <= MOST_CLOSED_WEIGHT + 1e-9
+    assert closed[~contact].max(initial=0) <= MAX_CLOSED_WEIGHT + 1e-9
 
 
 def test_phones_fade_around_their_border():

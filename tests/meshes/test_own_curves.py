@@ -49,7 +49,7 @@ def test_any_names_are_understood_by_their_rows(file):
         np.testing.assert_allclose(weights[shapes[name]], plain[name], atol=1e-4)
     np.testing.assert_array_equal(weights["other half"], weights[shapes["mouthFunnel"]])
     assert character.has_shape("eyeBlinkLeft")
-    assert [*character.beside({"eyeBlinkLeft": np.ones(2)}, 2)] == [shapes["eyeBlinkLeft"]]
+    assert [*character.weigh_others({"eyeBlinkLeft": np.ones(2)}, 2)] == [shapes["eyeBlinkLeft"]]
 
 
 def test_the_table_of_what_was_found_changes_nothing(file):

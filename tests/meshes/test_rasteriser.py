@@ -4,7 +4,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
 from lipmotion.meshes.model.surface import compute_normals
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.rendering.lighting import Finish, Lighting
 from lipmotion_faces.rendering.rasteriser import Camera, Canvas, flat, gradient
 
@@ -27,7 +27,7 @@ def picture_of(mesh: Mesh, camera: Camera) -> np.ndarray:
     colours, kinds = np.zeros_like(vertices), np.zeros(len(vertices), np.intp)
     for number, part in enumerate(mesh.parts):
         rows = np.unique(mesh.triangles[part.first : part.stop])
-        colours[rows], kinds[rows] = linear(part.material.colour), number
+        colours[rows], kinds[rows] = decode_srgb(part.material.colour), number
     glosses = [part.material.gloss for part in mesh.parts]
     lighting = Lighting([Finish((0.3, 0.2, 0.15), gloss=0.5 * gloss, focus=4 + round(2 * gloss)) for gloss in glosses])
     light = lighting.light(vertices, compute_normals(vertices, mesh.triangles), colours, kinds, camera.place)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
 from lipmotion.meshes.fitting.point_motion import move_points
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
-from lipmotion.meshes.fitting.shape_weights import SolverOptions, solve_shape_weights
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, SolverOptions, solve_shape_weights
 from lipmotion.meshes.model.face_shapes import find_face_shapes
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.surface import build_surface

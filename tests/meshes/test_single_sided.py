@@ -4,7 +4,7 @@ import numpy as np
 
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
 from lipmotion.meshes.model.scene import compute_shading_normals
-from lipmotion.meshes.model.single_sided import drop_back_sides
+from lipmotion.meshes.model.surface import drop_back_sides
 
 PLACES = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 FRONT = np.array([[0, 1, 2], [0, 2, 3]], np.int32)

@@ -14,9 +14,8 @@ from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
-from lipmotion.meshes.fitting.living_curves import compute_living_curves
-from lipmotion.meshes.model.head_angles import ANGLES as HEAD
+from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_living_curves, eye_and_brow_weights
+from lipmotion.meshes.model.bones import ANGLES as HEAD
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of

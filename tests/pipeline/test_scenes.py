@@ -13,8 +13,7 @@ from lipmotion import Delivery
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_container import read_gltf_document
+from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.scene import Scene

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.meshes.model.surface import compute_normals
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyelids import LID_SIDE
 from lipmotion_faces.head.eyes import LASHES, brow, brow_shift, catchlights, eyeball, lash_triangles, lashes
@@ -163,7 +163,7 @@ def skin_colours(skin: Skin) -> Real:
         for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
             upper = lids[ring, LID_SIDE > 0]
             colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
-    return linear(colour)
+    return decode_srgb(colour)
 
 
 def _lips(skin: Skin, colour: Real) -> None:

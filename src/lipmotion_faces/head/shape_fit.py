@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts, fit_bounded_curves
-from lipmotion.meshes.fitting.shape_weights import with_gap
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.head.figure import Figure

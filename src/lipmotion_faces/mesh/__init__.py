@@ -92,7 +92,7 @@ class MeshFace(Face):
             width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST_PX), self.staging.size
         stage = MeshStage(self._character, width, height, self.staging.colour)
         draw = stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
-        return lambda pose: draw(self._character.posed(pose.row), pose.turn, pose.look)
+        return lambda pose: draw(self._character.place_vertices(pose.row), pose.turn, pose.look)
 
 
 def write_picture(path: Path, character: DrivenCharacter) -> None:

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
-from lipmotion.meshes.model.single_sided import drop_back_sides
-from lipmotion.meshes.model.surface import build_surface, compute_normals
+from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat
 from lipmotion_faces.turning import turned

@@ -14,15 +14,12 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import SpokenMouth, frame_times, measure_mouth_at_rest, spoken_mouth
 from lipmotion.articulation.rest import add_rest
-from lipmotion.meshes.files.gltf_animator import write_animated_gltf
-from lipmotion.meshes.files.gltf_writer import write_gltf_scene
-from lipmotion.meshes.files.usd_text import asset
-from lipmotion.meshes.files.usd_writer import write_usda
+from lipmotion.meshes.files.gltf_writer import write_animated_gltf, write_gltf_scene
+from lipmotion.meshes.files.usd_writer import asset, write_usda
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
-from lipmotion.meshes.fitting.living_curves import compute_living_curves
-from lipmotion.meshes.model.head_angles import head_quaternions
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
+from lipmotion.meshes.model.bones import head_quaternions
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
@@ -201,7 +198,9 @@ def character_scene(
     living = compute_living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
     beside = {
-        name: curve for name, curve in character.beside(others, len(living.values)).items() if name not in weights.names
+        name: curve
+        for name, curve in character.weigh_others(others, len(living.values)).items()
+        if name not in weights.names
     }
     beside |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
     rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in beside.values())], axis=1)

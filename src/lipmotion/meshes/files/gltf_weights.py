@@ -18,13 +18,10 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
-from lipmotion.meshes.files.gltf_nodes import place_nodes
+from lipmotion.meshes.files.gltf_document import GltfArrays, GltfDocument, place_nodes, plain_name, read_gltf_document
 from lipmotion.meshes.files.gltf_scene import name_mesh_targets
 from lipmotion.meshes.files.steady_rate import choose_columns, exact_rate
-from lipmotion.meshes.model.bones import HEAD, NECK, bone_kind
-from lipmotion.meshes.model.head_angles import ANGLES, head_angles
+from lipmotion.meshes.model.bones import ANGLES, HEAD, NECK, bone_kind, head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.moods import MOODS

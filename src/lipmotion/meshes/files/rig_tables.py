@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.other_shapes import CLOSED
-from lipmotion.meshes.model.shape_names import ARKIT_52, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
+from lipmotion.meshes.model.shape_names import ARKIT_52, CLOSED, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.sources import is_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
@@ -113,7 +112,7 @@ def suggest_names(name: str, names: Iterable[str]) -> str:
     return f"nearest: {', '.join(near)}" if near else f"there are {shortened(', '.join(known)) or 'none'}"
 
 
-def apply_rig(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
+def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
     """Return the controls of a rig over time, in the order of the table.
 
     sources : curves by name, blendshapes of ARKit, visemes, channels of motion [each shape=(T,)]

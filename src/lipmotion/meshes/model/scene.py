@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.single_sided import drop_back_sides
-from lipmotion.meshes.model.surface import build_surface, compute_normals
+from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion.types import Motion
 
 Array = NDArray[np.float64]

@@ -13,17 +13,15 @@ from lipmotion.articulation.curve_edits import apply_curve_edits
 from lipmotion.articulation.expression import read_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
+from lipmotion.formats.fap import PARAMETERS, move_faps
 from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_rig_table
-from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.facial_animation import PARAMETERS, expression_weights, move_faps
-from lipmotion.meshes.fitting.living_curves import compute_living_curves
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS, weigh_visemes
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
-from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
+from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.other_shapes import CLOSED
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, arkit_name
 from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Timeline, Unit
 from lipmotion.types.staging import Staging
 

@@ -18,11 +18,11 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
+from lipmotion.formats.fap import FAP
 from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.fitting.living_curves import compute_living_curves
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.contact import opening_to_gap
-from lipmotion.meshes.fitting.facial_animation import MOUTH_TO_NOSE, STEPS, move_faps
+from lipmotion.formats.fap import MOUTH_TO_NOSE, STEPS, move_faps
 from meshes.speech import motion, units
 
 
