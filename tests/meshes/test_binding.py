@@ -18,7 +18,7 @@ from lipmotion.meshes.files.binding_files import (
     write_weights,
 )
 from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points
-from lipmotion.meshes.model.binding import MOST_WEIGHTS, bind, paint_weights, skin_vertices
+from lipmotion.meshes.model.binding import MAX_WEIGHTS, bind, paint_weights, skin_vertices
 from meshes.heads import SEAM, SIZE, head, lip_points
 from oracles.skinning import skinned_vertex_by_vertex
 
@@ -44,7 +44,7 @@ def _moved(binding, mesh, chosen, way):
 def test_weights_are_a_share_of_1(binding):
     assert binding.weights.min() >= 0
     assert binding.weights.sum(axis=1).max() <= 1 + 1e-9
-    assert binding.controls.shape[1] <= MOST_WEIGHTS
+    assert binding.controls.shape[1] <= MAX_WEIGHTS
 
 
 def test_the_lower_lip_does_not_drag_the_upper(binding, mesh):

@@ -26,14 +26,14 @@ def test_curves_stay_within_the_tolerance(tolerance: float) -> None:
 
 
 def test_coarser_keys_are_fewer() -> None:
-    counts = [len(Thinning(tolerance).kept(TIME_S, ROWS)) for tolerance in (0.0, 0.003, 0.01, 0.05, 2.0)]
+    counts = [len(Thinning(tolerance).choose(TIME_S, ROWS)) for tolerance in (0.0, 0.003, 0.01, 0.05, 2.0)]
     assert counts == sorted(counts, reverse=True)
     assert (counts[0], counts[-1]) == (300, 2)
-    assert len(EVERY_KEY.kept(TIME_S[:0], ROWS[:0])) == 0
+    assert len(EVERY_KEY.choose(TIME_S[:0], ROWS[:0])) == 0
 
 
 def test_closed_lips_stay_closed() -> None:
-    kept = Thinning(2.0, (0.703, 2.995)).kept(TIME_S, ROWS)
+    kept = Thinning(2.0, (0.703, 2.995)).choose(TIME_S, ROWS)
     assert kept.tolist() == [0, 69, 70, 71, 298, 299]
 
 

@@ -379,7 +379,7 @@ def key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: bool)
     """
     if stepped:
         return sorted({0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values) - 1})
-    return Thinning(tolerance).kept(time_s, values[:, None]).tolist()
+    return Thinning(tolerance).choose(time_s, values[:, None]).tolist()
 
 
 MOST_ITEMS = 1 << 20

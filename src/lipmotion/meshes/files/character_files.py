@@ -22,15 +22,15 @@ from lipmotion.storage.sources import check_kind, is_file
 
 NEUTRAL = "neutral"
 """The file of a folder with this word in its name, in any case, is the mesh; the others are its blendshapes."""
-LEAST_SHARE = 1e-5
+MIN_SHARE = 1e-5
 """Vertices that a blendshape moves by less than this share of the size of the mesh are not stored: OBJ files of one
 head are written with rounded numbers."""
 LARGEST_NUMBER = 1e9
 LARGEST_LIBRARY_BYTES = 1 << 20
-MOST_CORNERS = 1000
+MAX_CORNERS = 1000
 """Most corners of a polygon."""
 LONGEST_LINE = 1 << 16
-LEAST_OPAQUE_LEVEL = 250
+MIN_OPAQUE_LEVEL = 250
 """A texture with pixels of a lower opacity than this, of 255, has holes."""
 _NO_COLOUR = (np.nan,) * 3
 _SHININESS = 60.0
@@ -62,8 +62,8 @@ class _Surface:
     def add(self, kind: bytes, words: list[bytes]) -> None:
         """Add a line. Raises ValueError: it is damaged, or there are too many."""
         if kind == b"f":
-            if not 3 <= len(words) <= MOST_CORNERS:
-                raise InputError(f"a polygon of {len(words)} corners, required 3 to {MOST_CORNERS}")
+            if not 3 <= len(words) <= MAX_CORNERS:
+                raise InputError(f"a polygon of {len(words)} corners, required 3 to {MAX_CORNERS}")
             self.budget.spend("triangles", len(words) - 2)
             if self.here not in self.names:
                 self.budget.spend("parts", 1)
@@ -106,14 +106,14 @@ def read_obj(path: Path) -> Mesh:
             number = line
             surface.add(words[0], words[1:])
         number = 0
-        vertices, uv = _numbers(surface.vertices, 3), _numbers(surface.textures, 2)
-        painted = _numbers(surface.colours, 3, missing=True)
+        vertices, uv = _as_rows(surface.vertices, 3), _as_rows(surface.textures, 2)
+        painted = _as_rows(surface.colours, 3, missing=True)
     except ValueError as error:
         raise _damaged(path, error, number) from error
     if not surface.corners:
         raise InputError(f"{path}: there are no polygons in it, required a mesh; export the surface, not points alone")
     used = {material for _, material in surface.names}
-    materials = _materials(path.parent, surface.library, used, budget)
+    materials = _read_materials(path.parent, surface.library, used, budget)
     part = np.array(surface.parts)
     order = np.argsort(part, kind="stable")
     stops = np.cumsum([0, *np.bincount(part, minlength=len(surface.names))])
@@ -124,8 +124,13 @@ def read_obj(path: Path) -> Mesh:
     textures = np.array(surface.mapped).reshape(-1, 3)[order]
     mapped = np.where(textures[..., None] >= 0, uv[textures], 0.0) if len(uv) else None
     triangles = np.array(surface.corners, np.int32).reshape(-1, 3)[order]
-    colours = _colours(painted, triangles, parts)
-    return Mesh(vertices, triangles, parts, uv=mapped, colours=colours)
+    if not (painted < 1).any():  # none, or all are white, as programs write them that have none
+        return Mesh(vertices, triangles, parts, uv=mapped)
+    colours = painted / 255 if (painted > 1).any() else painted
+    for each in parts:
+        rows = np.unique(triangles[each.first : each.stop])
+        colours[rows[np.isnan(colours[rows, 0])]] = each.material.colour
+    return Mesh(vertices, triangles, parts, uv=mapped, colours=np.clip(np.nan_to_num(colours), 0, 1))
 
 
 def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True) -> Mesh:
@@ -145,47 +150,25 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
     others = [path for path in files if path != neutral[0] and wanted(path.stem)]
     budget = Budget()
     budget.spend("blendshapes", len(others))
-    least = LEAST_SHARE * float(np.ptp(mesh.vertices, axis=0).max())
+    smallest = MIN_SHARE * float(np.ptp(mesh.vertices, axis=0).max())
     shapes = []
     for path in others:
-        vertices = _vertices_of(path)
+        read, places = Budget(), array("d")  # its vertices, without reading its polygons
+        try:
+            for line in _VERTEX.finditer(read.file_bytes(path, "mesh")):
+                read.spend("vertices", 1)
+                _add_vertex(places, line[1].split())
+            vertices = _as_rows(places, 3)
+        except ValueError as error:
+            raise _damaged(path, error) from error
         if vertices.shape != mesh.vertices.shape:
             raise InputError(
                 f"{path}: {len(vertices)} vertices, required {len(mesh.vertices)} as in {neutral[0].name}; "
                 "move other meshes to another folder"
             )
-        shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=least))
+        shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=smallest))
         budget.spend("displacements", len(shapes[-1].rows))
     return replace(mesh, shapes=tuple(shapes))
-
-
-def _colours(
-    painted: NDArray[np.float64], triangles: NDArray[np.int32], parts: tuple[MeshPart, ...]
-) -> NDArray[np.float64] | None:
-    """Return colours of all vertices, 0 to 1 [shape=(V, 3)]; those without one have that of their material.
-
-    None: there are none, or all are white, as programs write them that have none.
-    """
-    if not (painted < 1).any():
-        return None
-    colours = painted / 255 if (painted > 1).any() else painted
-    for part in parts:
-        rows = np.unique(triangles[part.first : part.stop])
-        bare = rows[np.isnan(colours[rows, 0])]
-        colours[bare] = part.material.colour
-    return np.clip(np.nan_to_num(colours), 0, 1)
-
-
-def _vertices_of(path: Path) -> NDArray[np.float64]:
-    """Return the vertices of an OBJ file, without reading its polygons [shape=(V, 3)]."""
-    budget, vertices = Budget(), array("d")
-    try:
-        for line in _VERTEX.finditer(budget.file_bytes(path, "mesh")):
-            budget.spend("vertices", 1)
-            _add_vertex(vertices, line[1].split())
-        return _numbers(vertices, 3)
-    except ValueError as error:
-        raise _damaged(path, error) from error
 
 
 def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
@@ -216,8 +199,8 @@ def _add_vertex(vertices: array[float], words: list[bytes]) -> None:
     vertices.extend(map(float, words[:3]))
 
 
-def _numbers(found: array[float], width: int, *, missing: bool = False) -> NDArray[np.float64]:
-    values = np.array(found).reshape(-1, width)
+def _as_rows(numbers: array[float], width: int, *, missing: bool = False) -> NDArray[np.float64]:
+    values = np.array(numbers).reshape(-1, width)
     if not ((np.abs(values) <= LARGEST_NUMBER) | (missing & np.isnan(values))).all():
         raise ValueError(f"a vertex has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}")
     return values
@@ -235,43 +218,41 @@ def _text(words: list[bytes]) -> str:
     return b" ".join(words).decode("utf-8", "replace")
 
 
-def _materials(folder: Path, library: str, used: Collection[str], budget: Budget) -> dict[str, Material]:
+def _read_materials(folder: Path, library: str, used: Collection[str], budget: Budget) -> dict[str, Material]:
     """Return those materials of an MTL file in a folder that are used; none if there is no such file."""
-    path = _beside(folder, library)
+    path = _find_sibling(folder, library)
     if path is None or path.stat().st_size > LARGEST_LIBRARY_BYTES:
         return {}
-    found: dict[str, Material] = {}
+    materials: dict[str, Material] = {}
     pictures: dict[str, str] = {}
     name = ""
-    for _, words in _lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
-        if words[0] == b"newmtl":
-            name = _text(words[1:])
-            found[name] = Material(name)
-        elif name in found and name in used and len(words) > 1:
-            if words[0] == b"map_Kd":
+    for _, (kind, *words) in _lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
+        if kind == b"newmtl":
+            name = _text(words)
+            materials[name] = Material(name)
+        elif name in materials and name in used and words:
+            if kind == b"map_Kd":
                 pictures[name] = _text(words[-1:])
-            else:
-                found[name] = _with_look(found[name], words)
-    textures = {picture: _texture(folder, picture, budget) for picture in dict.fromkeys(pictures.values())}
-    return {name: _with_texture(found[name], textures.get(pictures.get(name, ""))) for name in found if name in used}
+            elif kind == b"Kd" and len(words) == 3:
+                red, green, blue = (min(max(_number(word), 0.0), 1.0) for word in words)
+                materials[name] = replace(materials[name], colour=(red, green, blue))
+            elif kind == b"Ns" and len(words) == 1:
+                shininess = max(_number(words[0]), 0.0)
+                materials[name] = replace(materials[name], gloss=shininess / (shininess + _SHININESS))
+            elif kind in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
+                materials[name] = replace(materials[name], opacity=min(max(_number(words[-1]), 0.0), 1.0))
+    textures = {picture: _read_texture(folder, picture, budget) for picture in dict.fromkeys(pictures.values())}
+    for name, picture in pictures.items():
+        texture = textures[picture]
+        if texture is not None:
+            clear = bool((texture.pixels[..., 3] < MIN_OPAQUE_LEVEL).any())  # there are holes
+            materials[name] = replace(materials[name], texture=texture, alpha=MASK if clear else OPAQUE)
+    return {name: material for name, material in materials.items() if name in used}
 
 
-def _with_look(material: Material, words: list[bytes]) -> Material:
-    """Return a material with what a line of its library says."""
-    if words[0] == b"Kd" and len(words) == 4:
-        red, green, blue = (min(max(_number(word), 0.0), 1.0) for word in words[1:])
-        return replace(material, colour=(red, green, blue))
-    if words[0] == b"Ns" and len(words) == 2:
-        shininess = max(_number(words[1]), 0.0)
-        return replace(material, gloss=shininess / (shininess + _SHININESS))
-    if words[0] in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
-        return replace(material, opacity=min(max(_number(words[-1]), 0.0), 1.0))
-    return material
-
-
-def _texture(folder: Path, name: str, budget: Budget) -> Texture | None:
+def _read_texture(folder: Path, name: str, budget: Budget) -> Texture | None:
     """Return the texture in a picture in a folder; None, and a warning, where there is none that can be read."""
-    path, texture = _beside(folder, name), None
+    path, texture = _find_sibling(folder, name), None
     if path is not None:
         content = budget.file_bytes(path, "picture")
         budget.spend("bytes of pictures", len(content))
@@ -286,15 +267,7 @@ def _texture(folder: Path, name: str, budget: Budget) -> Texture | None:
     return texture
 
 
-def _with_texture(material: Material, texture: Texture | None) -> Material:
-    """Return a material with a texture; where its pixels are clear, there are holes."""
-    if texture is None:
-        return material
-    clear = bool((texture.pixels[..., 3] < LEAST_OPAQUE_LEVEL).any())
-    return replace(material, texture=texture, alpha=MASK if clear else OPAQUE)
-
-
-def _beside(folder: Path, name: str) -> Path | None:
+def _find_sibling(folder: Path, name: str) -> Path | None:
     """Return the file of a name in a folder; None if there is none, or the name leads elsewhere."""
     return folder / name if name and Path(name).name == name and is_file(folder / name) else None
 

@@ -25,7 +25,7 @@ from lipmotion.types.values import SchemaError
 
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-MOST_CHUNKS = 100
+MAX_CHUNKS = 100
 LONGEST_NAME_CHARACTERS = 1000
 READABLE = {
     *("KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression"),
@@ -86,9 +86,14 @@ def read_gltf_document(path: Path) -> GltfDocument:
     """
     budget = Budget()
     content = memoryview(budget.file_bytes(path, "mesh"))
-    text, binary = _chunks(content) if content[:4] == MAGIC else (content, None)
+    text, binary = _split_chunks(content) if content[:4] == MAGIC else (content, None)
     budget.spend("bytes of a document", len(text))
-    json = _json(bytes(text).rstrip(b"\0 "), budget)
+    plain = bytes(text).rstrip(b"\0 ")
+    budget.spend("values in a document", sum(plain.count(mark) for mark in (b",", b"[", b"{")))
+    try:
+        json: Any = from_json(plain)
+    except ValueError as error:
+        raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
     try:
         version = ASSET(json)["asset"]["version"]
     except SchemaError as error:
@@ -112,6 +117,30 @@ def read_gltf_document(path: Path) -> GltfDocument:
     return document
 
 
+def _split_chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
+    """Return the document and the bytes of a GLB."""
+    if len(content) < 20:
+        raise InputError(f"{len(content)} bytes, required a whole .glb; copy it again")
+    _, version, length = struct.unpack_from("<4sII", content)
+    if version != VERSION:
+        raise InputError(f"a .glb of version {version}, required {VERSION}; export it again")
+    if length > len(content):
+        raise InputError(f"{len(content)} bytes, required {length} as its header says; copy it again")
+    chunks: dict[int, memoryview] = {}
+    position = 12
+    for _ in range(MAX_CHUNKS):
+        if position + 8 > length:
+            break
+        size, kind = struct.unpack_from("<II", content, position)
+        if position + 8 + size > length:
+            raise InputError(f"a part of {size} bytes at {position}, required at most {length - position - 8} bytes")
+        chunks.setdefault(kind, content[position + 8 : position + 8 + size])
+        position += 8 + size + -size % 4
+    if JSON_CHUNK not in chunks:
+        raise InputError("a .glb without a document; export it again")
+    return chunks[JSON_CHUNK], chunks.get(BINARY_CHUNK)
+
+
 def plain_name(name: str) -> str:
     """Return a name, or its beginning, on one line, which UTF-8 can encode."""
     return " ".join(name[:LONGEST_NAME_CHARACTERS].encode("utf-8", "replace").decode().split())
@@ -126,39 +155,6 @@ def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
         file.write(struct.pack("<4sII", MAGIC, VERSION, 28 + len(text) + len(padded)))
         file.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
         file.write(struct.pack("<II", len(padded), BINARY_CHUNK) + padded)
-
-
-def _chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
-    """Return the document and the bytes of a GLB."""
-    if len(content) < 20:
-        raise InputError(f"{len(content)} bytes, required a whole .glb; copy it again")
-    _, version, length = struct.unpack_from("<4sII", content)
-    if version != VERSION:
-        raise InputError(f"a .glb of version {version}, required {VERSION}; export it again")
-    if length > len(content):
-        raise InputError(f"{len(content)} bytes, required {length} as its header says; copy it again")
-    chunks: dict[int, memoryview] = {}
-    position = 12
-    for _ in range(MOST_CHUNKS):
-        if position + 8 > length:
-            break
-        size, kind = struct.unpack_from("<II", content, position)
-        if position + 8 + size > length:
-            raise InputError(f"a part of {size} bytes at {position}, required at most {length - position - 8} bytes")
-        chunks.setdefault(kind, content[position + 8 : position + 8 + size])
-        position += 8 + size + -size % 4
-    if JSON_CHUNK not in chunks:
-        raise InputError("a .glb without a document; export it again")
-    return chunks[JSON_CHUNK], chunks.get(BINARY_CHUNK)
-
-
-def _json(text: bytes, budget: Budget) -> Any:
-    """Return the content of JSON text. Raises InputError: it is damaged, or has too many values."""
-    budget.spend("values in a document", sum(text.count(mark) for mark in (b",", b"[", b"{")))
-    try:
-        return from_json(text)
-    except ValueError as error:
-        raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
 
 
 class GltfArrays:
@@ -208,7 +204,17 @@ class GltfArrays:
         self._document.budget.spend("numbers", count * width)
         dtype = np.dtype(COMPONENTS[accessor["componentType"]])
         values = self._elements(accessor, dtype, count, width)
-        return self._with_sparse(values, accessor["sparse"]) if "sparse" in accessor else values
+        if "sparse" not in accessor:
+            return values
+        few, where = accessor["sparse"]["count"], accessor["sparse"]["indices"]
+        if few > len(values):
+            raise InputError(f"a sparse array changes {few} of {len(values)} elements; export it again")
+        rows = self._elements(where, np.dtype(COMPONENTS[where["componentType"]]), few, 1)[:, 0]
+        if few and rows.max() >= len(values):
+            raise InputError("a sparse array that leads out of its array; export it again")
+        changed = values.copy()
+        changed[rows] = self._elements(accessor["sparse"]["values"], dtype, few, width)
+        return changed
 
     def _elements(self, place: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """Return what an accessor, or a part of a sparse one, places in a view; zeros if it names none."""
@@ -225,17 +231,6 @@ class GltfArrays:
             return np.zeros((0, width), dtype)
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
-    def _with_sparse(self, values: NDArray[Any], sparse: dict[str, Any]) -> NDArray[Any]:
-        count, indices = sparse["count"], sparse["indices"]
-        if count > len(values):
-            raise InputError(f"a sparse array changes {count} of {len(values)} elements; export it again")
-        where = self._elements(indices, np.dtype(COMPONENTS[indices["componentType"]]), count, 1)[:, 0]
-        if count and where.max() >= len(values):
-            raise InputError("a sparse array that leads out of its array; export it again")
-        changed = values.copy()
-        changed[where] = self._elements(sparse["values"], values.dtype, count, values.shape[1])
-        return changed
-
     def _view(self, number: int) -> tuple[memoryview, int]:
         """Return the bytes of a buffer view, and the distance of its elements (0: none apart)."""
         view = self._document.items("bufferViews")[number]
@@ -243,7 +238,7 @@ class GltfArrays:
         if packed is None:
             return self._slice(view), view.get("byteStride", 0)
         if number not in self._decoded:
-            self._decoded[number] = memoryview(_decoded(self._slice(packed), packed, self._document.budget))
+            self._decoded[number] = memoryview(_decode(self._slice(packed), packed, self._document.budget))
         return self._decoded[number], packed["byteStride"]
 
     def _slice(self, view: dict[str, Any]) -> memoryview:
@@ -257,7 +252,7 @@ class GltfArrays:
         return buffer[offset : offset + length]
 
 
-def _decoded(data: memoryview, packed: dict[str, Any], budget: Budget) -> bytes:
+def _decode(data: memoryview, packed: dict[str, Any], budget: Budget) -> bytes:
     count, stride, mode, kind = packed["count"], packed["byteStride"], packed["mode"], packed.get("filter", "NONE")
     budget.spend("compressed bytes", count * stride + len(data))
     if kind not in {"NONE", "EXPONENTIAL"}:
@@ -305,7 +300,19 @@ def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
         node = nodes[number]
         if number in placed or depth > DEEPEST_NESTING:
             raise InputError(f"node {number} is in the scene twice, or too deep; export it again")
-        matrix = parent.matrix @ _local_matrix(node)
+        local = np.eye(4)
+        if "matrix" in node:
+            local = np.array(node["matrix"]).reshape(4, 4).T
+        else:
+            x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+            rotation = [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+            local[:3, :3] = np.array(rotation) * node.get("scale", (1.0, 1.0, 1.0))
+            local[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+        matrix = parent.matrix @ local
         if not np.abs(matrix).max() <= LARGEST_NUMBER:
             raise InputError(f"node {number} is beyond ±{LARGEST_NUMBER:g}, with those that it hangs on; scale it down")
         kind = bone_kind(node.get("name", ""))
@@ -313,19 +320,3 @@ def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
         placed[number] = PlacedNode(matrix, kinds)
         waiting += [(child, placed[number], depth + 1) for child in node.get("children", [])]
     return placed
-
-
-def _local_matrix(node: dict[str, Any]) -> Matrix:
-    if "matrix" in node:
-        return np.array(node["matrix"]).reshape(4, 4).T
-    matrix = np.eye(4)
-    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
-    matrix[:3, :3] = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    ) * node.get("scale", (1.0, 1.0, 1.0))
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return matrix

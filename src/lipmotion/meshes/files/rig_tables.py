@@ -27,7 +27,7 @@ from lipmotion.types.values import number_of
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
 CONTROL = "control"
 """The unit of controls of a user's rig."""
-LARGEST_TABLE_BYTES, MOST_CONTROLS = 1 << 20, 2000
+LARGEST_TABLE_BYTES, MAX_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
 SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
 """The curves that blendshapes of a character may follow; besides, each what its own shape fits best: its own name."""
@@ -65,12 +65,12 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
-    found = table.plain_names
-    if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
-        raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
+    names = table.plain_names
+    if names[:2] != list(COLUMNS[:2]) or not set(names) <= set(COLUMNS):
+        raise InputError(f"{path}: the columns are {shortened(','.join(names))!r}, required {','.join(COLUMNS)}")
     rows = []
     for line, fields in lines:
-        texts = dict.fromkeys(COLUMNS, "") | dict(zip(found, map(from_field, map(str.strip, fields)), strict=False))
+        texts = dict.fromkeys(COLUMNS, "") | dict(zip(names, map(from_field, map(str.strip, fields)), strict=False))
         if texts["control"].startswith("#"):
             continue
         try:
@@ -87,8 +87,8 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
             rows.append(RigRow(texts["control"], texts["source"], **numbers))
         except ValueError as error:
             raise InputError(f"{path}: line {line}: {shortened(str(error))}") from error
-    if not rows or len(rows) > MOST_CONTROLS:
-        raise InputError(f"{path}: {len(rows)} rows, required 1 to {MOST_CONTROLS}")
+    if not rows or len(rows) > MAX_CONTROLS:
+        raise InputError(f"{path}: {len(rows)} rows, required 1 to {MAX_CONTROLS}")
     return tuple(rows)
 
 
@@ -156,7 +156,7 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
     path = table_path(character)
     if not is_file(path):
         return {}
-    found: dict[str, RigRow] = {}
+    table: dict[str, RigRow] = {}
     for row in read_rig_table(path):
         control, source = shortened(row.control), shortened(row.source)
         if row.control not in mesh.shape_names:
@@ -166,18 +166,14 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
             raise InputError(
                 f"{path}: {control!r} follows {source!r}, which is no curve; {suggest_names(row.source, SOURCES)}"
             )
-        if row.control in found:
+        if row.control in table:
             raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")
-        found[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
-    return found
+        table[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
+    return table
 
 
 def with_sources(mesh: Mesh, table: Mapping[str, RigRow]) -> Mesh:
     """Return a mesh whose blendshapes follow the curves of a table; those without a row, what their names say."""
-    shapes = [
-        replace(shape, source=CLOSED_VISEME if table[shape.name].source == CLOSED else table[shape.name].source)
-        if shape.name in table
-        else shape
-        for shape in mesh.shapes
-    ]
+    sources = {name: CLOSED_VISEME if row.source == CLOSED else row.source for name, row in table.items()}
+    shapes = (replace(each, source=sources[each.name]) if each.name in sources else each for each in mesh.shapes)
     return replace(mesh, shapes=tuple(shapes))

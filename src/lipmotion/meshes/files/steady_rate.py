@@ -91,7 +91,8 @@ def even_out_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     passed_s = time_s - time_s[0]
     mean_hz = (len(time_s) - 1) / float(passed_s[-1])
     known_hz = [min(rates, key=lambda usual: abs(usual - mean_hz)) for rates in (USUAL_RATES_HZ, TELEVISION_RATES_HZ)]
-    off, *known_off = (_unevenness(passed_s, hertz) for hertz in (mean_hz, *known_hz))
+    rows_at = np.arange(len(passed_s))  # how far times are from an even grid at most, as a share of a step
+    off, *known_off = (float(np.abs(passed_s * hertz - rows_at).max()) for hertz in (mean_hz, *known_hz))
     if min(off, known_off[0]) <= EVEN_SHARE:
         fits = (hertz for hertz, each in zip(known_hz, known_off, strict=True) if each <= 2 * off + ROUNDING_SHARE)
         return rows, next(fits, round(mean_hz, 6))
@@ -107,11 +108,6 @@ def even_out_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
         )
     grid_s = np.arange(frames) / hertz
     return np.stack([np.interp(grid_s, passed_s, column) for column in rows.T], axis=1), round(hertz, 6)
-
-
-def _unevenness(passed_s: Array, hertz: float) -> float:
-    """Return how far times are from an even grid at most, as a share of a step."""
-    return float(np.abs(passed_s * hertz - np.arange(len(passed_s))).max())
 
 
 def column_key(name: str) -> str:
@@ -152,7 +148,7 @@ def resample_rows(
     (``even_out_rows``). A warning says how many rows each of this was.
     Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
     """
-    ordered = _in_order(time_s)
+    ordered = _find_ordered(time_s)
     time_s, values = time_s[ordered], values[ordered]
     measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
     if not measured.any():
@@ -163,13 +159,23 @@ def resample_rows(
     names = [name for name, there in zip(names, measured, strict=True) if there]
     values = values[:, measured]
     channels = [_channel(name, unit) for name in names]
-    kept = choose_columns([channel.name for channel in channels], values)
-    values, channels = values[:, kept], [channels[column] for column in kept]
+    columns = choose_columns([channel.name for channel in channels], values)
+    values, channels = values[:, columns], [channels[column] for column in columns]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     if not seen.all():
         if not seen.any():
             raise InputError("0 rows with values of all curves, required two or more")
-        _bridge(time_s, values, seen, np.array([channel.unit == WEIGHT for channel in channels]))
+        spans = [f"{time_s[start] - time_s[0]:.2f}–{time_s[stop - 1] - time_s[0]:.2f} s" for start, stop in runs(~seen)]
+        more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
+        LOG.warning(
+            "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",
+            *(int((~seen).sum()), len(seen), ", ".join(spans[:4]), more),
+        )
+        for column in range(values.shape[1]):
+            values[:, column] = np.interp(time_s, time_s[seen], values[seen, column])
+        first, last = np.flatnonzero(seen)[[0, -1]]
+        weights = np.array([channel.unit == WEIGHT for channel in channels])
+        values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
     rows, rate_hz = even_out_rows(time_s, np.concatenate([values, seen[:, None]], axis=1))
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
 
@@ -196,21 +202,7 @@ def choose_columns(names: Sequence[str], values: Array) -> list[int]:
     return sorted(best.values())
 
 
-def _bridge(time_s: Array, values: Array, seen: NDArray[np.bool_], weights: NDArray[np.bool_]) -> None:
-    """Fill rows without a face: straight lines between faces, rest before the first and after the last one."""
-    spans = [f"{time_s[first] - time_s[0]:.2f}–{time_s[last - 1] - time_s[0]:.2f} s" for first, last in runs(~seen)]
-    more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
-    LOG.warning(
-        "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",
-        *(int((~seen).sum()), len(seen), ", ".join(spans[:4]), more),
-    )
-    for column in range(values.shape[1]):
-        values[:, column] = np.interp(time_s, time_s[seen], values[seen, column])
-    first, last = np.flatnonzero(seen)[[0, -1]]
-    values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
-
-
-def _in_order(time_s: Array) -> NDArray[np.bool_]:
+def _find_ordered(time_s: Array) -> NDArray[np.bool_]:
     """Return which rows are later than all before them. Raises InputError: a row goes far back, or too many do."""
     latest = np.maximum.accumulate(time_s)
     back = latest - time_s

@@ -51,12 +51,12 @@ def bone_kind(name: str) -> str | None:
 
 def merge_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
     """Return one bone of each kind: its vertices are those of all bones of this kind, its place that of the first."""
-    found: dict[str, list[Bone]] = {}
+    by_kind: dict[str, list[Bone]] = {}
     for bone in bones:
         if len(bone.rows):
-            found.setdefault(bone.kind, []).append(bone)
+            by_kind.setdefault(bone.kind, []).append(bone)
     merged = []
-    for kind, same in found.items():
+    for kind, same in by_kind.items():
         rows, inverse = np.unique(np.concatenate([bone.rows for bone in same]), return_inverse=True)
         shares = np.zeros(len(rows))
         np.maximum.at(shares, inverse.reshape(-1), np.concatenate([bone.shares for bone in same]))
@@ -72,8 +72,7 @@ ORDER = "YXZ"
 
 
 def head_quaternions(angles: Array) -> Array:
-    """Return the rotations of a head as quaternions x, y, z, w [shape=(T, 4)]; neighbours are less than half a turn
-    apart.
+    """Return rotations of a head as quaternions x, y, z, w [shape=(T, 4)]; neighbours are less than half a turn apart.
 
     angles : of ``ANGLES`` [shape=(T, 3)]
     """

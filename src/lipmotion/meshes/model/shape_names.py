@@ -98,18 +98,18 @@ SIDES = ("Left", "Right")
 OPENS = "jawOpen"
 
 
-def _by_arkit_names(forms: Mapping[str, str]) -> Sources:
+def _invert(forms: Mapping[str, str]) -> Sources:
     """Return the sources of blendshapes, from what each one of another set is made of: ``jawOpen 0.5 …``.
 
     A name that both sides of a face have, as ``mouthSmile``, stands for both.
     """
-    found: dict[str, tuple[tuple[str, float], ...]] = {}
+    sources: dict[str, tuple[tuple[str, float], ...]] = {}
     for name, form in forms.items():
         words = form.split()
         for known, gain in zip(words[::2], words[1::2], strict=True):
             for side in SIDES if known in PAIRED else ("",):
-                found[known + side] = (*found.get(known + side, ()), (name, float(gain)))
-    return found
+                sources[known + side] = (*sources.get(known + side, ()), (name, float(gain)))
+    return sources
 
 
 PAIRED = frozenset(("mouthSmile", "mouthStretch", "mouthPress", "mouthLowerDown", "mouthUpperUp"))
@@ -123,7 +123,7 @@ VOWEL_FORMS = {
     "oh": "jawOpen 0.2 mouthFunnel 0.4 mouthPucker 0.3",
 }
 """The vowels of VRM, which are the あ い う え お of MikuMikuDance, as blendshapes of ARKit."""
-VOWELS = _by_arkit_names({**VOWEL_FORMS, CLOSED: "mouthPress 0.2"})
+VOWELS = _invert({**VOWEL_FORMS, CLOSED: "mouthPress 0.2"})
 VISEME_FORMS = {
     "PP": "mouthPress 0.2",
     "FF": "jawOpen 0.1 mouthRollLower 0.6",
@@ -138,7 +138,7 @@ VISEME_FORMS = {
     **{name: VOWEL_FORMS[name] for name in ("aa", "ih", "oh", "ou")},
 }
 """The visemes of Oculus and OpenXR; silence moves nothing."""
-VISEMES = _by_arkit_names({f"viseme_{name}": form for name, form in VISEME_FORMS.items()})
+VISEMES = _invert({f"viseme_{name}": form for name, form in VISEME_FORMS.items()})
 FACEGOOD: Sources = {
     "jawOpen": (("mouth_stretch_c", 1.0), ("mouth_oh_c", 0.25)),
     "mouthFunnel": (*((f"mouth_funnel_{side}", 0.25) for side in ("dl", "dr", "ul", "ur")), ("mouth_oh_c", 0.5)),
@@ -212,10 +212,10 @@ def convert_to_arkit(motion: Motion) -> dict[str, Array]:
     for table in (FACEGOOD, AUDIO2FACE, VISEMES, VOWELS):
         if not any(source in named for source, _ in table[OPENS]):
             continue
-        found = {}
+        weights = {}
         for known, sources in table.items():
             curves = [gain * motion[named[name]].astype(np.float64) for name, gain in sources if name in named]
             if curves:
-                found[known] = np.asarray(np.sum(curves, axis=0))
-        return found
+                weights[known] = np.asarray(np.sum(curves, axis=0))
+        return weights
     return {}

@@ -98,7 +98,7 @@ def thinned(held: Generation, thinning: Thinning) -> Generation:
         if channel.unit != WEIGHT or np.abs(curve).max(initial=0.0) > thinning.tolerance:
             kept.append(channel.name)
         if channel.unit == WEIGHT and channel.name not in held.stepped:
-            keys = thinning.kept(motion.time_s, curve[:, None])
+            keys = thinning.choose(motion.time_s, curve[:, None])
             values[:, column] = np.interp(motion.time_s, motion.time_s[keys], curve[keys])
     return replace(held, motion=replace(motion, values=values)).selected(kept)
 
