@@ -18,7 +18,7 @@ from lipmotion.corpora.layouts import LRS
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import labels_beside
+from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
@@ -194,10 +194,10 @@ def transcript_beside(video: Path) -> TimedTranscript | None:
 
     Raises InputError: a file of labels cannot be read.
     """
-    transcript = labels_beside(video).transcript
+    transcript = find_labels(video).transcript
     if transcript is None or transcript.has_times:
         return transcript
-    other = labels_beside(video, ignored=frozenset({video.with_suffix(".txt")})).transcript
+    other = find_labels(video, ignored=frozenset({video.with_suffix(".txt")})).transcript
     return other if other is not None and other.has_times else transcript
 
 
@@ -241,7 +241,7 @@ class VideoPart:
 
 def single_video(path: Path) -> RecordingFolder:
     """Return the folder of recordings that one video is. Raises InputError: labels beside it cannot be read."""
-    return RecordingFolder(VIDEO, (SourceRecording(path.stem, path, labels_beside(path).words),))
+    return RecordingFolder(VIDEO, (SourceRecording(path.stem, path, find_labels(path).words),))
 
 
 def divide_long_videos(
