@@ -4,13 +4,13 @@ import pytest
 from hmm.synthetic import random_hmm
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.align import align_units
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of
-from lipmotion.hmm.model import hmm_arrays, hmm_from_arrays
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
+from lipmotion.hmm.model import hmm_from_arrays, hmm_to_arrays
 
 
 def test_models_come_back_from_arrays():
     hmm = random_hmm(1, contexts=5)
-    back = hmm_from_arrays(hmm_arrays(hmm), hmm.config)
+    back = hmm_from_arrays(hmm_to_arrays(hmm), hmm.config)
     assert back.table == hmm.table
     assert back.bigram.units == hmm.bigram.units
     assert np.array_equal(back.log_stay, hmm.log_stay)
@@ -19,21 +19,21 @@ def test_models_come_back_from_arrays():
     assert back.mixtures.log_likelihood(features) == pytest.approx(hmm.mixtures.log_likelihood(features), abs=0.1)
     units = ("sil", "a", "b", "sil")
     assert np.array_equal(
-        align_units(back, log_likelihoods_of(back, features), units),
-        align_units(hmm, log_likelihoods_of(hmm, features), units),
+        align_units(back, compute_log_likelihoods(back, features), units),
+        align_units(hmm, compute_log_likelihoods(hmm, features), units),
     )
 
 
 def test_switched_off_components_stay_off():
     hmm = random_hmm(3)
     hmm.mixtures.log_weights[0] = [0, -np.inf]
-    back = hmm_from_arrays(hmm_arrays(hmm), hmm.config)
+    back = hmm_from_arrays(hmm_to_arrays(hmm), hmm.config)
     assert back.mixtures.log_weights[0].tolist() == [0, -np.inf]
 
 
 def test_a_missing_array_and_one_of_the_wrong_shape_are_a_damaged_model():
     hmm = random_hmm(5, contexts=2)
-    whole = hmm_arrays(hmm)
+    whole = hmm_to_arrays(hmm)
     for name in whole:
         with pytest.raises(ModelFormatError, match=name):
             hmm_from_arrays({other: array for other, array in whole.items() if other != name}, hmm.config)

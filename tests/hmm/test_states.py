@@ -1,6 +1,6 @@
-from lipmotion.hmm.states import plain_states
+from lipmotion.hmm.states import make_plain_states
 
-TABLE = plain_states(("sil", "sp", "b", "ih"), (3, 1, 3, 3), free=("sil", "sp")).extended(("b.0<ih", "b.2>sil"))
+TABLE = make_plain_states(("sil", "sp", "b", "ih"), (3, 1, 3, 3), free=("sil", "sp")).extended(("b.0<ih", "b.2>sil"))
 
 
 def test_names_without_context_come_first_unit_by_unit():
@@ -9,7 +9,7 @@ def test_names_without_context_come_first_unit_by_unit():
 
 def test_states_depend_on_the_nearer_neighbour():
     for count, sides in ((1, [""]), (2, ["<", ">"]), (3, ["<", "", ">"]), (4, list("<<>>"))):
-        table = plain_states(("u",), (count,), free=())
+        table = make_plain_states(("u",), (count,), free=())
         assert [table.side("u", state) for state in range(count)] == sides
 
 

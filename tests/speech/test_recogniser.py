@@ -83,7 +83,7 @@ def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
     hmm: UnitHmm, passage: AnalysedAudio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bounds = np.array([0, 10, 12, 40, 60, passage.frames])
-    monkeypatch.setattr(word_search, "units_of_path", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
+    monkeypatch.setattr(word_search, "decode_path", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
     found = recognise(hmm, passage)
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
     assert covers(found, passage.duration_s)
@@ -201,7 +201,7 @@ def test_noises_are_silence_and_silences_are_one(
 ) -> None:
     bounds = np.array([0, 10, 30, 40, 60, 80, passage.frames])
     labels = ("+spn+", "sil", "aa", "+nsn+", "sil", "+spn+")
-    monkeypatch.setattr(word_search, "units_of_path", lambda *_: (labels, bounds))
+    monkeypatch.setattr(word_search, "decode_path", lambda *_: (labels, bounds))
     found = recognise(hmm, passage, "general")
     assert phones(found) == ["sil", "aa", "sil"]
     assert [span.start_s for span in found] == pytest.approx([0, 0.295, 0.395])

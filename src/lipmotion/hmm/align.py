@@ -37,7 +37,7 @@ class StateSequence:
     positions: NDArray[np.intp]
 
 
-def state_sequence(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
+def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
     """Return the context-dependent states of a unit sequence; beyond its ends lies silence."""
     table, silence = hmm.table, hmm.table.free[0]
     neighbours = [silence, *(silence if unit in table.free else unit for unit in units), silence]
@@ -52,7 +52,7 @@ def state_sequence(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
     return StateSequence(tuple(names), np.array(densities, np.intp), plain, np.array(positions, np.intp))
 
 
-def state_path(
+def align_states(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
     """Return the states of a unit sequence (``StateSequence.names``), and the state of every frame [shape=(T,)].
@@ -60,7 +60,7 @@ def state_path(
     windows : of the units
     Raises AlignmentError: fewer frames than states.
     """
-    chain = state_sequence(hmm, units)
+    chain = expand_states(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
     of_states = None if windows is None else Windows(windows.first[chain.positions], windows.end[chain.positions])
     path = _chain_network(hmm, chain, local).best_path(log_likelihoods, used, windows=of_states)
@@ -75,8 +75,8 @@ def align_units(
     windows : of the units: the frames that each may have
     Raises AlignmentError: fewer frames than states, or none within the windows.
     """
-    _, path = state_path(hmm, log_likelihoods, units, windows)
-    positions = state_sequence(hmm, units).positions[path]
+    _, path = align_states(hmm, log_likelihoods, units, windows)
+    positions = expand_states(hmm, units).positions[path]
     return np.append(np.searchsorted(positions, np.arange(len(units))), log_likelihoods.frames)
 
 
@@ -216,7 +216,7 @@ def _slot_windows(windows: Windows, frames: int) -> Windows:
     return Windows(first, end)
 
 
-def unit_windows(spoken: Sequence[SpokenWord], windows: Windows, frames: int) -> Windows:
+def spread_windows(spoken: Sequence[SpokenWord], windows: Windows, frames: int) -> Windows:
     """Return the windows of all units of words with silences and pauses, from those of the words."""
     of_slots = _slot_windows(windows, frames)
     slots, word = [], -1

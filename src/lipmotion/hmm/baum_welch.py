@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.align import StateSequence, state_sequence
+from lipmotion.hmm.align import StateSequence, expand_states
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.states import StateTable
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
@@ -45,7 +45,7 @@ def baum_welch(
     """
 
     def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
-        mixtures = reestimated_mixtures(model, statistics, data)
+        mixtures = reestimate_mixtures(model, statistics, data)
         return replace(model, mixtures=mixtures, log_stay=statistics.log_stay())
 
     return run_em(
@@ -79,7 +79,7 @@ def adapt_contexts(
     )
 
 
-def reestimated_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
+def reestimate_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
     """Return the densities re-estimated from the statistics (the M-step).
 
     data : all features, whose variance gives the variance floor
@@ -102,7 +102,7 @@ def accumulate_statistics(
     """Return the sufficient statistics of utterances for every state (the E-step). Parameters as ``baum_welch``."""
     statistics = UnitStatistics(hmm)
     states = [sum(hmm.table.count(unit) for unit in sequence) for sequence in sequences]
-    groups = list(batches([len(x) for x in data], states))
+    groups = list(group_by_length([len(x) for x in data], states))
     jobs = (_Batch(hmm, [data[i] for i in batch], [sequences[i] for i in batch]) for batch in groups)
     for batch, (of_utterances, log_likelihood, frames) in zip(
         groups, parallel_map(_batch_statistics, jobs), strict=True
@@ -141,7 +141,7 @@ class UtteranceStatistics:
     weights: NDArray[np.float32]
 
 
-def utterance_statistics(
+def collect_statistics(
     sequence: StateSequence, posterior: NDArray[np.float64], stay: NDArray[np.float64]
 ) -> UtteranceStatistics:
     """Return the statistics of an utterance from its state posteriors [shape=(T, S)].
@@ -155,7 +155,7 @@ def utterance_statistics(
 
 def _batch_statistics(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int]:
     """Return the statistics of each utterance, and the log likelihood and frame count of all that have a path."""
-    hmm, chains = batch.hmm, [state_sequence(batch.hmm, sequence) for sequence in batch.sequences]
+    hmm, chains = batch.hmm, [expand_states(batch.hmm, sequence) for sequence in batch.sequences]
     frames = np.array([len(x) for x in batch.data], np.intp)
     states = np.array([len(chain.densities) for chain in chains], np.intp)
     log_emission = np.zeros((frames.max(), len(chains), states.max()))
@@ -167,14 +167,14 @@ def _batch_statistics(batch: _Batch) -> tuple[list[UtteranceStatistics], float, 
     log_move = np.log(-np.expm1(log_stay))
     posterior, stay, log_likelihood = chain_posteriors(log_emission, log_stay, log_move, frames, states)
     statistics = [
-        utterance_statistics(chain, posterior[: frames[u], u, : states[u]], stay[u, : states[u]])
+        collect_statistics(chain, posterior[: frames[u], u, : states[u]], stay[u, : states[u]])
         for u, chain in enumerate(chains)
     ]
     possible = log_likelihood > LOG_ZERO / 2
     return statistics, float(log_likelihood[possible].sum()), int(frames[possible].sum())
 
 
-def batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
+def group_by_length(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
     """Give the numbers of utterances in batches of similar length.
 
     frames, states : of each utterance
@@ -242,11 +242,11 @@ class UnitStatistics:
         """
         kept = self._stay / np.maximum(self._occupied, 1e-9)
         keep = np.where(self._occupied > 0, kept, np.exp(self._hmm.log_stay))
-        longest = longest_mean_durations(self._hmm.table)[: len(keep)]
+        longest = max_mean_durations(self._hmm.table)[: len(keep)]
         return np.log(np.clip(keep, 0.05, 1 - 1 / longest)).astype(np.float32)
 
 
-def longest_mean_durations(table: StateTable) -> NDArray[np.float64]:
+def max_mean_durations(table: StateTable) -> NDArray[np.float64]:
     """Return the largest mean duration allowed for each state, in frames [shape=(G,)]."""
     units = [name.split(".")[0] for name in table.names]
     return np.array([LONGEST_SILENCE_FRAMES if unit in table.free else LONGEST_STATE_FRAMES for unit in units])

@@ -30,7 +30,7 @@ class UnitLoop:
     entries: frozenset[int]
 
 
-def unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
+def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
     """Return the loop over an inventory, which includes silence (the first free unit).
 
     A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
@@ -59,10 +59,10 @@ def decode_units(
     beam : as in ``Network.best_path``; None: exact
     Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5).
     """
-    return units_of_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
+    return decode_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
 
 
-def units_of_path(loop: UnitLoop, path: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+def decode_path(loop: UnitLoop, path: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units of a path through the loop [shape=(T,)], and their frames as ``decode_units`` does."""
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
     return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)

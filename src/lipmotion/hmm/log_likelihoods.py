@@ -35,7 +35,7 @@ class LogLikelihoods:
         return self.log_density(first, end, None)
 
 
-def log_likelihoods_from(values: NDArray[np.float32]) -> LogLikelihoods:
+def wrap_log_likelihoods(values: NDArray[np.float32]) -> LogLikelihoods:
     """Return the log likelihoods of a recording, or a stretch of one, that were computed [shape=(T, G)]."""
 
     def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
@@ -44,7 +44,7 @@ def log_likelihoods_from(values: NDArray[np.float32]) -> LogLikelihoods:
     return LogLikelihoods(len(values), log_density)
 
 
-def log_likelihoods_of(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
+def compute_log_likelihoods(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
     """Return the log likelihoods of features [shape=(T, D)] under models of the same features."""
     return LogLikelihoods(
         len(features), lambda first, end, chosen: hmm.mixtures.log_likelihood(features[first:end], chosen)

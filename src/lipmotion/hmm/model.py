@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.states import StateTable, plain_states
+from lipmotion.hmm.states import StateTable, make_plain_states
 from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from_arrays
 from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -67,7 +67,7 @@ class UnitHmm:
         return float(self.mixtures.log_likelihood(features, plain).max(axis=1).mean())
 
 
-def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
+def hmm_to_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
     """Serialise the models; the configuration is not included.
 
     precision : of the Gaussians: half precision suffices for recognition, float32 keeps them exactly
@@ -121,6 +121,6 @@ def _check_names(
 ) -> None:
     if not set(free) <= set(units) or len(set(units)) < len(units) or sum(counts) > len(names):
         raise ValueError(f"{len(names)} states of {len(units)} units, {len(free)} of them silent")
-    required = plain_states(units, counts, free).names
+    required = make_plain_states(units, counts, free).names
     if names[: len(required)] != required or len(set(names)) < len(names):
         raise ValueError("the names of the states are not those of the units")

@@ -73,7 +73,7 @@ class StateTable:
         return StateTable(self.units, self.counts, self.names + names, self.free)
 
 
-def plain_states(units: tuple[str, ...], counts: tuple[int, ...], free: tuple[str, ...]) -> StateTable:
+def make_plain_states(units: tuple[str, ...], counts: tuple[int, ...], free: tuple[str, ...]) -> StateTable:
     """Return the table of states without context."""
     names = tuple(f"{unit}.{state}" for unit, count in zip(units, counts, strict=True) for state in range(count))
     return StateTable(units, counts, names, free)

@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, CorpusError
-from lipmotion.hmm.align import StateSequence, choose_pronunciations, state_path, state_sequence
+from lipmotion.hmm.align import StateSequence, align_states, choose_pronunciations, expand_states
 from lipmotion.hmm.baum_welch import (
     UnitStatistics,
     adapt_contexts,
     baum_welch,
-    longest_mean_durations,
-    reestimated_mixtures,
-    utterance_statistics,
+    collect_statistics,
+    max_mean_durations,
+    reestimate_mixtures,
 )
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.loudness import smooth_level
-from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
-from lipmotion.hmm.states import plain_states
+from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays
+from lipmotion.hmm.states import make_plain_states
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import equal_gaussians
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -164,7 +164,7 @@ _CHECKPOINT = "phones"
 
 def _store(checkpoint: Checkpoint, done: int, state: _State) -> None:
     sequences = np.array([" ".join(units) for units in state.sequences])
-    checkpoint.save(_CHECKPOINT, {**hmm_arrays(state.hmm, np.float32), "said": sequences, "done": np.array(done)})
+    checkpoint.save(_CHECKPOINT, {**hmm_to_arrays(state.hmm, np.float32), "said": sequences, "done": np.array(done)})
 
 
 def _restored(checkpoint: Checkpoint, config: HmmConfig) -> tuple[int, _State] | None:
@@ -316,7 +316,7 @@ def _chosen_sequence(
     known = set(hmm.table.units)
     words = [[v for v in variants if set(v) <= known] or variants[:1] for variants in utterance.words]
     try:
-        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), words, inventory.pause)
+        chosen = choose_pronunciations(hmm, compute_log_likelihoods(hmm, utterance.features), words, inventory.pause)
     except AlignmentError:
         return before
     sequence = tuple(unit for word in chosen for unit in word.units)
@@ -334,17 +334,17 @@ def _flat_start(
     silence_and_pause = (inventory.silence, inventory.pause)
     units = (*silence_and_pause, *sorted({u for s in sequences for u in s} - {inventory.silence}))
     counts = tuple(1 if unit == inventory.pause else config.states for unit in units)
-    table = plain_states(units, counts, free=silence_and_pause)
-    log_stay = np.log(1 - 1 / longest_mean_durations(table)).astype(np.float32)
+    table = make_plain_states(units, counts, free=silence_and_pause)
+    log_stay = np.log(1 - 1 / max_mean_durations(table)).astype(np.float32)
     start = equal_gaussians(np.concatenate(data), len(table.names))
     hmm = UnitHmm(config, table, start, log_stay, estimate_bigram(units, []))
     statistics = UnitStatistics(hmm)
     for x, sequence in zip(data, sequences, strict=True):
-        chain = state_sequence(hmm, sequence)
+        chain = expand_states(hmm, sequence)
         posterior = np.zeros((len(x), len(chain.plain)))
         posterior[np.arange(len(x)), _initial_path(x[:, inventory.energy], chain, len(sequence))] = 1
-        statistics.add(x, utterance_statistics(chain, posterior, np.zeros(len(chain.plain))))
-    return replace(hmm, mixtures=reestimated_mixtures(hmm, statistics, data))
+        statistics.add(x, collect_statistics(chain, posterior, np.zeros(len(chain.plain))))
+    return replace(hmm, mixtures=reestimate_mixtures(hmm, statistics, data))
 
 
 def _initial_path(energy: NDArray[np.float32], chain: StateSequence, units: int) -> NDArray[np.intp]:
@@ -380,7 +380,7 @@ def _frequent_contexts(
     frames: Counter[str] = Counter()
     for x, sequence in zip(data, sequences, strict=True):
         if len(x) >= sum(hmm.table.count(unit) for unit in sequence):
-            names, path = state_path(hmm, log_likelihoods_of(hmm, x), sequence)
+            names, path = align_states(hmm, compute_log_likelihoods(hmm, x), sequence)
             frames.update(names[position][0] for position in path)
     frequent = {name for name, count in frames.items() if count >= hmm.config.context_frames}
     return tuple(sorted(frequent - set(hmm.table.names)))

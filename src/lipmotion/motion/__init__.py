@@ -4,12 +4,12 @@ An engine of your own needs ``fit_motion``, ``LearnedMotion`` and perhaps ``fit_
 (docs/extend/engine.md).
 """
 
-from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_arrays, learned_motion_from_arrays
+from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_from_arrays, learned_motion_to_arrays
 from lipmotion.motion.context_window import (
     WINDOW,
     AcousticContext,
-    acoustic_context_arrays,
-    acoustic_context_from,
+    acoustic_context_from_arrays,
+    acoustic_context_to_arrays,
     fit_acoustic_context,
 )
 from lipmotion.motion.fit import fit_motion
@@ -22,13 +22,13 @@ __all__ = [
     "WINDOW",
     "AcousticContext",
     "LearnedMotion",
-    "acoustic_context_arrays",
-    "acoustic_context_from",
+    "acoustic_context_from_arrays",
+    "acoustic_context_to_arrays",
     "dynamics_known",
     "fit_acoustic_context",
     "fit_motion",
-    "learned_motion_arrays",
     "learned_motion_from_arrays",
+    "learned_motion_to_arrays",
     "with_dynamics",
     "with_unit_names",
 ]

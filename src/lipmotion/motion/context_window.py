@@ -71,12 +71,12 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 
 
-def acoustic_context_arrays(context: AcousticContext) -> dict[str, NDArray[Any]]:
+def acoustic_context_to_arrays(context: AcousticContext) -> dict[str, NDArray[Any]]:
     """Serialise a context; the basis is stored at half precision."""
     return {"window": np.stack([context.mean, context.scale]), "window_basis": context.basis.astype(np.float16)}
 
 
-def acoustic_context_from(arrays: CheckedArrays) -> AcousticContext:
+def acoustic_context_from_arrays(arrays: CheckedArrays) -> AcousticContext:
     """Deserialise a context from arrays that were checked against ``WINDOW``.
 
     Raises ValueError: a scale that is not positive, or a column of the basis that is zero.

@@ -73,7 +73,7 @@ class MotionLimits(NamedTuple):
             )
 
 
-def limits_of(poses: NDArray[np.floating]) -> MotionLimits:
+def measure_limits(poses: NDArray[np.floating]) -> MotionLimits:
     """Return the limits of some poses [shape=(N, Q)]."""
     return MotionLimits(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
 

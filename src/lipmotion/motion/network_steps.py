@@ -38,7 +38,7 @@ LONGEST_STEPS = 250
 """Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
 
 
-def between_steps(steps: Array, frames: int, first: int = 0) -> Array:
+def interpolate_steps(steps: Array, frames: int, first: int = 0) -> Array:
     """Return values at time steps of 40 ms [shape=(N, C)] interpolated to frames of 10 ms [shape=(frames, C)].
 
     first : frame of the first time step; those before it have the same values
@@ -53,20 +53,20 @@ def between_steps(steps: Array, frames: int, first: int = 0) -> Array:
     )
 
 
-def spectrum_steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
+def stack_spectrum(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
     """Return the frames around every time step, concatenated [shape=(ceil(T / 4), 160)]; spectrum [shape=(T, 40)]."""
     centres = np.arange(0, len(spectrum), STEP)
     frames = np.clip(centres[:, None] + np.arange(STEP) - STEP // 2, 0, len(spectrum) - 1)
     return spectrum[frames].reshape(len(centres), -1).astype(np.float32)
 
 
-def standard_poses(training: PredictorTraining) -> tuple[Array, Array]:
+def measure_poses(training: PredictorTraining) -> tuple[Array, Array]:
     """Return mean and standard deviation of the measured motion, which standardise it [each shape=(Q,)]."""
     poses = np.concatenate([x[example.valid] for x, example in zip(training.values, training.examples, strict=True)])
     return poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
 
 
-def error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
+def measure_error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
     """Return the variances of the error of static value, Δ and Δ² in the examples [shape=(3, Q)].
 
     predicted : motion of each example [each shape=(T, Q)]
@@ -80,7 +80,7 @@ def error_variances(training: PredictorTraining, predicted: Iterable[Array], sca
     return np.maximum(squares / max(count, 1), 1e-4 * np.square(scale) + 1e-12)
 
 
-def random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> TrainingSequence:
+def cut_random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> TrainingSequence:
     """Return a sequence, or a piece of it from a random place where it is long."""
     excess = len(sequence.inputs) - LONGEST_STEPS
     if excess <= 0:
@@ -243,7 +243,7 @@ class RecurrentShape(NetworkShape[RecurrentNetwork]):
         return initial_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)
 
 
-def checked_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
+def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
     """Return standard deviations of targets, as stored; raise ValueError where one is not more than 0."""
     if not (scale > 0).all():
         raise ValueError(f"{name} with a scale that is not more than 0")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
+from lipmotion.motion.eigenlips import Eigenlips, eigenlips_from_arrays, eigenlips_to_arrays
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.storage.coded_video import decode_pictures, encode_pictures
@@ -42,8 +42,8 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
     Pictures are coded (``storage.coded_video``), which changes them by about one grey level.
     """
     parts = {
-        "mouth": eigenlips_arrays(appearance.mouth),
-        "jaw": eigenlips_arrays(appearance.jaw),
+        "mouth": eigenlips_to_arrays(appearance.mouth),
+        "jaw": eigenlips_to_arrays(appearance.jaw),
         "from_motion": motion_map_arrays(appearance.from_motion),
         "noise": camera_noise_arrays(appearance.noise),
     }

@@ -8,7 +8,7 @@ import pytest
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
-from lipmotion.motion.frame_labels import full_context_states
+from lipmotion.motion.frame_labels import label_full_context
 from lipmotion.stats.tree_regression import fit_tree_regressions, regression_node, ridge, zero_statistics
 from lipmotion.stats.trees import Question, Tree
 from lipmotion.testing.examples import examples
@@ -110,7 +110,7 @@ def error(model, corpus):
         rows = np.array(
             [
                 model.emission.row(p, OPTIONS.layout)
-                for p in full_context_states(one.speech.units, len(one.valid), OPTIONS.layout)
+                for p in label_full_context(one.speech.units, len(one.valid), OPTIONS.layout)
             ]
         )
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))

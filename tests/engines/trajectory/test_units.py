@@ -8,8 +8,8 @@ import pytest
 
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.closure import closable_ranges
-from lipmotion.motion.frame_labels import StateLayout, full_context_states
+from lipmotion.motion.closure import find_closable_ranges
+from lipmotion.motion.frame_labels import StateLayout, label_full_context
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
@@ -83,7 +83,7 @@ def test_phones_of_one_unit_move_alike():
 @named
 def test_lips_meet_on_p_b_m_whatever_their_unit(name):
     result, (_, model) = generated(name), trained(name)
-    spans = closable_ranges(SPOKEN.units, len(result.motion.values))
+    spans = find_closable_ranges(SPOKEN.units, len(result.motion.values))
     assert len(spans) == sum(span.label.phone in LIP_CLOSING for span in SPOKEN.units) == 2
     for span in spans:
         assert result.motion["opening"][span].min() <= model.closure.closed + 1e-9
@@ -91,7 +91,7 @@ def test_lips_meet_on_p_b_m_whatever_their_unit(name):
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
     layout = StateLayout(3, 7, 0.1, unit_set("2vis"))
-    states = full_context_states(timeline(("p", "aa")), 141, layout)
+    states = label_full_context(timeline(("p", "aa")), 141, layout)
     assert {state.unit for state in states} == {"open", "closed"}
     assert {layout.name(state) for state in states if state != layout.rest} == {"speech.0", "speech.1", "speech.2"}
     assert states[0] == states[-1] == layout.rest
@@ -101,7 +101,7 @@ def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
 def test_lips_that_meet_between_others_do_not_rest():
     """All three are units of silence, too, and the part may have the number of silence's middle one."""
     layout = StateLayout(5, 5, 0.1, unit_set("2vis"))
-    assert layout.rest not in full_context_states(timeline(("p", "b", "m")), 150, layout)[60:90]
+    assert layout.rest not in label_full_context(timeline(("p", "b", "m")), 150, layout)[60:90]
 
 
 def table_model(folder: Path) -> tuple[Engine, dict]:

@@ -13,7 +13,7 @@ from lipmotion.hmm.multistream.model import MOTION_ONLY
 from lipmotion.hmm.multistream.multistream_baum_welch import (
     accumulate_statistics,
     prepare_utterances,
-    reestimated_hmm,
+    reestimate_hmm,
     state_posteriors,
 )
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, mean_log_likelihood, train_joint
@@ -105,7 +105,7 @@ def test_a_step_improves_on_what_was_found():
     for _ in range(4):
         expected = accumulate_statistics(hmm, prepared)
         figures.append(expected.mean_log_likelihood)
-        hmm = reestimated_hmm(hmm, expected)
+        hmm = reestimate_hmm(hmm, expected)
     assert (np.diff(figures) > 0).all()
 
 

@@ -12,7 +12,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
-from lipmotion.hmm.multistream.unit_states import TriphoneStates, triphone_states
+from lipmotion.hmm.multistream.unit_states import TriphoneStates, expand_triphones
 from lipmotion.hmm.network import NetworkBuilder
 
 LEAST_SPREAD = 1.0
@@ -51,7 +51,7 @@ def align(
     Raises AlignmentError: fewer frames than states. Raises InputError: an unknown unit, or bounds that do not fit.
     """
     weights = weights or hmm.config.recognition
-    states = triphone_states(hmm.inventory, units)
+    states = expand_triphones(hmm.inventory, units)
     streams = hmm.standardise(observed, weights)
     log_density = hmm.log_density(streams, hmm.leaves(states.triphones), weights)
     chosen = np.arange(len(states.monophones))
@@ -107,7 +107,7 @@ def _best_path(hmm: JointHmm, log_density: NDArray[np.float64], monophones: NDAr
     return builder.build().best_path(log_likelihoods)
 
 
-def measured_durations(
+def measure_durations(
     hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
 ) -> NDArray[np.float64]:
     """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)].
@@ -118,7 +118,7 @@ def measured_durations(
     sums = np.zeros((len(hmm.log_stay), 3))
     for observed, units in utterances:
         active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)
-        if not active or len(triphone_states(hmm.inventory, units).monophones) > observed.frames:
+        if not active or len(expand_triphones(hmm.inventory, units).monophones) > observed.frames:
             continue
         path = align(hmm, observed, units, weights=hmm.config.training)
         frames = np.bincount(path.frames, minlength=len(path.states.monophones)).astype(float)

@@ -14,7 +14,7 @@ from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAM
 from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.stats.bigram import BIGRAM, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
-from lipmotion.stats.trees import TREES, tree_arrays, trees_from_arrays
+from lipmotion.stats.trees import TREES, trees_from_arrays, trees_to_arrays
 from lipmotion.storage.schema import (
     BELOW_ONE,
     NEGATIVE,
@@ -28,7 +28,7 @@ from lipmotion.storage.schema import (
 )
 
 
-def joint_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
+def joint_to_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
     """Serialise a model; its configuration is not included.
 
     precision : of means and variances; float32 keeps them exactly
@@ -49,7 +49,7 @@ def joint_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) 
             "log_weights": model.tied.mixtures.log_weights,
             "means": model.tied.mixtures.means.astype(precision),
             "variances": model.tied.mixtures.variances.astype(precision),
-            **tree_arrays(model.forest.trees),
+            **trees_to_arrays(model.forest.trees),
         }
         if model.tied.voiced is not None:
             of_stream["voiced"] = model.tied.voiced

@@ -204,7 +204,7 @@ def _compact(mixtures: Mixtures) -> Mixtures:
     return Mixtures(np.take_along_axis(mixtures.log_weights, order, axis=1), means, variances)
 
 
-def standard_normal_densities(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> TiedDensities:
+def make_standard_normals(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> TiedDensities:
     """Return equal densities of mean 0 and variance 1, those of the whole standardised stream.
 
     has_spaces : whether frames may be without a value;  voiced : the share of frames with one

@@ -131,7 +131,7 @@ def context_questions(inventory: Inventory, classes: Mapping[str, frozenset[str]
     return tuple(Question(position, name, members) for position in range(3) for members, name in distinct.items())
 
 
-def positions_asked(
+def choose_positions(
     stream: str, inventory: Inventory, unit: str, state: int, *, both_neighbours: bool = False
 ) -> tuple[int, ...]:
     """Return the positions of the context that the tree of a state may ask about (``Question.position``).
@@ -156,7 +156,7 @@ class TreeCosts:
     factor         : price of a leaf, in units of its description length
     least_frames   : frames that a leaf must have
     least_variance : of a leaf's Gaussian, in the scale of the stream
-    both_neighbours : as of ``positions_asked``
+    both_neighbours : as of ``choose_positions``
     """
 
     factor: float
@@ -189,7 +189,7 @@ def grow_forest(
     names = np.array([inventory.tree(context[1], state) for context, state in triphones])
     trees = {}
     for name, (unit, state) in inventory.trees.items():
-        asked = positions_asked(stream, inventory, unit, state, both_neighbours=costs.both_neighbours)
+        asked = choose_positions(stream, inventory, unit, state, both_neighbours=costs.both_neighbours)
         in_tree = np.flatnonzero(names == name)
         contexts, pooled = _pooled([triphones[i][0] for i in in_tree.tolist()], values[in_tree], asked)
         trees[name] = grow_tree(

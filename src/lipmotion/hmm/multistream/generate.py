@@ -57,7 +57,7 @@ class Trajectory:
     log_likelihoods: tuple[float, ...]
 
 
-def densities_of_path(hmm: JointHmm, path: StatePath) -> FrameDensities:
+def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
     """Return the densities of motion in every frame along a path of states.
 
     Raises InputError: the model has no motion, or motion has weight 0 in synthesis.
@@ -70,14 +70,14 @@ def densities_of_path(hmm: JointHmm, path: StatePath) -> FrameDensities:
     return _without_end_dynamics(FrameDensities(log_weights[chosen], means[chosen], precisions[chosen]))
 
 
-def densities_of_posterior(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) -> FrameDensities:
+def average_densities(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) -> FrameDensities:
     """Return one Gaussian for every frame, that of all states together, given their posteriors.
 
     leaves    : of S states in the motion stream [shape=(S,)]
     posterior : of the states in every frame [shape=(T, S)]
     A trajectory that maximises the expected log density needs, in every frame, the expected precision, and the mean
     weighted by precision. The Gaussians of a mixture count by their weights.
-    Raises InputError: as ``densities_of_path``, or the shapes do not fit.
+    Raises InputError: as ``select_densities``, or the shapes do not fit.
     """
     model, weight = _motion_model(hmm)
     if posterior.ndim != 2 or posterior.shape[1] != len(leaves):
@@ -95,10 +95,10 @@ def densities_of_posterior(hmm: JointHmm, leaves: NDArray[np.intp], posterior: A
     return _without_end_dynamics(FrameDensities(np.zeros((len(posterior), 1)), mean, total))
 
 
-def densities_of_paths(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
-    """Return one Gaussian for every frame, that of several equally probable paths (``JointRecogniser.sampled_paths``).
+def average_path_densities(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
+    """Return one Gaussian for every frame, that of several equally probable paths (``JointRecogniser.draw_paths``).
 
-    Raises InputError: as ``densities_of_posterior``, or no paths, or of different lengths.
+    Raises InputError: as ``average_densities``, or no paths, or of different lengths.
     """
     model, _ = _motion_model(hmm)
     if not paths or len({len(path.frames) for path in paths}) > 1:
@@ -107,10 +107,10 @@ def densities_of_paths(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensit
     leaves, local = np.unique(chosen, return_inverse=True)
     posterior = np.zeros((len(paths[0].frames), len(leaves)))
     np.add.at(posterior, (np.arange(len(posterior)), local.reshape(chosen.shape)), 1 / len(paths))
-    return densities_of_posterior(hmm, leaves, posterior)
+    return average_densities(hmm, leaves, posterior)
 
 
-def generate(
+def solve_trajectory(
     densities: FrameDensities, pins: Mapping[tuple[int, int], float] | None = None, iterations: int = ITERATIONS
 ) -> Trajectory:
     """Return the trajectory that is most probable together with its dynamics.
@@ -145,14 +145,14 @@ def _converged(log_likelihoods: Sequence[float], frames: int) -> bool:
     return len(log_likelihoods) > 1 and log_likelihoods[-1] - log_likelihoods[-2] < LEAST_GAIN * frames
 
 
-def single_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
+def merge_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
     """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)].
 
     The Gaussians of a mixture are merged by their posteriors given the most probable trajectory, which EM finds.
     """
     if densities.log_weights.shape[1] == 1:
         return densities.means[:, 0], densities.precisions[:, 0]
-    components = densities.log_components(generate(densities).values)
+    components = densities.log_components(solve_trajectory(densities).values)
     share = np.exp(components - components.max(axis=1, keepdims=True))
     return _merged(densities, share / share.sum(axis=1, keepdims=True))
 

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, batches
+from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
 from lipmotion.hmm.multistream.densities import LEAST_POSTERIOR, GaussianStatistics, TiedDensities
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations
-from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, triphone_states
+from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 
 LEAST_STAY_PROBABILITY = 0.05
@@ -108,7 +108,7 @@ def prepare_utterances(
     index: dict[TriphoneState, int] = {}
     items = []
     for observed, units in utterances:
-        states = triphone_states(hmm.inventory, units)
+        states = expand_triphones(hmm.inventory, units)
         triphones = np.array([index.setdefault(state, len(index)) for state in states.triphones], np.intp)
         distinct, local = np.unique(triphones, return_inverse=True)
         member = np.eye(len(distinct), dtype=np.float32)[local]
@@ -130,7 +130,7 @@ def state_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[
     usable = [i for i, item in enumerate(utterances.items) if item.fits and set(weights.active) & set(item.streams)]
     items = [utterances.items[i] for i in usable]
     counts = [len(item.monophones) for item in items]
-    for batch in batches([item.frames for item in items], counts):
+    for batch in group_by_length([item.frames for item in items], counts):
         frames = np.array([items[i].frames for i in batch], np.intp)
         states = np.array([counts[i] for i in batch], np.intp)
         log_emission = np.zeros((frames.max(), len(batch), states.max()))
@@ -207,7 +207,7 @@ def accumulate_statistics(
     return StreamStatistics(triphones, leaves, stay, occupied, log_likelihood, frames)
 
 
-def reestimated_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
+def reestimate_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
     """Return the models re-estimated from sufficient statistics (the M-step)."""
     floor = hmm.config.variance_floor
     models = {

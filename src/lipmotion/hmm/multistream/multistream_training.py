@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.multistream.align import measured_durations
-from lipmotion.hmm.multistream.densities import fit_scale, standard_normal_densities
+from lipmotion.hmm.multistream.align import measure_durations
+from lipmotion.hmm.multistream.densities import fit_scale, make_standard_normals
 from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest, unit_forest
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
 from lipmotion.hmm.multistream.multistream_baum_welch import (
@@ -21,11 +21,11 @@ from lipmotion.hmm.multistream.multistream_baum_welch import (
     accumulate_statistics,
     max_stay_probability,
     prepare_utterances,
-    reestimated_hmm,
+    reestimate_hmm,
     state_posteriors,
 )
 from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, StreamObservations
-from lipmotion.hmm.multistream.unit_states import Inventory, triphone_states
+from lipmotion.hmm.multistream.unit_states import Inventory, expand_triphones
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import run_em
 from lipmotion.stats.trees import Question
@@ -65,12 +65,12 @@ def train_joint(
     monitor: Monitor = silent_monitor,
     validation: Sequence[TrainingUtterance] = (),
 ) -> JointHmm:
-    """Return models of all streams, trained together: the last of ``growing_joint``, which says what it takes."""
-    *_, hmm = growing_joint(utterances, inventory, classes, config, monitor, validation)
+    """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
+    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, validation)
     return with_durations(hmm, utterances)
 
 
-def growing_joint(
+def grow_joint(
     utterances: Sequence[TrainingUtterance],
     inventory: Inventory,
     classes: Mapping[str, frozenset[str]],
@@ -91,7 +91,7 @@ def growing_joint(
     Raises InputError: an unknown unit, or no stream that is active in training.
     Source: Hofer 2008, §4 and §6; tying by minimum description length as in ``stats.trees``.  Deviations: utterances
     with ``bounds`` start from these, not flat; trees of acoustic streams ask about one neighbour, unless
-    ``both_neighbours`` is set (``forest.positions_asked``).
+    ``both_neighbours`` is set (``forest.choose_positions``).
     """
     hmm, prepared = _start(utterances, inventory, config)
     splits = _doublings(config.mixtures), _doublings(config.motion_mixtures)
@@ -116,7 +116,7 @@ def _start(
     utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig
 ) -> tuple[JointHmm, PreparedUtterances]:
     """Return models without context that were estimated from states of equal length, and the utterances. Raises as
-    ``growing_joint``."""
+    ``grow_joint``."""
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
@@ -136,7 +136,7 @@ def _start(
 
 def with_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> JointHmm:
     """Return models with the durations of states that are measured in the alignment of their training."""
-    return replace(hmm, durations=measured_durations(hmm, [(u.observed, u.units) for u in utterances]))
+    return replace(hmm, durations=measure_durations(hmm, [(u.observed, u.units) for u in utterances]))
 
 
 def _doublings(most: int) -> int:
@@ -156,7 +156,7 @@ def _run_em(hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int,
     def report(step: int, _: JointHmm, statistics: StreamStatistics) -> None:
         monitor(Progress(stage, step, steps, step / steps, statistics.mean_log_likelihood))
 
-    return run_em(hmm, lambda model: accumulate_statistics(model, prepared), reestimated_hmm, steps, report).model
+    return run_em(hmm, lambda model: accumulate_statistics(model, prepared), reestimate_hmm, steps, report).model
 
 
 def _tied(hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question, ...], monitor: Monitor) -> JointHmm:
@@ -171,7 +171,7 @@ def _tied(hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question
             name, hmm.inventory, questions, triphones, statistics[name], has_spaces=has_spaces, costs=costs
         )
         of_leaves = statistics[name].pooled(forest.leaves(triphones), forest.size)
-        untrained = standard_normal_densities(forest.size, len(model.scale.mean), has_spaces)
+        untrained = make_standard_normals(forest.size, len(model.scale.mean), has_spaces)
         models[name] = StreamModel(model.scale, forest, untrained.reestimated(of_leaves, config.variance_floor))
         monitor(Progress("trees", step, len(hmm.models), step / len(hmm.models), float(forest.size)))
     return replace(hmm, models=models)
@@ -214,7 +214,7 @@ def _untrained(
     for name in streams:
         scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
         forest = unit_forest(inventory, spoken_units)
-        tied = standard_normal_densities(forest.size, len(scale.mean), name in F0_STREAMS, known)
+        tied = make_standard_normals(forest.size, len(scale.mean), name in F0_STREAMS, known)
         models[name] = StreamModel(scale, forest, tied)
     sequences = [_without_pauses(utterance.units, inventory) for utterance in utterances]
     log_stay = np.log(max_stay_probability(inventory))
@@ -237,12 +237,12 @@ def _initialised(
     def posteriors() -> Iterator[StatePosteriors]:
         for number, (item, (units, bounds)) in enumerate(zip(prepared.items, starts, strict=True)):
             if item.fits:
-                path = _equal_path(triphone_states(hmm.inventory, units).positions, item.frames, bounds)
+                path = _equal_path(expand_triphones(hmm.inventory, units).positions, item.frames, bounds)
                 posterior = np.zeros((item.frames, len(item.monophones)))
                 posterior[np.arange(item.frames), path] = 1
                 yield StatePosteriors(number, posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
 
-    return reestimated_hmm(hmm, accumulate_statistics(hmm, prepared, posteriors()))
+    return reestimate_hmm(hmm, accumulate_statistics(hmm, prepared, posteriors()))
 
 
 def _equal_path(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:

@@ -16,7 +16,7 @@ from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
-from lipmotion.hmm.multistream.unit_states import triphone_states
+from lipmotion.hmm.multistream.unit_states import expand_triphones
 from lipmotion.hmm.network import NetworkBuilder
 from lipmotion.kernels.paths import sample_paths
 
@@ -61,7 +61,7 @@ class _StateNodes:
         return [int(number) for number in self.numbers[:, self.right[neighbour]]]
 
 
-def context_loop(hmm: JointHmm) -> ContextLoop:
+def build_context_loop(hmm: JointHmm) -> ContextLoop:
     """Return the loop of a model's units with the back-off bigram.
 
     A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
@@ -196,7 +196,7 @@ class JointRecogniser:
         units, starts = decode_units(self._loop.network, self._log_likelihoods(observed), beam)
         return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
-    def sampled_paths(self, observed: StreamObservations, count: int, seed: int) -> list[StatePath]:
+    def draw_paths(self, observed: StreamObservations, count: int, seed: int) -> list[StatePath]:
         """Return ``count`` paths of states, drawn independently from the posterior of all paths.
 
         Memory grows with the frames: 20 kB each, in GRID. Raises as ``recognise``.
@@ -214,7 +214,7 @@ class JointRecogniser:
         """Return a path through the nodes of the loop as a path through the states of its units, one state a node."""
         changes, loop = np.append(True, np.diff(nodes) != 0), self._loop.network
         units = [loop.owners[node] for node in nodes[changes].tolist() if node in loop.entries]
-        return StatePath(triphone_states(self.hmm.inventory, units), np.cumsum(changes) - 1)
+        return StatePath(expand_triphones(self.hmm.inventory, units), np.cumsum(changes) - 1)
 
     @property
     def _weights(self) -> StreamWeights:
@@ -222,7 +222,7 @@ class JointRecogniser:
 
     @cached_property
     def _loop(self) -> ContextLoop:
-        return context_loop(self.hmm)
+        return build_context_loop(self.hmm)
 
     def _log_likelihoods(self, observed: StreamObservations) -> LogLikelihoods:
         streams = self.hmm.standardise(observed, self._weights)

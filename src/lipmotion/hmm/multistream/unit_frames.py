@@ -13,7 +13,7 @@ from lipmotion.hmm.multistream.recognise import RecognisedUnit
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit, frames_of
 
 
-def units_in_frames(
+def units_to_frames(
     units: Timeline[Unit], frames: int, silence: str, unit_of: Callable[[Unit], str] = attrgetter("phone")
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units of a recording, and the first frame of each, with the frame count at the end.
@@ -44,7 +44,7 @@ def units_in_frames(
     return tuple(names), np.array([*firsts, frames], np.intp)
 
 
-def units_in_time(
+def frames_to_units(
     recognised: Sequence[RecognisedUnit], duration_s: float, label_of: Callable[[str], Unit] = Unit
 ) -> Timeline[Unit]:
     """Return recognised units in time: frame n covers (n ± ½) · 10 ms; together they last from 0 s to ``duration_s``.

@@ -94,7 +94,7 @@ class TriphoneStates:
     monophones: NDArray[np.intp]
 
 
-def triphone_states(inventory: Inventory, units: Sequence[str]) -> TriphoneStates:
+def expand_triphones(inventory: Inventory, units: Sequence[str]) -> TriphoneStates:
     """Return the states of a sequence of units. Raises InputError: an unknown unit."""
     contexts = inventory.contexts(units)
     counts = [inventory.count(unit) for unit in units]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.model.shape_names import arkit_name, is_known
-from lipmotion.motion.rest import runs
+from lipmotion.motion.rest import find_runs
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion.types.motion import RADIAN
 
@@ -198,7 +198,9 @@ def strongest_columns(names: Sequence[str], values: Array) -> list[int]:
 
 def _bridge(time_s: Array, values: Array, seen: NDArray[np.bool_], weights: NDArray[np.bool_]) -> None:
     """Fill rows without a face: straight lines between faces, rest before the first and after the last one."""
-    spans = [f"{time_s[first] - time_s[0]:.2f}–{time_s[last - 1] - time_s[0]:.2f} s" for first, last in runs(~seen)]
+    spans = [
+        f"{time_s[first] - time_s[0]:.2f}–{time_s[last - 1] - time_s[0]:.2f} s" for first, last in find_runs(~seen)
+    ]
     more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
     LOG.warning(
         "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",

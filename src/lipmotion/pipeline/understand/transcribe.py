@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, shortened
-from lipmotion.hmm.loudness import frames_above
+from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
 from lipmotion.speech.recognition.anchors import anchors_of, fitted
@@ -94,7 +94,7 @@ def transcribe(
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
-        words = fitted(words, frames_above(analysed(audio, features).log_energy), audio.duration_s)
+        words = fitted(words, find_loud_frames(analysed(audio, features).log_energy), audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
         LOG.warning(
