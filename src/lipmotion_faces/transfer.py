@@ -22,7 +22,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source
 from lipmotion.types import Audio, Example, Motion, Speech, Track
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
@@ -145,7 +145,7 @@ def _takes(
     elif isinstance(opened, Corpus):
         names = _names(opened, where, speaker)
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
-        for index in evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
+        for index in choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
             utterance = opened.utterance(names[index])
             words = " ".join(utterance.words) if utterance.words else None
             yield utterance.name, Request(utterance.audio, words, units=utterance.phones), utterance.track

@@ -24,7 +24,7 @@ from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
-from lipmotion.units import Pronunciation, is_silent, words_in_time, words_of
+from lipmotion.units import Pronunciation, group_words, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.film.filmed_video import write_film
 from lipmotion_faces.filmed.face import FilmedFace
@@ -155,7 +155,7 @@ class OpenLine:
         for step in map(step_of, map(str, steps)):
             if isinstance(step, WordStep):
                 own, text = own_pronunciations(step), step.word if isinstance(step, WordIs | WordSaid) else step.words
-                found |= guesses([word for word in words_of(text) if word not in own], lexicon)
+                found |= guesses([word for word in split_words(text) if word not in own], lexicon)
         return [{"word": word, "phones": list(phones)} for word, phones in found.items()]
 
     @property
@@ -164,7 +164,7 @@ class OpenLine:
         outlook, units = self.file.outlook, self.file.units
         if outlook is None or units is None or outlook.words not in WITH_TRANSCRIPT:
             return ""
-        return " ".join(span.label for span in words_in_time(units) if span.label)
+        return " ".join(span.label for span in group_words(units) if span.label)
 
     def undone(self, revision: int, count: int) -> dict[str, Any]:
         """Take back the last edits; return what moved. Raises as ``edited``."""
@@ -338,7 +338,7 @@ def _said(span: Span[Unit]) -> tuple[str, float, float]:
 def word_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
     """Return the words of phones in time as objects of JSON, with the numbers of their phones, from 1."""
     rows, first, spans = [], 0, list(units)
-    for word in words_in_time(units):
+    for word in group_words(units):
         last = first
         while last + 1 < len(spans) and spans[last + 1].start_s < word.end_s - 1e-9:
             last += 1

@@ -130,9 +130,9 @@ class ProjectReplies:
 
 def _word(given: str) -> str:
     """Return a word as lexicons have it. Raises InputError: it is none, or several."""
-    from lipmotion.units import words_of
+    from lipmotion.units import split_words
 
-    words = words_of(given)
+    words = split_words(given)
     if len(words) != 1:
         raise InputError(f"{given!r} is {len(words)} words, required one")
     return words[0]

@@ -27,7 +27,7 @@ from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
 from lipmotion.types.staging import Staging
-from lipmotion.units import PHONES, Pronunciation, is_silent, words_of
+from lipmotion.units import PHONES, Pronunciation, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion_studio.desk import FAILED, READY, WAITING, WORKING, Desk, NotReadyError, Work
@@ -413,11 +413,11 @@ class Studio:
 def _pronounced(step: Step, own: Mapping[str, Sequence[Pronunciation]]) -> Step:
     """Return an edit of words with the phones of those that a lexicon has; other edits as they are."""
     if isinstance(step, WordIs):
-        words = words_of(step.word)
+        words = split_words(step.word)
         phones = [phone for word in words if word in own for phone in own[word][0]]
         return WordSaid(step.number, step.word, Text(" ".join(phones))) if own.keys() >= {*words} else step
     if type(step) is WordsSaid:  # and not one that brings phones along
-        said = [f"{word} {' '.join(own[word][0])}" for word in dict.fromkeys(words_of(step.words)) if word in own]
+        said = [f"{word} {' '.join(own[word][0])}" for word in dict.fromkeys(split_words(step.words)) if word in own]
         return WordsSaidSo(step.words, step.start_s, step.end_s, Text(", ".join(said))) if said else step
     return step
 

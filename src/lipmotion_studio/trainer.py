@@ -19,7 +19,18 @@ from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.pipeline.workers import begun_apart
 from lipmotion.storage.files import UNFINISHED, make_folder, read_text_file, remove, whole_file, work_folder
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, tupled, value_of, whole
+from lipmotion.types.values import (
+    any_members,
+    as_tuple,
+    items,
+    members,
+    number,
+    one_of,
+    optional,
+    text,
+    value_of,
+    whole,
+)
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
 from lipmotion_studio.folder import ProjectFolder, copy_file, plain_name, restore, write_twice
 from lipmotion_studio.project import ProjectLine
@@ -349,7 +360,7 @@ def _job(job: Mapping[str, Any]) -> TrainingJob:
 
 
 _TEXT, _ANY = text(1 << 20), any_members(lambda value: value)
-_WANTED = {"kind": one_of(KINDS), "name": _TEXT, "lines": tupled(items(whole(0, 1 << 31))), "options": _ANY}
+_WANTED = {"kind": one_of(KINDS), "name": _TEXT, "lines": as_tuple(items(whole(0, 1 << 31))), "options": _ANY}
 _TOLD = {
     **{"state": one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)), "stage": _TEXT, "share": number(0, 1)},
     **{"warnings": items(_TEXT), "skipped": items(_ANY), "error": _TEXT, "report": optional(_ANY)},

@@ -36,7 +36,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import Audio
 from lipmotion.units import PHONES
-from lipmotion.units.phones import phone_edits
+from lipmotion.units.phones import count_phone_edits
 
 TOKENS = ("b", "p", "iː", "uː", "l", "ŋ", "t", "͡", "ʃ", WORD_BOUNDARY, BLANK)
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
@@ -125,8 +125,8 @@ def test_a_sure_word_is_believed_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_forms_of_a_phone_are_the_same() -> None:
-    assert phone_edits(("ax", "b", "el"), ["ah", "b", "l"]) == 0
-    assert phone_edits(("b", "uw"), ["p", "uw", "t"]) == 2
+    assert count_phone_edits(("ax", "b", "el"), ["ah", "b", "l"]) == 0
+    assert count_phone_edits(("b", "uw"), ["p", "uw", "t"]) == 2
 
 
 def test_posteriors_of_phones_sum_to_one() -> None:

@@ -21,7 +21,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
-from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
 from lipmotion.units.phones import SHORT_PAUSE_S
 
 
@@ -216,7 +216,7 @@ def test_speakers_and_words_beyond_all_training(recordings: Path) -> None:
         for name in ("61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav"):
             audio = read_audio(recordings / "speech-open" / name)
             text = (recordings / "speech-open" / name).with_suffix(".txt" if name.endswith("wav") else ".lab")
-            spoken = phones(align(load_model().phones, audio, words_of(text.read_text()), Lexicon(), "general"))
+            spoken = phones(align(load_model().phones, audio, split_words(text.read_text()), Lexicon(), "general"))
             matcher = SequenceMatcher(None, spoken, phones(recognise(load_model().phones, audio, kind)), autojunk=False)
             right += sum(block.size for block in matcher.get_matching_blocks())
             count += len(spoken)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from lipmotion.stats.mixture import SPLIT_STEP, Mixtures, equal_gaussians
+from lipmotion.stats.mixture import SPLIT_STEP, Mixtures, make_equal_gaussians
 
 SEEDS = st.integers(0, 2**32 - 1)
 FLOOR = np.full(3, 1e-3, np.float32)
@@ -83,7 +83,7 @@ def test_one_gaussian_takes_the_weighted_mean_and_variance():
 
 
 def test_variances_stay_above_the_floor():
-    mixtures = equal_gaussians(np.zeros((10, 3), np.float32), 1)
+    mixtures = make_equal_gaussians(np.zeros((10, 3), np.float32), 1)
     floor = np.array([0.1, 0.2, 0.3], np.float32)
     mixtures.em_update(0, np.ones((50, 3), np.float32), np.ones(50, np.float32), floor)
     assert mixtures.variances[0, 0] == pytest.approx(floor)

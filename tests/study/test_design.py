@@ -22,7 +22,7 @@ from lipmotion_studio.study.encoding import encode_shown
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.region import Region
 from lipmotion_studio.study.settings import StudySettings
-from lipmotion_studio.study.sources import condition_of, drawn_job, named_conditions, sentences_of
+from lipmotion_studio.study.sources import condition_of, drawn_job, named_conditions, split_sentences
 
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
 
@@ -169,7 +169,7 @@ def test_conditions_that_are_refused(conditions: list[str], says: str) -> None:
 )
 def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], object], source: str, says: str) -> None:
     prepare(here)
-    said = sentences_of([here / "said"])
+    said = split_sentences([here / "said"])
     if not says:
         assert callable(condition_of(str(here / source), said, drawn_job("portrait", None, "auto")))
         return
@@ -178,7 +178,7 @@ def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], objec
 
 
 def test_recordings_without_pictures_cannot_be_shown() -> None:
-    said = sentences_of([Path("examples/welcome.flac")])
+    said = split_sentences([Path("examples/welcome.flac")])
     with pytest.raises(InputError, match="has no pictures"):
         condition_of("recording", said, drawn_job("portrait", None, "auto"))
 
@@ -196,7 +196,7 @@ def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) 
 
 def test_two_sentences_of_one_name_are_refused(here: Path) -> None:
     with pytest.raises(InputError, match="two sentences are called 'one'"):
-        sentences_of([here / "said", here / "ours" / "one.mp4"])
+        split_sentences([here / "said", here / "ours" / "one.mp4"])
 
 
 @pytest.mark.long

@@ -25,7 +25,7 @@ from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays
 from lipmotion.hmm.states import make_plain_states
 from lipmotion.stats.bigram import estimate_bigram
-from lipmotion.stats.mixture import equal_gaussians
+from lipmotion.stats.mixture import make_equal_gaussians
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Monitor, ParallelMap, Progress
 
@@ -336,7 +336,7 @@ def _flat_start(
     counts = tuple(1 if unit == inventory.pause else config.states for unit in units)
     table = make_plain_states(units, counts, free=silence_and_pause)
     log_stay = np.log(1 - 1 / max_mean_durations(table)).astype(np.float32)
-    start = equal_gaussians(np.concatenate(data), len(table.names))
+    start = make_equal_gaussians(np.concatenate(data), len(table.names))
     hmm = UnitHmm(config, table, start, log_stay, estimate_bigram(units, []))
     statistics = UnitStatistics(hmm)
     for x, sequence in zip(data, sequences, strict=True):

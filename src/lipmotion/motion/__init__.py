@@ -15,7 +15,7 @@ from lipmotion.motion.context_window import (
 from lipmotion.motion.fit import fit_motion
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 
 __all__ = [
     "LEARNED_MOTION_ARRAYS",
@@ -24,11 +24,11 @@ __all__ = [
     "LearnedMotion",
     "acoustic_context_from_arrays",
     "acoustic_context_to_arrays",
-    "dynamics_known",
     "fit_acoustic_context",
     "fit_motion",
     "learned_motion_from_arrays",
     "learned_motion_to_arrays",
+    "mark_known_dynamics",
     "with_dynamics",
     "with_unit_names",
 ]

@@ -21,7 +21,7 @@ from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
-from lipmotion.units import PHONES, SILENCE, VOWELS, is_silent, most_similar_phone, unknown_phone_message
+from lipmotion.units import PHONES, SILENCE, VOWELS, describe_unknown_phone, find_similar_phone, is_silent
 
 
 def unseen_share(voice: float) -> float:
@@ -155,9 +155,9 @@ def trace_articulators(units: Timeline[Unit], frames: int, reliability: Array | 
     for span in units:
         phone, (first, stop) = span.label.phone, frames_of(span, frames)
         if phone and phone not in PHONES:
-            raise InputError(unknown_phone_message(phone, f" at {span.start_s} s"))
+            raise InputError(describe_unknown_phone(phone, f" at {span.start_s} s"))
         if first < stop and phone:
-            row = table[phone if phone in table else most_similar_phone(phone, list(table))]
+            row = table[phone if phone in table else find_similar_phone(phone, list(table))]
             time_s = np.arange(first, stop) / FRAME_RATE_HZ
             third = (time_s - span.start_s) / max(span.duration_s, 1e-9) * len(THIRDS)
             thirds, sure = np.minimum(np.maximum(third.astype(int), 0), len(THIRDS) - 1), relied[first:stop]

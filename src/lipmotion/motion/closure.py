@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Channel, Example, Motion, Timeline, Unit
-from lipmotion.units import closing_phones
+from lipmotion.units import mark_closing_phones
 
 OPENING = "opening"
 REACH_S = 0.02
@@ -56,7 +56,7 @@ def find_closable_ranges(
                     do not; its middle always does
     """
     ranges = []
-    for span, closing in zip(units, closing_phones(units), strict=True):
+    for span, closing in zip(units, mark_closing_phones(units), strict=True):
         label = span.label
         if closing or (not label.phone and label.unit in closing_units):
             inside_s = min(-reach_s, span.duration_s / 2)

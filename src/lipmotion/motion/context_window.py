@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.pca import principal_axes
+from lipmotion.stats.pca import find_principal_axes
 from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
@@ -66,7 +66,9 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     mean = total / count
     covariance = products / count - np.outer(mean, mean)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + LEAST_DEVIATION
-    basis = np.ascontiguousarray(principal_axes(covariance / np.outer(scale, scale), size).T)  # stored in this order
+    basis = np.ascontiguousarray(
+        find_principal_axes(covariance / np.outer(scale, scale), size).T
+    )  # stored in this order
     factor = SCALE / np.sqrt(basis.shape[1])
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 

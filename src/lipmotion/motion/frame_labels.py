@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit, frames_of
-from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone_message
+from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, describe_unknown_phone, is_silent
 
 REST_STATE = -1
 """The number of the one state of the rest pose: silence far from speech."""
@@ -106,7 +106,7 @@ def label_full_context(units: Timeline[Unit], frames: int, layout: StateLayout) 
     """
     for span in units:
         if span.label.phone not in PHONES:
-            raise InputError(unknown_phone_message(span.label.phone, f" at {span.start_s} s"))
+            raise InputError(describe_unknown_phone(span.label.phone, f" at {span.start_s} s"))
     result = [layout.rest] * frames
     away = is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), layout.rest_s)
     for left, span, right in with_neighbours(units):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
-from lipmotion.stats.modulation_spectrum import modulation_spectrum
+from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule
 
@@ -129,7 +129,7 @@ def fit_modulation_filter(
 
 
 def _spectrum(clips: Sequence[NDArray[Any]]) -> tuple[Array, Array]:
-    return modulation_spectrum([clip.astype(float) for clip in clips], FRAME_RATE_HZ)
+    return measure_modulation_spectrum([clip.astype(float) for clip in clips], FRAME_RATE_HZ)
 
 
 def _taps(frequencies: Array, log_gains: Array) -> Array:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, initial_network
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, make_network
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.stats.network_training import (
     LinearMap,
     SequenceNetwork,
@@ -20,7 +20,7 @@ from lipmotion.stats.network_training import (
     TrainingSequence,
     fit_network,
 )
-from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, initial_recurrent_network
+from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, make_recurrent_network
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import Progress
 
@@ -74,7 +74,7 @@ def measure_error_variances(training: PredictorTraining, predicted: Iterable[Arr
     """
     squares, count = np.zeros((3, len(scale))), 0
     for example, x, motion in zip(training.examples, training.values, predicted, strict=True):
-        frames = dynamics_known(example.valid)
+        frames = mark_known_dynamics(example.valid)
         squares += np.square(with_dynamics(x - motion)[frames]).sum(axis=0)
         count += int(frames.sum())
     return np.maximum(squares / max(count, 1), 1e-4 * np.square(scale) + 1e-12)
@@ -204,7 +204,7 @@ class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
         return ConvolutionalNetwork(layers, self.dilations, output)
 
     def initial(self, outputs: int, seed: int) -> ConvolutionalNetwork:  # noqa: D102
-        return initial_network(self.inputs, self.hidden_units, outputs, self.dilations, seed)
+        return make_network(self.inputs, self.hidden_units, outputs, self.dilations, seed)
 
 
 @final
@@ -240,7 +240,7 @@ class RecurrentShape(NetworkShape[RecurrentNetwork]):
         return RecurrentNetwork(layers, output)
 
     def initial(self, outputs: int, seed: int) -> RecurrentNetwork:  # noqa: D102
-        return initial_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)
+        return make_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)
 
 
 def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import SPECTRUM_BANDS, Example, Speech
 
@@ -208,7 +208,7 @@ def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) 
 def _variances(predictions: Sequence[Array], values: Sequence[Array], examples: Sequence[Example]) -> Array:
     """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)]."""
     errors = [
-        with_dynamics(x - predicted)[dynamics_known(example.valid)]
+        with_dynamics(x - predicted)[mark_known_dynamics(example.valid)]
         for predicted, x, example in zip(predictions, values, examples, strict=True)
     ]
     return np.square(np.concatenate(errors)).mean(axis=0) + 1e-12

@@ -51,8 +51,8 @@ from lipmotion.types import (
 )
 from lipmotion.types.generation import SURE_CONFIDENCE
 from lipmotion.types.languages import ENGLISH
-from lipmotion.units import SILENCE, words_in_time
-from lipmotion.units.mood_tags import moods_in_time
+from lipmotion.units import SILENCE, group_words
+from lipmotion.units.mood_tags import time_moods
 
 ModelT = TypeVar("ModelT")
 TRANSCRIPT = "the words that are spoken (--transcript)"
@@ -95,7 +95,7 @@ def generation_of(
     speech, fit = understood.speech, understood.fit
     fits = fit.of_frames(len(speech.features.values)) if fit else 1.0
     knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits)
-    moods = moods_in_time(understood.tags, speech.units)
+    moods = time_moods(understood.tags, speech.units)
     told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
     return replace(told, outlook=outlook_of(request, understood))
 
@@ -260,7 +260,7 @@ def _known_share(request: Request, understood: UnderstoodSpeech) -> float:
     """Return how sure the phones of a transcript are, 0 to 1: 1 for English, less for what is mapped to English."""
     if request.language != ENGLISH:
         return MAPPED_CONFIDENCE
-    said, lexicon = [span.label for span in words_in_time(understood.speech.units)], lexicon_of(request)
+    said, lexicon = [span.label for span in group_words(understood.speech.units)], lexicon_of(request)
     words = [word for word in said if word]
     return sum(map(lexicon.known, words)) / len(words) if is_other_language(words, lexicon) else 1.0
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import COLOURS, COMPONENTS, Eigenlips, fit_eigenlips
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance.camera_noise import CameraNoise, estimate_noise
 from lipmotion_faces.appearance.candidates import (
@@ -230,10 +230,10 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     """
     pictures, light, reference = _in_one_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
-    mouth = fit_eigenlips(mouths[evenly_spaced(TRAINING_PICTURES, len(mouths))], COMPONENTS)
+    mouth = fit_eigenlips(mouths[choose_evenly(TRAINING_PICTURES, len(mouths))], COMPONENTS)
     codes = mouth.project(mouths)
-    around = pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))].mean(axis=0, dtype=np.float32)
-    faces = _jaw_alone(pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))], around, footage.shape)
+    around = pictures[choose_evenly(TRAINING_PICTURES, len(pictures))].mean(axis=0, dtype=np.float32)
+    faces = _jaw_alone(pictures[choose_evenly(TRAINING_PICTURES, len(pictures))], around, footage.shape)
     jaw = fit_eigenlips(faces, JAW_COMPONENTS)
     jaw_codes = np.concatenate(
         [

@@ -21,7 +21,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript, TranscriptLine
-from lipmotion.units.written_forms import readings
+from lipmotion.units.written_forms import list_readings
 from lipmotion_faces.corpus.separate_sound import on_own_time, separate_sound
 from lipmotion_faces.corpus.utterance_spans import SpokenPart, utterance_spans
 from lipmotion_faces.tracking.video_scan import VideoScan, scan_video
@@ -49,7 +49,7 @@ def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
     parts: list[SpokenPart] = []
     for n, line in enumerate(transcript.lines):
         words = [
-            SpokenPart(word.start_s, word.end_s, readings(word.word)[0])
+            SpokenPart(word.start_s, word.end_s, list_readings(word.word)[0])
             for word in line.words
             if word.start_s is not None and word.end_s is not None and word.end_s > word.start_s
         ]
@@ -65,7 +65,7 @@ def _whole_line(line: TranscriptLine, following_s: float | None) -> list[SpokenP
     end_s = following_s if line.end_s is None else line.end_s
     if line.start_s is None or end_s is None or end_s <= line.start_s or not line.words:
         return []
-    return [SpokenPart(line.start_s, end_s, tuple(said for word in line.words for said in readings(word.word)[0]))]
+    return [SpokenPart(line.start_s, end_s, tuple(said for word in line.words for said in list_readings(word.word)[0]))]
 
 
 LOG = logging.getLogger("lipmotion")

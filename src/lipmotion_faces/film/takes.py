@@ -13,7 +13,7 @@ from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.source_recordings import SourceRecording, video_files
 from lipmotion.corpora.store import MANIFEST, Corpus
 from lipmotion.errors import InputError
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion_faces.tracking.frames import VideoSpan
@@ -79,10 +79,10 @@ def _evenly_used(takes: Sequence[Take]) -> list[Take]:
 
     A take that cannot be read may be among them: where it is tracked, the reason is reported.
     """
-    durations_s = [_duration_s(takes[index]) for index in evenly_spaced(MOST_MEASURED_RECORDINGS, len(takes))]
+    durations_s = [_duration_s(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
     longest_s = _longest_s(durations_s)
     mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
-    chosen = evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
+    chosen = choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
     if max(durations_s) <= longest_s:
         return [takes[index] for index in chosen]
     return [_shortened(takes[index], longest_s) for index in chosen]

@@ -22,7 +22,7 @@ from lipmotion_studio.study.sources import (
     condition_of,
     drawn_job,
     named_conditions,
-    sentences_of,
+    split_sentences,
 )
 from lipmotion_studio.study.trials import (
     VideoNumbers,
@@ -62,7 +62,7 @@ def design_study(
         raise InputError(f"a study of the kind {kind!r}, required one of {', '.join(KINDS)}")
     if output.exists():
         raise ExportError(f"{output}: exists; give the name of a new folder")
-    sources, said = named_conditions(conditions), sentences_of(sentences)
+    sources, said = named_conditions(conditions), split_sentences(sentences)
     drawn = drawn_job(settings.face, settings.fps, settings.recogniser)
     makers = {name: condition_of(source, said, drawn) for name, source in sources.items()}
     base = RECORDING if RECORDING in sources else next(iter(sources))

@@ -61,7 +61,7 @@ from lipmotion.types import (
     Timeline,
     Unit,
 )
-from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, unit_set
+from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, load_unit_set
 
 PREFIX = "joint_"
 """Prefix of the names of the arrays of the joint model."""
@@ -164,7 +164,7 @@ class JointEngine(Engine[JointModel]):
 
     def _learning(self, examples: Sequence[Example]) -> _Learning:
         """Return what the joint model is trained on. Raises CorpusError: there is no speech."""
-        units = unit_set(self.config.units)
+        units = load_unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
         utterances = [self._training_utterance(example, x, units) for example, x in zip(examples, values, strict=True)]
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):

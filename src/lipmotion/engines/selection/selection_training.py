@@ -27,7 +27,7 @@ from lipmotion.motion.predictors import PredictorTraining, choose_predictor, loa
 from lipmotion.motion.reliability import rate_phones
 from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import MotionSpace
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Span, Speech, Timeline, Unit, sub_monitor
 from lipmotion.units import SILENCE, is_silent
@@ -211,7 +211,7 @@ def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence
     if len(examples) < 2:
         return found
     for number in np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist():
-        frames = dynamics_known(examples[number].valid)
+        frames = mark_known_dynamics(examples[number].valid)
         if frames.any():
             chosen = _chosen(model, costs, examples[number], costs.inventory.windows.recording == number)
             found.append(_LeftOut(number, frames, chosen))

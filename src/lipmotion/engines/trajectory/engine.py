@@ -34,7 +34,7 @@ from lipmotion.types import (
     Unit,
     option,
 )
-from lipmotion.units import UnitSet, unit_set
+from lipmotion.units import UnitSet, load_unit_set
 
 POSITIVE, ODD = Rule(above=0), Rule(least=1, odd=True)
 
@@ -104,7 +104,7 @@ class TrajectoryConfig(Configuration):
     absent: ClassVar[Mapping[str, Any]] = {"modulation_filter": 0.0}
 
     def check_files(self) -> None:  # noqa: D102
-        unit_set(self.units)
+        load_unit_set(self.units)
         check_predictor(self.predictor)
 
     def layout(self, units: UnitSet) -> StateLayout:
@@ -115,7 +115,7 @@ class TrajectoryConfig(Configuration):
     def training(self) -> TrainingOptions:
         """The options of the training. Raises InputError: no such unit set, or a table with errors."""
         names = {field.name for field in fields(TrainingOptions)} - {"layout"}
-        return TrainingOptions(self.layout(unit_set(self.units)), **{name: getattr(self, name) for name in names})
+        return TrainingOptions(self.layout(load_unit_set(self.units)), **{name: getattr(self, name) for name in names})
 
 
 @final

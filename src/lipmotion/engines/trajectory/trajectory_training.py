@@ -23,11 +23,11 @@ from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.stats.tree_regression import (
     RegressionStatistics,
+    fit_regression_node,
     fit_tree_regressions,
-    regression_node,
     ridge,
     zero_statistics,
 )
@@ -70,7 +70,7 @@ def _owners(emission: Emission, options: TrainingOptions) -> list[_Node | None]:
     least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
     owners: list[_Node | None] = []
     for name, tree in emission.forest.items():
-        owners += [(name, regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
+        owners += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
     return [*owners, None]
 
 
@@ -256,7 +256,7 @@ def training_clip(example: Example, values: Array, layout: StateLayout) -> Train
 
     values : its motion in the motion space [shape=(T, Q)]
     """
-    frames = np.nonzero(dynamics_known(example.valid))[0]
+    frames = np.nonzero(mark_known_dynamics(example.valid))[0]
     states = label_full_context(example.speech.units, len(values), layout)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
     return TrainingClip(example.speech, states, frames, dynamics)

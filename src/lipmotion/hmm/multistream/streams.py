@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 
 SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
@@ -119,7 +119,7 @@ def f0_streams(log_f0: NDArray[np.float64]) -> dict[str, Stream]:
         raise InputError(f"log F0 has shape {log_f0.shape}, required (T,), NaN where there is no voice, never infinite")
     voiced = ~np.isnan(log_f0)
     dynamics = with_dynamics(np.where(voiced, log_f0, 0.0)[:, None])
-    known = (voiced, *[dynamics_known(voiced)] * 2)
+    known = (voiced, *[mark_known_dynamics(voiced)] * 2)
     return {
         name: Stream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
         for window, (name, mask) in enumerate(zip(F0_STREAMS, known, strict=True))
@@ -138,6 +138,6 @@ def motion_stream(motion: NDArray[np.float64], measured: NDArray[np.bool_]) -> S
         raise InputError(
             "motion holds values that are not finite where it was measured; mark these frames as not measured"
         )
-    known = dynamics_known(np.asarray(measured, bool))
+    known = mark_known_dynamics(np.asarray(measured, bool))
     dynamics = with_dynamics(np.where(measured[:, None], motion, 0.0)).reshape(len(motion), -1)
     return Stream(np.where(known[:, None], dynamics, 0.0), known)

@@ -18,7 +18,7 @@ from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_hea
 from lipmotion.storage.files import check_source, read_text_file, whole_file
 from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
 from lipmotion.storage.text_table import read_table
-from lipmotion.types.values import whole_of
+from lipmotion.types.values import parse_whole
 
 BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"
@@ -146,7 +146,7 @@ def read_points(path: Path) -> dict[int, int]:
 
 
 def _whole(path: Path, line: int, text: str) -> int:
-    return whole_of(text, f"{path}: line {line}: the number of a point is")
+    return parse_whole(text, f"{path}: line {line}: the number of a point is")
 
 
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:

@@ -39,7 +39,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
-from lipmotion.units.phones import phone_edits
+from lipmotion.units.phones import count_phone_edits
 
 __all__ = [
     "Transcription",
@@ -207,7 +207,7 @@ def _found_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
             continue
         lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
         runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
-        edits = [(phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
+        edits = [(count_phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
         if edits and min(edits)[0] <= most:
             _, first, end = min(edits)
             words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)

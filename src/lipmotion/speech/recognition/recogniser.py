@@ -45,7 +45,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 )
 from lipmotion.speech.recognition.word_search import WordSearch, begun_decoding, free_labels
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
-from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
+from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
 
 RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
@@ -215,7 +215,7 @@ class Recogniser:
         forms_of = {word: lexicon.spoken_forms(word) for word in set(words)}
         modelled = {PAUSE, *(unit for unit in hmm.table.units if not is_silent(unit))}
         units_of = {
-            word: [tuple(most_similar_phone(phone, modelled) for phone, _ in form) for form in forms]
+            word: [tuple(find_similar_phone(phone, modelled) for phone, _ in form) for form in forms]
             for word, forms in forms_of.items()
         }
         spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)

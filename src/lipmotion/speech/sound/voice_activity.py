@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.hmm.loudness import DECIBEL, LEAST_RANGE, average_power, find_loud_frames, find_sound_runs, smooth_level
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW
 from lipmotion.types import Audio
-from lipmotion.types.audio import sixteen_bits
+from lipmotion.types.audio import to_sixteen_bits
 
 PAUSE_FRAMES = 40
 """Sound with shorter pauses is one stretch."""
@@ -94,7 +94,7 @@ def _cut(stretch: Stretch, log_energy: NDArray[np.float32]) -> list[Stretch]:
 
 def stretch_samples(audio: Audio, stretch: Stretch) -> bytes:
     """Return the samples of a stretch of a recording at 16 kHz, as 16-bit integers."""
-    return sixteen_bits(audio.samples[stretch.first * HOP : stretch.end * HOP]).astype("<i2").tobytes()
+    return to_sixteen_bits(audio.samples[stretch.first * HOP : stretch.end * HOP]).astype("<i2").tobytes()
 
 
 def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:

@@ -24,7 +24,7 @@ from lipmotion.engines.coupled.training.em_steps import (
     m_step,
 )
 from lipmotion.stats.mixture import Mixtures
-from lipmotion.units import most_similar_phone
+from lipmotion.units import find_similar_phone
 
 LEAST_FRAMES = 10
 """A joint state with at least so many frames in training has densities of its own."""
@@ -200,7 +200,7 @@ def _with_borrowed_densities(
             for phone in unit_set.phones(name)
         ]
         if phones:
-            similar = unit_set.unit(most_similar_phone(unit_set.phones(units[unit])[0], phones))
+            similar = unit_set.unit(find_similar_phone(unit_set.phones(units[unit])[0], phones))
             source[state] = structure.state(units.index(similar), position)
     return replace(group, mixtures=group.mixtures.selected(source))
 

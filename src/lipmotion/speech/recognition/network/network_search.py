@@ -29,7 +29,7 @@ from lipmotion.speech.recognition.word_fit import FORMS, align_recognised_words,
 from lipmotion.speech.recognition.word_search import free_labels
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.units import PHONES, Lexicon, Pronunciation, is_silent
-from lipmotion.units.phones import phone_edits
+from lipmotion.units.phones import count_phone_edits
 
 AGREEMENT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.9, 4.1, -2.7
 """Coefficients of the confidence of a word: by the share of its phones that the network finds without words, and the
@@ -148,6 +148,6 @@ def _confidence(
 ) -> float:
     """Return the probability that a word is right, 0 to 1."""
     sure = posteriors.mean_posterior(first, end)
-    agreement = max(1 - phone_edits(variant, found) / max(len(variant), len(found)) for variant in variants)
+    agreement = max(1 - count_phone_edits(variant, found) / max(len(variant), len(found)) for variant in variants)
     score = AGREEMENT_WEIGHT * agreement + POSTERIOR_WEIGHT * sure + CONSTANT
     return float(1 / (1 + np.exp(-score)))
