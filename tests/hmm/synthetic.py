@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.hmm.states import make_plain_states
+from lipmotion.hmm.model import HmmConfig, UnitHmm, make_plain_states
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
@@ -34,7 +33,7 @@ def random_hmm(
             if table.side(unit, state)
         }
     )
-    table = table.extended(tuple(draw.permutation(possible)[:contexts].tolist()))
+    table = table.extend(tuple(draw.permutation(possible)[:contexts].tolist()))
     shape = (len(table.names), 2, 2)
     mixtures = Mixtures(
         np.log(draw.dirichlet((2, 2), shape[0])).astype(np.float32),

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
 from lipmotion.hmm import baum_welch as module
-from lipmotion.hmm import unit_training
-from lipmotion.hmm.align import expand_states
+from lipmotion.hmm.align import align_states, expand_states
 from lipmotion.hmm.baum_welch import accumulate_statistics, adapt_contexts, baum_welch
 from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.unit_training import add_contexts
 from oracles import chains
 
 
@@ -64,7 +64,7 @@ def test_a_high_variance_floor_does_not_break_the_rise():
 
 
 def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
-    monkeypatch.setattr(module, "LEAST_POSTERIOR", 0.0)
+    monkeypatch.setattr(module, "MIN_POSTERIOR", 0.0)
     monkeypatch.setattr(module, "CELLS", 100)
     hmm, draw = random_hmm(1, contexts=6), np.random.default_rng(1)
     said = [("a",), ("sil", "b"), ("a", "sp"), ("b", "a")]
@@ -147,7 +147,7 @@ def coarticulated(count: int):
         x = utterance.features.copy()
         path = expand_states(known_hmm(who), units)
         first = {position for position, unit in enumerate(units) if unit == "a" and units[position - 1] == "d"}
-        nearest = unit_training.align_states(known_hmm(who), compute_log_likelihoods(known_hmm(who), x), units)[1]
+        nearest = align_states(known_hmm(who), compute_log_likelihoods(known_hmm(who), x), units)[1]
         for position in first:
             x[(path.positions[nearest] == position) & (nearest % 3 == 0)] += [0, 0, 1.5, 0]
         data.append(x)
@@ -156,7 +156,7 @@ def coarticulated(count: int):
 
 def in_context(hmm, data, said):
     """Return the models with states in context, and the likelihood before every step of adapting them."""
-    hmm = unit_training._with_contexts(hmm, unit_training._frequent_contexts(hmm, data, said))
+    hmm = add_contexts(hmm, data, said)
     result = adapt_contexts(hmm, data, said, hmm.config.iterations)
     return result.model, result.log_likelihoods
 

@@ -25,7 +25,7 @@ FACE = space("eye_distance", "eye_distance")
 
 def test_reach_is_what_poses_span() -> None:
     assert (REACH.low.tolist(), REACH.high.tolist()) == ([0.0, 0.5], [0.3, 0.6])
-    wide = REACH.extended(np.array([0.1, 0.01]))
+    wide = REACH.extend(np.array([0.1, 0.01]))
     assert wide.low == pytest.approx([-0.3, 0.47])
     assert wide.high == pytest.approx([0.6, 0.63])
 

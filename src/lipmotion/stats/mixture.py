@@ -77,11 +77,11 @@ class Mixtures:
             np.concatenate([self.variances, self.variances], axis=1),
         )
 
-    def selected(self, chosen: NDArray[np.intp]) -> Mixtures:
+    def select(self, chosen: NDArray[np.intp]) -> Mixtures:
         """Return copies of the chosen densities, in the given order."""
         return Mixtures(self.log_weights[chosen], self.means[chosen], self.variances[chosen])
 
-    def concatenated(self, other: Mixtures) -> Mixtures:
+    def concatenate(self, other: Mixtures) -> Mixtures:
         """Return both sets of densities as one; they have equal numbers of components."""
         return Mixtures(
             np.concatenate([self.log_weights, other.log_weights]),

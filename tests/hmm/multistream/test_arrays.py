@@ -4,8 +4,8 @@ import pytest
 from hmm.multistream.synthetic import observed, random_joint
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.multistream.align import align
-from lipmotion.hmm.multistream.arrays import joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.generate import select_densities, solve_trajectory
+from lipmotion.hmm.multistream.model import joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 
 HMM = random_joint(1, ("a", "b", "c"))

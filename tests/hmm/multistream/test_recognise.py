@@ -8,11 +8,10 @@ from kernels.networks import network_posteriors
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import build_unit_loop, decode_units
 from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
-from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm
 from lipmotion.hmm.multistream.recognise import JointRecogniser, build_context_loop
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import expand_triphones
-from lipmotion.hmm.states import StateTable
 from oracles import joint as slow
 from oracles.sequences import sequences
 
@@ -33,7 +32,7 @@ def state_posteriors(recogniser, data):
     """Return the posterior of every state without context in every frame [shape=(T, R)]."""
     loop = build_context_loop(recogniser.hmm)
     log_density = recogniser._log_likelihoods(data).log_density(0, data.frames, None)
-    posteriors, _, _ = network_posteriors(log_density, *loop.network.network.arrays)
+    posteriors, _, _ = network_posteriors(log_density, *loop.network.network)
     result = np.zeros((data.frames, len(recogniser.hmm.inventory.monophones)))
     np.add.at(result.T, loop.monophones, posteriors.T.astype(float))
     return result
@@ -130,7 +129,7 @@ def test_speech_alone_is_the_plain_model():
             leaves.append(model.forest.leaf((context, state)))
     table = StateTable(known.names, tuple(map(known.count, known.names)), tuple(names), known.free)
     config = HmmConfig(bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
-    plain = UnitHmm(config, table, model.tied.mixtures.selected(np.array(leaves)), hmm.log_stay, hmm.bigram)
+    plain = UnitHmm(config, table, model.tied.mixtures.select(np.array(leaves)), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
     rows = model.scale.standardise(data.streams[SPEECH])
     units, bounds = decode_units(

@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.recognise import RecognisedUnit
-from lipmotion.hmm.multistream.unit_frames import frames_to_units, units_to_frames
+from lipmotion.hmm.multistream.unit_states import RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.types import Span, Timeline, Unit
 
 

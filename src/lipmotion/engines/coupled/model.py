@@ -64,7 +64,7 @@ class CoupledModel:
         for stream in self.visual:
             deviation[stream.columns] = stream.deviation[: len(stream.columns)]
         low, high = np.minimum(poses.low, self.rest_pose), np.maximum(poses.high, self.rest_pose)
-        return MotionLimits(low, high).extended(deviation)
+        return MotionLimits(low, high).extend(deviation)
 
     @cached_property
     def motion(self) -> LearnedMotion:

@@ -15,14 +15,12 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.engines.joint.config import JointEngineConfig
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.hmm.multistream.align import StatePath, align
-from lipmotion.hmm.multistream.arrays import joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.generate import average_path_densities, merge_gaussians, select_densities
-from lipmotion.hmm.multistream.model import JointHmm
+from lipmotion.hmm.multistream.model import JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint, with_durations
-from lipmotion.hmm.multistream.recognise import RecognisedUnit, joint_recogniser
+from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, stream_observations
-from lipmotion.hmm.multistream.unit_frames import frames_to_units, units_to_frames
-from lipmotion.hmm.multistream.unit_states import Inventory
+from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.arrays import (
     MOTION_ARRAYS,
@@ -91,7 +89,7 @@ class JointModel:
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of plausible motion."""
-        return self.poses.extended(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
+        return self.poses.extend(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
 
     @cached_property
     def motion(self) -> LearnedMotion:

@@ -68,7 +68,7 @@ class TrajectoryModel:
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of plausible motion."""
-        return self.poses.extended(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
+        return self.poses.extend(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
 
     @cached_property
     def motion(self) -> LearnedMotion:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.log_likelihoods import DensitySelection, LogLikelihoods
-from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.states import StateTable
+from lipmotion.hmm.model import StateTable, UnitHmm
 from lipmotion.speech.recognition.general.acoustic import density_column, general_model
 from lipmotion.speech.recognition.general.language import english_bigram
 from lipmotion.stats.bigram import Bigram

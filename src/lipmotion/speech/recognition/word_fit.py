@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.align import align_states, choose_pronunciations, expand_states
+from lipmotion.hmm.align import align_states, choose_pronunciations
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.recognition.combined_phones import NOISES
@@ -75,8 +75,7 @@ def align_recognised_words(
     }
     spoken = choose_pronunciations(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
     sequence = [unit for item in spoken for unit in item.units]
-    _, path = align_states(hmm, log_likelihoods, sequence)
-    states = expand_states(hmm, sequence)
+    states, path = align_states(hmm, log_likelihoods, sequence)
     phones = [(phone, item.word) for item in spoken for phone in (
         variants[words[item.word]][item.variant] if item.word >= 0 else item.units)]  # fmt: skip
     bounds = np.searchsorted(states.positions[path], np.arange(len(sequence) + 1)).astype(np.intp)

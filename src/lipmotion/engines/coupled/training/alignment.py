@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product
 from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.hmm.multistream.unit_frames import units_to_frames
+from lipmotion.hmm.multistream.unit_states import units_to_frames
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
 from lipmotion.units import SILENCE
