@@ -20,8 +20,8 @@ from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
-from lipmotion_faces.tracking.landmarks import LIP_POINTS
 from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.trackers import LIP_POINTS
 
 Source = str | Path | Motion | Track | Generation
 Array = NDArray[np.float64]
@@ -190,7 +190,7 @@ def _channel_figures(
         "jerk": curves.jerk_ratio(generated, reference),
         "modulation_db": modulation_distance_db(generated, reference, rate_hz),
     }
-    moves = curves.moving(reference, [channel.unit for channel in channels])
+    moves = curves.select_moving(reference, [channel.unit for channel in channels])
     rows = {
         channel.name: {
             "unit": channel.unit,

@@ -11,7 +11,7 @@ from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.storage.media import has_video, open_media, video_streams
 from lipmotion_faces.outputs.drawn_video import read_sound
-from lipmotion_faces.tracking.footage import untracked_frames
+from lipmotion_faces.tracking.footage import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
 
 PLAYED = {
@@ -89,6 +89,6 @@ def write_playable(video: Path, sound: Path, path: Path) -> None:
 
     Raises ExportError: it cannot be written.
     """
-    frames, rate_hz = untracked_frames(video)
+    frames, rate_hz = read_video_frames(video)
     even = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame in frames)
     write_mp4(path, even, fps=rate_hz, audio=read_sound(sound))

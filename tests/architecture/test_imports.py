@@ -48,7 +48,7 @@ FORBIDDEN = [
     (
         "Tracking knows trackers by their interface alone",
         "lipmotion_faces/tracking/track.py",
-        "from lipmotion_faces.tracking import face_mesh",
+        "from lipmotion_faces.tracking import mediapipe",
     ),
     (TRACKING, "lipmotion/pipeline/training/train.py", "import cv2"),
     (NUMBA, "lipmotion/stats/mixture.py", "def late():\n    import numba"),
