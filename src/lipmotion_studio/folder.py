@@ -24,9 +24,10 @@ from lipmotion.pipeline.batch.lines import is_recording, read_lines
 from lipmotion.pipeline.edit_files import EditFile, check_sound, read_edits, write_edits
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import (
+    atomic_file,
+    create_folders,
     is_link,
-    locked,
-    made_folders,
+    lock_folder,
     make_folder,
     portable_name,
     read_text_file,
@@ -34,7 +35,6 @@ from lipmotion.storage.files import (
     remove_unfinished,
     sha256_of,
     sound_reference,
-    whole_file,
 )
 from lipmotion.storage.json_text import as_json, as_json_rows, from_json
 from lipmotion.types.languages import AUTO, ENGLISH
@@ -224,7 +224,7 @@ class ProjectFolder:
     def write_edits(self, line: ProjectLine, file: EditFile) -> None:
         """Write a line's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
         path, copy = self.edits(line), self._copy(line)
-        with self.lock, made_folders([path.parent, copy.parent]):
+        with self.lock, create_folders([path.parent, copy.parent]):
             write_twice(path, copy, lambda first: write_edits(file, first))
             self._summaries[line.number] = self._written(line), summary_of(file)
 
@@ -243,7 +243,7 @@ class ProjectFolder:
             file = replace(file, sha256=digest)
             self.write_edits(line, file)
         elif not copy.exists() or copy.read_bytes() != path.read_bytes():  # others may have edited it
-            with self.lock, made_folders([copy.parent]):
+            with self.lock, create_folders([copy.parent]):
                 copy_file(path, copy)
         return file
 
@@ -306,7 +306,7 @@ class ProjectFolder:
         """Write the project. Raises ExportError: it cannot be written."""
         with self.lock:
             text = as_json_rows(project_document(self.project), ensure_ascii=False)
-            with whole_file(self.path / PROJECT) as temporary:
+            with atomic_file(self.path / PROJECT) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
@@ -350,7 +350,7 @@ class ProjectFolder:
             line = self._named(line, taken)
             line = replace(line, sound=f"{SOUNDS}/{line.name}{suffix}")
             check_lines(self.project.with_lines([line]))
-            with whole_file(self.sound(line)) as temporary:
+            with atomic_file(self.sound(line)) as temporary:
                 content.replace(temporary)
             self.change(lambda project: project.with_lines([line]))
             return line.number
@@ -404,7 +404,7 @@ class ProjectFolder:
         """Write a vote behind those that were cast before; return all. Raises InputError, ExportError: not possible."""
         with self.lock:
             votes = (*read_votes(self.path / VOTES), vote)
-            with whole_file(self.path / VOTES) as temporary:
+            with atomic_file(self.path / VOTES) as temporary:
                 temporary.write_text(votes_text(votes), encoding="utf-8")
             return votes
 
@@ -428,7 +428,7 @@ class ProjectFolder:
             known = self.lexicon().user
             user = {**known, word: tuple(dict.fromkeys((phones, *known.get(word, ()))))}
             rows = [f"{each} {' '.join(variant)}\n" for each, variants in sorted(user.items()) for variant in variants]
-            with whole_file(self.path / LEXICON) as temporary:
+            with atomic_file(self.path / LEXICON) as temporary:
                 temporary.write_text("".join(rows), encoding="utf-8")
 
 
@@ -477,7 +477,7 @@ def opened_folder(source: Path | None, out: Path | None = None) -> Iterator[Proj
     """
     path = folder_for(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
-    with locked(path):
+    with lock_folder(path):
         remove_unfinished(path)  # what was dropped on a studio that was killed
         folder = ProjectFolder(path)
         if recordings is not None:
@@ -493,7 +493,7 @@ def _key(name: str) -> str:
 
 def copy_file(source: Path, target: Path) -> None:
     """Copy a file, whole or not at all. Raises ExportError: it cannot be written."""
-    with whole_file(target) as temporary:
+    with atomic_file(target) as temporary:
         shutil.copyfile(source, temporary)
 
 
@@ -509,7 +509,7 @@ def write_twice(path: Path, copy: Path, write: Callable[[Path], object]) -> None
 
 def restore(path: Path, copy: Path) -> None:
     """Put a copy in the place of a damaged file, which stays beside it under another name. Raises ExportError."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         shutil.copyfile(copy, temporary)
         if path.exists():
             path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
+from lipmotion.pipeline.analysis.transcribe import guesses
 from lipmotion.pipeline.edit_files import EditFile
-from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, step_of
+from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, parse_step
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
-from lipmotion.pipeline.session import own_pronunciations
-from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
-from lipmotion.pipeline.understand.transcribe import guesses
+from lipmotion.pipeline.session import read_pronunciations
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
 from lipmotion.units import Pronunciation, is_silent, words_in_time, words_of
@@ -79,7 +79,7 @@ class OpenLine:
         asked = replace(read_request(file.named), onto=onto) if onto is not None else None
         self.session = file.session(asked, model=model, audio=audio)
         self._pictures = SessionPictures(self.session)
-        self.session.generated(file.edits)
+        self.session.generate(file.edits)
 
     def moved_by(self, model: Model, onto: FilmedFace | None) -> OpenLine:
         """Return the line with its edits as another model moves it, or mapped onto another person; it is only read.
@@ -102,12 +102,12 @@ class OpenLine:
     def generation(self) -> Generation:
         """The motion with all edits, but for its delivery."""
         with self._view():
-            return self.session.generated(self.file.edits)
+            return self.session.generate(self.file.edits)
 
     @property
     def _delivered(self) -> Motion:
         with self._view():
-            return self.session.delivered(self.file.edits).motion
+            return self.session.deliver(self.file.edits).motion
 
     def _view(self, *, settled: bool | None = None) -> AbstractContextManager[None]:
         """Return what motion is asked for within; ``settled``: None: as it is."""
@@ -150,11 +150,11 @@ class OpenLine:
 
     def _guessed(self, steps: tuple[str | Step, ...]) -> list[dict[str, Any]]:
         """Return the words of edits whose pronunciation is a guess, with it, as objects of JSON."""
-        lexicon = lexicon_of(self.session.request)
+        lexicon = read_lexicon(self.session.request)
         found: dict[str, Pronunciation] = {}
-        for step in map(step_of, map(str, steps)):
+        for step in map(parse_step, map(str, steps)):
             if isinstance(step, WordStep):
-                own, text = own_pronunciations(step), step.word if isinstance(step, WordIs | WordSaid) else step.words
+                own, text = read_pronunciations(step), step.word if isinstance(step, WordIs | WordSaid) else step.words
                 found |= guesses([word for word in words_of(text) if word not in own], lexicon)
         return [{"word": word, "phones": list(phones)} for word, phones in found.items()]
 
@@ -191,7 +191,7 @@ class OpenLine:
         """
         before, settled = self._delivered, self.audio.duration_s <= LONG_S
         with self._view(settled=settled):
-            after = self.session.delivered(file.edits).motion
+            after = self.session.deliver(file.edits).motion
         is_other = file.edits.steps != self.file.edits.steps or file.undone != self.file.undone
         if is_other or keeps:
             with self.folder.changing(self.number, revision) as line:
@@ -232,7 +232,7 @@ class OpenLine:
         if of == "variance":
             return replace(generation.motion, values=generation.variance)
         if of == "confidence":
-            return Motion(confidence_of(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
+            return Motion(score_words(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
         return generation.motion
 
     def weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
@@ -349,7 +349,7 @@ def word_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
     return rows
 
 
-def confidence_of(generation: Generation) -> NDArray[np.float64]:
+def score_words(generation: Generation) -> NDArray[np.float64]:
     """Return how sure each frame is; 1 where it is not known."""
     found = generation.confidence
     return np.ones(len(generation.motion.values)) if found is None else found
@@ -357,7 +357,7 @@ def confidence_of(generation: Generation) -> NDArray[np.float64]:
 
 def doubts_of(generation: Generation) -> list[dict[str, Any]]:
     """Return the phones that are said, by the mean confidence of their frames, the least sure first."""
-    sure, hertz = confidence_of(generation), generation.motion.rate_hz
+    sure, hertz = score_words(generation), generation.motion.rate_hz
     rows = []
     for number, span in enumerate(generation.units, 1):
         frames = sure[int(span.start_s * hertz) : max(int(span.end_s * hertz), int(span.start_s * hertz) + 1)]
@@ -367,7 +367,7 @@ def doubts_of(generation: Generation) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row["confidence"])[:MOST_SHOWN_DOUBTS]
 
 
-def doubt_of(generation: Generation) -> float:
+def rate_doubt(generation: Generation) -> float:
     """Return the mean doubt of a line's speech, 0 to 1; of a line without speech 1."""
     rows = doubts_of(generation)
     return 1.0 - float(np.mean([row["confidence"] for row in rows])) if rows else 1.0

@@ -8,7 +8,7 @@ from functools import partial
 from hashlib import sha256
 from typing import Any
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
 from lipmotion.types.values import (
@@ -29,7 +29,7 @@ from lipmotion.types.values import (
 
 FORMAT, VERSION = "lipmotion.project", 1
 NO_MARK, APPROVED, REDO = MARKS = ("none", "approved", "redo")
-MOST_LINES, LONGEST_TEXT = 100_000, 1 << 24
+MAX_LINES, LONGEST_TEXT = 100_000, 1 << 24
 MOST_VERSIONS = 100
 """Versions that are kept of a line."""
 EDITS_SUFFIX = "edits.json"
@@ -109,7 +109,7 @@ class ProjectLine:
 
     def __post_init__(self) -> None:
         if self.mark not in MARKS:
-            raise InputError(f"the mark is {shortened(repr(self.mark))}, required one of: {', '.join(MARKS)}")
+            raise InputError(f"the mark is {shorten(repr(self.mark))}, required one of: {', '.join(MARKS)}")
 
     def with_version(self, steps: tuple[str, ...]) -> ProjectLine:
         """Return the line with a version of these edits; as it is, where there is one. Raises InputError: too many."""
@@ -131,7 +131,7 @@ class ProjectLine:
             if version.name == name:
                 return version
         known = ", ".join(version.name for version in self.versions) or "nothing: none is kept"
-        raise InputError(f"no version {shortened(repr(name))} of the line, required one of: {known}")
+        raise InputError(f"no version {shorten(repr(name))} of the line, required one of: {known}")
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,8 @@ class Project:
 
 def check_lines(project: Project) -> None:
     """Raise InputError or ExportError if two lines have one name, or one lies outside the folder of the project."""
-    if len(project.lines) > MOST_LINES:
-        raise InputError(f"{len(project.lines)} lines, required at most {MOST_LINES} in a project; divide it")
+    if len(project.lines) > MAX_LINES:
+        raise InputError(f"{len(project.lines)} lines, required at most {MAX_LINES} in a project; divide it")
     check_names((BatchLine(line.name, line.sound) for line in project.lines.values()), (EDITS_SUFFIX,))
 
 

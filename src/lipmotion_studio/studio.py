@@ -14,15 +14,15 @@ from uuid import uuid4
 
 from starlette.exceptions import HTTPException
 
-from lipmotion.errors import InputError, LipMotionError, shortened
+from lipmotion.errors import InputError, LipMotionError, shorten
 from lipmotion.extensions import installed_version
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
-from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
+from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, parse_step
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
-from lipmotion.storage.files import TEMPORARY, made_folders, remove, sha256_of, temporary_folder
+from lipmotion.storage.files import TEMPORARY, create_folders, remove, sha256_of, temporary_folder
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
@@ -91,7 +91,7 @@ class Studio:
         status, mark : only lines with these; empty: all
         """
         if order not in ORDERS:
-            raise InputError(f"order is {shortened(repr(order))}, required doubt, or nothing")
+            raise InputError(f"order is {shorten(repr(order))}, required doubt, or nothing")
         with self.folder.lock:
             project, revision = self.folder.project, self.folder.revision
         lines = [
@@ -172,7 +172,7 @@ class Studio:
         """Return path and model of a voice. Raises InputError: none of that name. Others as ``load_model``."""
         known = self.voices()
         if name not in known:
-            raise InputError(f"no voice {shortened(repr(name))}; required one of: {', '.join(filter(None, known))}")
+            raise InputError(f"no voice {shorten(repr(name))}; required one of: {', '.join(filter(None, known))}")
         file = Path(os.path.normpath(self.folder.path / known[name])) if known[name] else None
         return known[name], known_model(file)
 
@@ -241,7 +241,7 @@ class Studio:
 
         Raises InputError: a sentence is no edit.
         """
-        steps = [step_of(sentence) for sentence in sentences]
+        steps = [parse_step(sentence) for sentence in sentences]
         if not any(isinstance(step, WordIs | WordsSaid) for step in steps):
             return tuple(steps)
         own = self.folder.lexicon().user
@@ -374,7 +374,7 @@ class Studio:
         copy = out / f"{line.name}.{EDITS_SUFFIX}"
         files = tuple(str(out / f"{line.name}{suffix}") for suffix in preset.files)
         file = replace(self.folder.read_edits(line), undone=(), sha256=line.sha256)
-        with made_folders([copy.parent]):
+        with create_folders([copy.parent]):
             write_edits(file, copy)
             request = replace(file.named, recording=self.folder.checked_sound(line), edits=copy)
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)

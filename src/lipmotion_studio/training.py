@@ -17,13 +17,13 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.registry import DEFAULT
 from lipmotion.errors import InputError, LipMotionError
-from lipmotion.extensions import provided
+from lipmotion.extensions import load_provided
 from lipmotion.formats.label_files import label_files_beside
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, train
-from lipmotion.storage.files import confined, made_folders, remove, unfinished_work, whole_file
+from lipmotion.storage.files import atomic_file, confine, create_folders, remove, unfinished_work
 from lipmotion.types import Item, Monitor, Progress, sub_monitor
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.units import Lexicon
@@ -99,7 +99,7 @@ def carry_out(order: TrainingOrder, tell: Tell) -> None:
     handler = _Teller(tell)
     LOG.addHandler(handler)
     try:
-        with confined(order.work.parent):  # the project, in this process
+        with confine(order.work.parent):  # the project, in this process
             tell({"report": _made(order, partial(_report, tell))})
     except (LipMotionError, OSError) as error:
         tell({"error": str(error)})
@@ -129,7 +129,7 @@ def _report(tell: Tell, event: Progress | Item) -> None:
 
 def _made(order: TrainingOrder, monitor: Monitor) -> dict[str, Any]:
     begun_s = time.monotonic()
-    with made_folders([order.target.parent, order.work]), _gathered(order) as recordings:
+    with create_folders([order.target.parent, order.work]), _gathered(order) as recordings:
         made = _voice(order, recordings, monitor) if order.kind == VOICE else _face(order, recordings, monitor)
     return {"kind": order.kind, "seconds": round(time.monotonic() - begun_s), **made}
 
@@ -142,7 +142,7 @@ def _gathered(order: TrainingOrder) -> Iterator[Path]:
         return
     place = order.work / GATHERED / order.target.stem
     remove(place.parent)  # of a process that was killed
-    with made_folders([place]):
+    with create_folders([place]):
         try:
             taken: set[str] = set()
             for line in order.source:
@@ -154,7 +154,7 @@ def _gathered(order: TrainingOrder) -> Iterator[Path]:
                     check_sound(line.recording, line.sha256)
                 _put(line.recording, place / f"{stem}{line.recording.suffix}")
                 if line.transcript:
-                    with whole_file(place / f"{stem}.txt") as text:
+                    with atomic_file(place / f"{stem}.txt") as text:
                         text.write_text(line.transcript, encoding="utf-8")
                     continue
                 for labels in label_files_beside(line.recording):
@@ -169,7 +169,7 @@ def _put(file: Path, place: Path) -> None:
     try:
         os.link(file.resolve(), place)
     except OSError:
-        with whole_file(place) as copy:
+        with atomic_file(place) as copy:
             shutil.copyfile(file, copy)
 
 
@@ -217,7 +217,7 @@ def _measured(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monit
     if not names:
         return {}
     try:
-        figures = provided("evaluate")(model, corpus, selection=Selection(names=names), monitor=monitor)
+        figures = load_provided("evaluate")(model, corpus, selection=Selection(names=names), monitor=monitor)
     except LipMotionError as error:
         LOG.warning("the voice could not be measured: %s", error)
         return {}

@@ -13,7 +13,7 @@ from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items, whole
 from lipmotion_studio import asked
 from lipmotion_studio.asked import content_of, member, text
-from lipmotion_studio.project import MOST_LINES
+from lipmotion_studio.project import MAX_LINES
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.trainer import MOST_LISTED
 from lipmotion_studio.training import FACE, VOICE, VoiceOptions, check_options
@@ -34,7 +34,7 @@ class TrainingReplies:
         """A voice or a face that is to be made."""
         content = await content_of(request)
         kind, name = text(content, "kind"), text(content, "name", "")
-        lines = list(dict.fromkeys(member(content, "lines", [], items(whole(0, 1 << 31), most=MOST_LINES))))
+        lines = list(dict.fromkeys(member(content, "lines", [], items(whole(0, 1 << 31), most=MAX_LINES))))
         options = check_options(content.get("options", {}))
         await self._desk.beside(lambda: self._trainer.begin(kind, name, lines, options))
         return await self._told(201)

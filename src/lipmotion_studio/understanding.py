@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lipmotion.pipeline.edit_files import begun_with
+from lipmotion.pipeline.analysis.read_request import read_request
+from lipmotion.pipeline.edit_files import create_edit_file
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Monitor, silent_monitor
 from lipmotion_studio.folder import ProjectFolder
-from lipmotion_studio.line import OpenLine, doubt_of
+from lipmotion_studio.line import OpenLine, rate_doubt
 from lipmotion_studio.project import ProjectLine
 
 
@@ -43,10 +43,10 @@ def understand_line(
     if line.transcript:
         request = replace(request, transcript=line.transcript)
     session = Session(request, model=model, monitor=monitor, audio=audio)
-    file, generation = begun_with(replace(named, lexicon=None), session)
+    file, generation = create_edit_file(replace(named, lexicon=None), session)
     digest = line.sha256 or file.sha256
     folder.checked_sound(replace(line, sha256=digest))  # and not another one meanwhile
-    duration_s, doubt = audio.duration_s, doubt_of(generation)
+    duration_s, doubt = audio.duration_s, rate_doubt(generation)
     with folder.lock:
         folder.line(line.number)  # it may have been removed meanwhile
         folder.write_edits(line, replace(file, sha256=digest))
@@ -69,6 +69,6 @@ def open_line(folder: ProjectFolder, line: ProjectLine, model: Model, audio: Ana
     named = replace(file.named, recording=folder.sound(line), model=folder.model_file)
     opened = OpenLine(replace(file, named=named), folder, line.number, model, audio)
     if line.duration_s is None:  # it was understood by a studio that was killed before the project was written
-        duration_s, doubt = audio.duration_s, doubt_of(opened.generation)
+        duration_s, doubt = audio.duration_s, rate_doubt(opened.generation)
         folder.change_line(line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt))
     return opened

@@ -39,7 +39,7 @@ from study.asgi import Reply
 
 EDITS = ("phone 2 is p", "pin opening 0.1 at 0.2", "set intensity 1.1", "remove phone 3", "phone 99 is p")
 """The last one is refused: there is no such phone."""
-MOST_LINES = 4
+MAX_LINES = 4
 TWO_WORDS_S = 0.4, 1.24
 """Where the first two words of the sentence are said."""
 DAMAGES: dict[str, Callable[[Path], Any]] = {
@@ -167,7 +167,7 @@ class TwoClients(RuleBasedStateMachine):
     @rule(sound=st.integers(0, 2))
     def dropped(self, sound: int) -> None:
         """All that is dropped has the same name."""
-        if len(self.lines) >= MOST_LINES:
+        if len(self.lines) >= MAX_LINES:
             return
         content, words = self.sounds[sound].read_bytes(), self.words[0]
         reply = self.ask("/api/lines?name=take.wav", content, x_lipmotion_transcript=words)

@@ -52,7 +52,7 @@ MEANT = {
     **dict.fromkeys(("emotion", "expression"), ("mood",)),
 }
 """Options of other programs, and what may be meant here: the first that the verb has."""
-LEAST_LIKENESS = 0.7
+MIN_LIKENESS = 0.7
 """So alike must an option be to one that does not exist to be suggested: ``--force`` is not meant by ``--voice``."""
 NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 """A negative number, which is no option."""
@@ -171,7 +171,7 @@ def _option_of(parser: argparse.ArgumentParser, word: str) -> argparse.Action | 
         return known[longer[0]]
     stems = {option.lstrip("-"): option for option in known if option.startswith("--")}
     meant = next((each for each in MEANT.get(name.lstrip("-"), ()) if each in stems), None)
-    near = [meant] if meant else get_close_matches(name.lstrip("-"), stems, n=1, cutoff=LEAST_LIKENESS)
+    near = [meant] if meant else get_close_matches(name.lstrip("-"), stems, n=1, cutoff=MIN_LIKENESS)
     return parser.error(f"unrecognized arguments: {word}" + (f"; did you mean {stems[near[0]]}?" if near else ""))
 
 

@@ -6,7 +6,7 @@ import gc
 import os
 import sys
 
-from lipmotion.cli.terminal.events import Events, events_of
+from lipmotion.cli.terminal.events import Events, create_events
 from lipmotion.cli.terminal.stop import MESSAGE, Stopper
 
 NEW_OBJECTS = 50_000
@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None and sys.argv[0].replace("\\", "/").rpartition("/")[2].lower() in {"rhubarb", "rhubarb.exe"}:
         words = ["cues", "--datFrameRate", "24", *words]  # under this name programs that start Rhubarb find it
-    stopper, events = Stopper(), events_of(words)
+    stopper, events = Stopper(), create_events(words)
     try:
         try:
             stopper.listen()

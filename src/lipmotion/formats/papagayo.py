@@ -12,7 +12,7 @@ from dataclasses import replace
 from itertools import islice, takewhile
 
 from lipmotion.articulation.cue_sheets import CueSheet, chart_of, cue_time, shape_of, sheet_of, shown_shapes
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
 from lipmotion.units.mouth_chart import REST, SHAPES
@@ -146,7 +146,7 @@ def _word(lines: _Lines) -> tuple[str, int, int, int]:
     fields = line.rsplit(maxsplit=3)
     if len(fields) != 4:
         raise InputError(
-            f"{lines.place} is {shortened(line)!r}, required a word, its frames and the number of its shapes"
+            f"{lines.place} is {shorten(line)!r}, required a word, its frames and the number of its shapes"
         )
     first, last, count = (int(cue_time(field, lines.place)) for field in fields[1:])
     return fields[0], first, last, count

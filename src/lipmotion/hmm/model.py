@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.hmm.states import StateTable, plain_states
 from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from_arrays
-from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Configuration
 
 
@@ -90,10 +90,10 @@ def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
     """Deserialise models. Raises ModelFormatError: an array is missing, undeclared, inconsistent or out of range."""
     with format_errors("the phone models", "train or download the model again", verb="are"):
         refuse_undeclared(arrays, NAMES, MODELS)
-        named = checked_arrays(arrays, NAMES)
+        named = check_arrays(arrays, NAMES)
         units, counts, names, free = (tuple(named[key].tolist()) for key in ("units", "counts", "names", "free"))
         _check_names(units, counts, names, free)
-        stored = checked_arrays(arrays, MODELS, **named.sizes, R=sum(counts))
+        stored = check_arrays(arrays, MODELS, **named.sizes, R=sum(counts))
         table = StateTable(units, counts, names, free)
         bigram = bigram_from_array(units, stored["bigram"])
         return UnitHmm(

@@ -27,7 +27,7 @@ from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraini
 from lipmotion.motion.reliability import clearness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Speech, sub_monitor
 
 Array = NDArray[np.float64]
@@ -152,7 +152,7 @@ class AcousticNetwork(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> AcousticNetwork:
         """Deserialise a network; as ``Predictor.from_arrays``."""
-        stored = checked_arrays(arrays, TARGETS, Q=dimensions)
+        stored = check_arrays(arrays, TARGETS, Q=dimensions)
         mean, scale = stored["network_targets"]
         network = SHAPE.from_arrays(arrays, dimensions + 1)
         found = not arrays.keys().isdisjoint(PosteriorNetwork.ARRAYS)

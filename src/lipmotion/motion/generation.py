@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior, strangeness
 from lipmotion.motion.closure import REACH_S, Closure, closable_ranges, frames_to_close, is_never_negative
@@ -174,7 +174,7 @@ def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: i
     for pin in constraints.pins if constraints else ():
         if pin.channel not in names:
             raise InputError(
-                f"cannot pin {shortened(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
+                f"cannot pin {shorten(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
             )
         frame = frame_of(pin.time_s, frames, FRAME_RATE_HZ)
         if frame is None:

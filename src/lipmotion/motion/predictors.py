@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import Registry
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, silent_monitor
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ class Predictor(ABC):
         Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
         """
         constructor: Any = cls  # every predictor is a dataclass
-        restored: PredictorT = constructor(**checked_arrays(arrays, cls.ARRAYS, Q=dimensions).arrays)
+        restored: PredictorT = constructor(**check_arrays(arrays, cls.ARRAYS, Q=dimensions).arrays)
         return restored
 
 

@@ -11,18 +11,18 @@ from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.formats.motion_document import parse_units, unit_rows
+from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.request import Request, located
+from lipmotion.pipeline.request import Request, locate_paths
 from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.storage.files import (
     LARGEST_TEXT_BYTES,
+    atomic_file,
     check_source,
     read_text_file,
     sha256_of,
     sound_reference,
-    whole_file,
 )
 from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
@@ -102,20 +102,17 @@ class EditFile:
         return Session(request, model=model, outlook=self.outlook, lasts_s=lasts_s, **more)
 
 
-def begun(asked: Request) -> EditFile:
-    """Return a file without edits of a recording, but for the moods that tags in its words ask for.
+def create_edit_file(asked: Request, session: Session | None = None) -> tuple[EditFile, Generation]:
+    """Return a file of a recording, and its motion; its only edits are the moods that tags in the words ask for.
 
-    Its phones are recognised or aligned now. Raises as ``animate``.
+    session : of the recording, where there is one; None: its phones are recognised or aligned now
+    Raises as ``animate``.
     """
-    return begun_with(asked, Session(read_request(asked), model=load_model(asked.model)))[0]
-
-
-def begun_with(asked: Request, session: Session) -> tuple[EditFile, Generation]:
-    """Return the file of ``begun`` for a session of a request, and its motion."""
+    session = session or Session(read_request(asked), model=load_model(asked.model))
     named = Request(**{name: getattr(asked, name) for name in HELD})
     if not (isinstance(named.recording, Path | None) and isinstance(named.lexicon, Path | None)):
         raise InputError("a file of edits names its recording and lexicon, required paths of files, not values")
-    generation = session.generated()
+    generation = session.generate()
     moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not held
     digest = sha256_of(named.recording) if named.recording else ""
     return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook, sha256=digest), generation
@@ -188,7 +185,7 @@ def _content(members: dict[str, Any], folder: Path) -> EditFile:
     if unknown := sorted(set(members) - known):
         raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
     steps, undone = (_sentences(members, name) for name in ("steps", "undone"))
-    named = located(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
+    named = locate_paths(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
     units = parse_units(members["units"], members.get("recognised")) if "units" in members else None
     outlook, sha256 = _OUTLOOK(members.get("outlook")), require(_TEXT, members.get(DIGEST, ""), DIGEST)
     return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps, sha256)
@@ -218,7 +215,7 @@ def write_edits(file: EditFile, path: str | Path) -> None:
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
     content = _as_toml(members) if kind == TOML else as_json_rows(members)
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any, ClassVar, get_type_hints
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
@@ -17,7 +17,7 @@ from lipmotion.types.staging import Staging
 from lipmotion.types.values import described, number_of, whole_of
 from lipmotion.units import PHONES, is_silent, unknown_phone_message
 
-LEAST_PHONE_S = 0.01
+MIN_PHONE_S = 0.01
 """Shortest phone that an edit may leave."""
 
 
@@ -115,12 +115,12 @@ class PhoneIs(PhoneStep):
 def _moved_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
     """Return phones with another time between the phone at place ``before`` and the next one.
 
-    Raises InputError: one of both would last less than ``LEAST_PHONE_S``, or there is no such border.
+    Raises InputError: one of both would last less than ``MIN_PHONE_S``, or there is no such border.
     """
     spans = list(units)
     first_s, last_s = spans[before].start_s, spans[before + 1].end_s
-    if not first_s + LEAST_PHONE_S - 1e-9 <= time_s <= last_s - LEAST_PHONE_S + 1e-9:
-        least, most = first_s + LEAST_PHONE_S, last_s - LEAST_PHONE_S
+    if not first_s + MIN_PHONE_S - 1e-9 <= time_s <= last_s - MIN_PHONE_S + 1e-9:
+        least, most = first_s + MIN_PHONE_S, last_s - MIN_PHONE_S
         raise InputError(f"{str(step)!r}: required {least:.3f} to {most:.3f} s, between the phones beside it")
     for place, change in ((before, {"end_s": time_s}), (before + 1, {"start_s": time_s})):
         label = replace(spans[place].label, confidence=None)
@@ -188,8 +188,8 @@ class PhoneInserted(PhoneStep):
 
     def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         last_s = units[-1].end_s if len(units) else 0.0
-        if not (self.start_s >= 0 and self.start_s + LEAST_PHONE_S - 1e-9 <= self.end_s <= last_s + 1e-9):
-            raise InputError(f"{str(self)!r}: required at least {LEAST_PHONE_S} s within 0 to {last_s:.3f} s")
+        if not (self.start_s >= 0 and self.start_s + MIN_PHONE_S - 1e-9 <= self.end_s <= last_s + 1e-9):
+            raise InputError(f"{str(self)!r}: required at least {MIN_PHONE_S} s within 0 to {last_s:.3f} s")
         return with_span(units, [Span(self.start_s, min(self.end_s, last_s), _known(self.phone))])
 
 
@@ -204,11 +204,11 @@ class PhoneSplit(PhoneStep):
     def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
         whole = units[place]
-        least_s, most_s = whole.start_s + LEAST_PHONE_S, whole.end_s - LEAST_PHONE_S
+        least_s, most_s = whole.start_s + MIN_PHONE_S, whole.end_s - MIN_PHONE_S
         if not least_s - 1e-9 <= self.time_s <= most_s + 1e-9:
             raise InputError(
                 f"{str(self)!r}: the phone lasts from {whole.start_s:.3f} to {whole.end_s:.3f} s, required a time at "
-                f"least {LEAST_PHONE_S} s within"
+                f"least {MIN_PHONE_S} s within"
             )
         label = replace(whole.label, confidence=None)
         parts = (Span(whole.start_s, self.time_s, label), Span(self.time_s, whole.end_s, label))
@@ -282,7 +282,7 @@ class WordsSaidSo(WordsSaid):
         super().__post_init__()
         for word, phones in self.own.items():
             if not phones:
-                raise InputError(f"{str(self)!r}: {shortened(repr(word))} has no phones; required WORD PHONES, WORD …")
+                raise InputError(f"{str(self)!r}: {shorten(repr(word))} has no phones; required WORD PHONES, WORD …")
             _check_said(self, phones)
 
     @property
@@ -416,7 +416,7 @@ class UnlockStep(Step):
     end_s: float
 
 
-def locks(steps: Sequence[Step]) -> dict[int, LockStep]:
+def find_locks(steps: Sequence[Step]) -> dict[int, LockStep]:
     """Return the locks that hold after some edits, by their places among these.
 
     Raises InputError: what is taken out was not locked.
@@ -452,7 +452,7 @@ class SetStep(Step):
         kind = next((kind for kind in (Delivery, Staging) if self.name in _names(kind)), None)
         if kind is None:
             known = ", ".join((*_names(Delivery), *_names(Staging)))
-            raise InputError(f"{str(self)!r}: nothing is called {shortened(repr(self.name))}; required one of: {known}")
+            raise InputError(f"{str(self)!r}: nothing is called {shorten(repr(self.name))}; required one of: {known}")
         return kind
 
     @property
@@ -508,12 +508,12 @@ FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form
 """Their sentences, for messages and help; times are in seconds."""
 
 
-def step_of(sentence: str) -> Step:
+def parse_step(sentence: str) -> Step:
     """Return the edit that a sentence states. Raises InputError: it states none, or a value is not allowed.
 
-    >>> step_of("phone 12 ends 1.24")
+    >>> parse_step("phone 12 ends 1.24")
     PhoneEnds(number=12, time_s=1.24)
-    >>> str(step_of("pin  jawOpen .2 at 1"))
+    >>> str(parse_step("pin  jawOpen .2 at 1"))
     'pin jawOpen 0.2 at 1.0'
     """
     if not isinstance(sentence, str):
@@ -525,7 +525,7 @@ def step_of(sentence: str) -> Step:
     first = sentence.split()[:1]
     near = [form for form in FORMS if form.split()[:1] == first] or FORMS
     required = f"required {'one of: ' if len(near) > 1 else ''}{'; '.join(near)}"
-    raise InputError(f"{shortened(repr(sentence))} is no edit; {required} (whole numbers, seconds as 1.24, one word)")
+    raise InputError(f"{shorten(repr(sentence))} is no edit; {required} (whole numbers, seconds as 1.24, one word)")
 
 
 @dataclass(frozen=True)
@@ -544,7 +544,7 @@ class Edits:
 
     def then(self, *edits: str | Step) -> Edits:
         """Return these edits and some more, sentences or values. Raises InputError: a sentence states no edit."""
-        return Edits(self.steps + tuple(edit if isinstance(edit, Step) else step_of(edit) for edit in edits))
+        return Edits(self.steps + tuple(edit if isinstance(edit, Step) else parse_step(edit) for edit in edits))
 
     @classmethod
     def of_pins(cls, pins: Iterable[Pin]) -> Edits:

@@ -10,7 +10,7 @@ import numpy as np
 
 from lipmotion.motion.closure import clip_at_zero
 from lipmotion.motion.network_steps import STEP
-from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
+from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Constraints,
@@ -60,9 +60,7 @@ class Excerpt:
         return Constraints(tuple(replace(pin, time_s=pin.time_s - first_s) for pin in inside))
 
 
-def excerpt_of_change(
-    before: Timeline[Unit], after: Timeline[Unit], pins: Collection[Pin], frames: int
-) -> Excerpt | None:
+def find_excerpt(before: Timeline[Unit], after: Timeline[Unit], pins: Collection[Pin], frames: int) -> Excerpt | None:
     """Return the excerpt outside of which motion is the same; None: it is too long, outside, or nothing has changed.
 
     pins   : that are there before or after, but not both
@@ -82,7 +80,7 @@ def excerpt_of_change(
     return Excerpt(slice(round(start * FRAME_RATE_HZ), min(round(end * FRAME_RATE_HZ) + 1, frames)), (first, last))
 
 
-def speech_within(understood: UnderstoodSpeech, frames: slice) -> UnderstoodSpeech:
+def cut_analysis(understood: SpeechAnalysis, frames: slice) -> SpeechAnalysis:
     """Return understood speech of some frames alone, without phones; its first frame is a multiple of 4."""
     return replace(understood, speech=_within(understood.speech, frames), tags=(), events=())
 
@@ -123,7 +121,7 @@ def _part_within(part: SpeechPart, frames: slice) -> SpeechPart:
     return SpeechPart(part.first + first - frames.start, own, inside)
 
 
-def with_excerpt(
+def apply_excerpt(
     whole: Generation, before: Generation, after: Generation, excerpt: Excerpt, units: Timeline[Unit]
 ) -> Generation:
     """Return motion with what an excerpt changes.

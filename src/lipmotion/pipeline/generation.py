@@ -16,16 +16,16 @@ from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
-from lipmotion.extensions import provided
+from lipmotion.extensions import load_provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
+from lipmotion.pipeline.analysis.read_request import read_lexicon
+from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
+from lipmotion.pipeline.analysis.spoken_language import score_words
+from lipmotion.pipeline.analysis.transcribe import is_other_language
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import lexicon_of
-from lipmotion.pipeline.understand.spoken_language import confidence_of
-from lipmotion.pipeline.understand.transcribe import is_other_language
-from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB, joined_units, placed_units
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
@@ -71,16 +71,16 @@ REACH_FRAMES = 10
 """Frames on both sides of a pin over which a value is reached that motion does not take by itself."""
 
 
-def generation_of(
+def generate_motion(
     request: Request,
     person: SpeakerMap | None,
     model: Model,
-    understood: UnderstoodSpeech,
+    understood: SpeechAnalysis,
     constraints: Constraints | None = None,
 ) -> Generation:
     """Return the motion of understood speech, with pauses and asymmetry as asked for, and what to expect of it.
 
-    person : of ``person_of``
+    person : of ``find_person``
     Raises InputError: a constraint is not usable.
     """
 
@@ -97,7 +97,7 @@ def generation_of(
     knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits)
     moods = moods_in_time(understood.tags, speech.units)
     told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
-    return replace(told, outlook=outlook_of(request, understood))
+    return replace(told, outlook=predict_outlook(request, understood))
 
 
 def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
@@ -117,7 +117,7 @@ def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
     return maps.of(speaker)
 
 
-def person_of(model: Model, request: Request) -> SpeakerMap | None:
+def find_person(model: Model, request: Request) -> SpeakerMap | None:
     """Return the map of the motion that a model generates to that of the person of a request; None: it is not mapped.
 
     Raises as ``speaker_map`` and ``map_onto``.
@@ -132,7 +132,7 @@ def person_of(model: Model, request: Request) -> SpeakerMap | None:
         return person
     from lipmotion.motion.transfer_map import composed
 
-    onto = provided("map_onto")(
+    onto = load_provided("map_onto")(
         model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request
     )
     return composed(person, onto)
@@ -189,7 +189,7 @@ def _generate_one(
     return replace(mean, motion=motion, spread=_spread(mean.spread, np.square(fitted.gain)))
 
 
-def explanation_for(person: SpeakerMap | None, explanation: Explanation, speech: Speech) -> Explanation:
+def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech: Speech) -> Explanation:
     """Return an explanation of the mean person's motion with all channels in one person's units.
 
     person : from ``speaker_map``
@@ -239,7 +239,7 @@ def _spread(
     return spread * factors
 
 
-def outlook_of(request: Request, understood: UnderstoodSpeech) -> Outlook:
+def predict_outlook(request: Request, understood: SpeechAnalysis) -> Outlook:
     """Return what to expect of the motion of some speech."""
     found, speech = understood.recognition, understood.speech
     if understood.is_without_speech:
@@ -253,24 +253,24 @@ def outlook_of(request: Request, understood: UnderstoodSpeech) -> Outlook:
         return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
     words = "words" if found.word_s > found.phone_s else "phones"
     voice = own_model_weight(found.similarity) if found.similarity is not None else None
-    return Outlook(words, confidence_of(found), voice, understood.range_db, _advice(understood))
+    return Outlook(words, score_words(found), voice, understood.range_db, _advice(understood))
 
 
-def _known_share(request: Request, understood: UnderstoodSpeech) -> float:
+def _known_share(request: Request, understood: SpeechAnalysis) -> float:
     """Return how sure the phones of a transcript are, 0 to 1: 1 for English, less for what is mapped to English."""
     if request.language != ENGLISH:
         return MAPPED_CONFIDENCE
-    said, lexicon = [span.label for span in words_in_time(understood.speech.units)], lexicon_of(request)
+    said, lexicon = [span.label for span in words_in_time(understood.speech.units)], read_lexicon(request)
     words = [word for word in said if word]
     return sum(map(lexicon.known, words)) / len(words) if is_other_language(words, lexicon) else 1.0
 
 
-def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
+def _advice(understood: SpeechAnalysis) -> tuple[str, ...]:
     """Return what would help, the most helpful first: before all else the words, where they are not sure."""
     found, advice = understood.recognition, []
     if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
         advice.append(WHOLE_TRANSCRIPT)
-    if found is not None and confidence_of(found) < SURE_CONFIDENCE:
+    if found is not None and score_words(found) < SURE_CONFIDENCE:
         advice.append(TRANSCRIPT)
     if understood.range_db < NOISY_DB:
         advice.append(LESS_NOISE)

@@ -28,10 +28,20 @@ from lipmotion.articulation.curve_edits import (
     with_stretch,
 )
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
-from lipmotion.errors import AlignmentError, InputError, shortened
+from lipmotion.errors import AlignmentError, InputError, shorten
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.speaker_maps import SpeakerMap
+from lipmotion.pipeline.analysis.language import resolve_language
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
+from lipmotion.pipeline.analysis.speech_analysis import (
+    SpeechAnalysis,
+    align_between,
+    analyse_speech,
+    prepare_search,
+    read_recording,
+    with_units,
+)
 from lipmotion.pipeline.edits import (
     CurveStep,
     Edits,
@@ -44,23 +54,13 @@ from lipmotion.pipeline.edits import (
     WordsSaid,
     WordsSaidSo,
     WordStep,
-    locks,
+    find_locks,
     with_span,
 )
-from lipmotion.pipeline.excerpts import Excerpt, excerpt_of_change, speech_within, with_excerpt
-from lipmotion.pipeline.generation import generation_of, person_of
+from lipmotion.pipeline.excerpts import Excerpt, apply_excerpt, cut_analysis, find_excerpt
+from lipmotion.pipeline.generation import find_person, generate_motion
 from lipmotion.pipeline.model import Model, load_model, with_prior
-from lipmotion.pipeline.request import Request, SpeechInput, request_of
-from lipmotion.pipeline.understand.language import in_language
-from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
-from lipmotion.pipeline.understand.understood_speech import (
-    UnderstoodSpeech,
-    aligned_within,
-    audio_of,
-    prepare_search,
-    understood_speech,
-    with_units,
-)
+from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import (
@@ -144,7 +144,7 @@ class Session:
     model     : from ``load_model``, or the path of a model file; None: the shipped model
     workers   : number of processes that recognise the words of a long recording
     monitor   : receives reports of the progress of the first motion
-    meanwhile : is called while these processes work, where there are several
+    background : is called while these processes work, where there are several
     curves    : names of further curves that outputs will have: controls of a rig, blendshapes of a character
     outlook   : what to expect of the motion, where it is known; None: it follows from the speech
     lasts_s   : duration of the recording that was edited, in seconds: another one is refused; None: not known
@@ -156,7 +156,7 @@ class Session:
     >>> import lipmotion
     >>> session = lipmotion.Session("examples/welcome.flac")
     >>> closed = lipmotion.Edits().then("pin opening 0.02 at 0.5")
-    >>> round(float(session.generated(closed).motion["opening"][50]), 6)
+    >>> round(float(session.generate(closed).motion["opening"][50]), 6)
     0.02
     """
 
@@ -167,17 +167,17 @@ class Session:
         model: Model | str | Path | None = None,
         workers: int = 1,
         monitor: Monitor = silent_monitor,
-        meanwhile: Callable[[], None] | None = None,
+        background: Callable[[], None] | None = None,
         curves: Iterable[str] = (),
         outlook: Outlook | None = None,
         lasts_s: float | None = None,
         audio: AnalysedAudio | None = None,
     ) -> None:
-        self.request: Request = in_language(read_request(request_of(speech), is_typed=False))
+        self.request: Request = resolve_language(read_request(as_request(speech), is_typed=False))
         self.model = model if isinstance(model, Model) else load_model(model or self.request.model)
         self._work = map_in_processes(workers, self._prepare)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
-        self._meanwhile = meanwhile
+        self._background = background
         self._lasts_s, self._motions, self._known_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()
         self._cache = Cache()
@@ -206,7 +206,7 @@ class Session:
         with self._one_at_a_time, one_thread():
             return self._edited_units(edits.steps)
 
-    def generated(self, edits: Edits = NO_EDITS) -> Generation:
+    def generate(self, edits: Edits = NO_EDITS) -> Generation:
         """Return the motion with all edits but the delivery; with none, that of ``animate``.
 
         Pins hold exactly: those of channels that the model generates bend the motion as it does, others bend their
@@ -217,15 +217,15 @@ class Session:
         with self._one_at_a_time, one_thread():
             return self._after(edits.steps)
 
-    def delivered(self, edits: Edits = NO_EDITS) -> Generation:
+    def deliver(self, edits: Edits = NO_EDITS) -> Generation:
         """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
-        from lipmotion.pipeline.outputs.delivered import delivered  # curves, which ``animate`` needs not
+        from lipmotion.pipeline.outputs.deliver import deliver  # curves, which ``animate`` needs not
 
         with self._one_at_a_time, one_thread():
             key = (edits.steps, self.is_sketching)
-            return self._cache.cached("delivered", key, lambda: delivered(self.generated(edits), edits.delivery()))
+            return self._cache.cached("delivered", key, lambda: deliver(self.generate(edits), edits.delivery()))
 
-    def understood(self, edits: Edits = NO_EDITS) -> UnderstoodSpeech:
+    def analyse(self, edits: Edits = NO_EDITS) -> SpeechAnalysis:
         """Return the speech as input of the engine, with the phones of ``units``."""
         with self._one_at_a_time, one_thread():
             return self._edited_speech(edits.steps)
@@ -233,11 +233,11 @@ class Session:
     def _prepare(self) -> None:
         """Prepare what comes next, while processes work on the recording."""
         prepare_search(self.request)
-        if self._meanwhile is not None:
-            self._meanwhile()
+        if self._background is not None:
+            self._background()
 
     @cached_property
-    def _recording(self) -> UnderstoodSpeech:
+    def _recording(self) -> SpeechAnalysis:
         """The speech without edits."""
         self.speaker  # noqa: B018 # what is refused is refused before the long work
         request = self.request
@@ -248,16 +248,16 @@ class Session:
             )
         if self._lasts_s is not None or self._known_audio is not None:
             request = replace(request, recording=self._audio)
-        return understood_speech(self.model, request, self._work, self._monitor)
+        return analyse_speech(self.model, request, self._work, self._monitor)
 
     @cached_property
     def speaker(self) -> SpeakerMap | None:
         """The map onto the person whose motion is generated; None: the model knows one person."""
-        return person_of(self.model, self.request)
+        return find_person(self.model, self.request)
 
     @cached_property
     def _audio(self) -> AnalysedAudio:
-        return self._known_audio or analysed(audio_of(self.request))
+        return self._known_audio or analysed(read_recording(self.request))
 
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
@@ -274,7 +274,7 @@ class Session:
         if isinstance(step, LockStep | UnlockStep):
             return before
         after = step.applied(before) if isinstance(step, PhoneStep) else self._reworded(before, step)
-        held = locks(ours).values()
+        held = find_locks(ours).values()
         changed = {*before} ^ {*after} if held else ()
         for lock in held:
             if any(lock.covers(span.start_s, span.end_s) for span in changed):
@@ -294,7 +294,7 @@ class Session:
             there = words[step.number - 1]
             start_s, end_s, said = there.start_s, there.end_s, Text(step.word)
             where = f"{start_s:.2f} to {end_s:.2f} s, where {there.label!r} was"
-        own = tuple(own_pronunciations(step).items())
+        own = tuple(read_pronunciations(step).items())
         try:
             spans = self._cache.cached(
                 "aligned", (said, own, start_s, end_s), lambda: self._said(step, said, start_s, end_s)
@@ -308,12 +308,12 @@ class Session:
     def _said(self, step: WordStep, said: str, start_s: float, end_s: float) -> list[Span[Unit]]:
         """Return the phones in time of words that a step says. Raises AlignmentError: they do not fit in there."""
         request, pauses = self.request, isinstance(step, WordsSaid)
-        if own := own_pronunciations(step):
-            lexicon = lexicon_of(request)
+        if own := read_pronunciations(step):
+            lexicon = read_lexicon(request)
             request = replace(request, lexicon=replace(lexicon, user=lexicon.user | own))
-        return aligned_within(self.model, request, self._audio, said, start_s, end_s, pauses=pauses)
+        return align_between(self.model, request, self._audio, said, start_s, end_s, pauses=pauses)
 
-    def _edited_speech(self, steps: tuple[Step, ...]) -> UnderstoodSpeech:
+    def _edited_speech(self, steps: tuple[Step, ...]) -> SpeechAnalysis:
         plain, units = self._recording, self._edited_units(steps)
         if units is plain.speech.units:
             return plain
@@ -329,7 +329,7 @@ class Session:
         """Return the motion after some edits, with locked spans as they were when they were locked."""
         self._edited_units(steps)  # refuses phones that change what is locked
         generation = self._with_curves(tuple(step for step in steps if not isinstance(step, LockStep | UnlockStep)))
-        for place, lock in locks(steps).items():
+        for place, lock in find_locks(steps).items():
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
@@ -383,7 +383,7 @@ class Session:
             )
             near = get_close_matches(edit.channel.lower(), lower, 1)
             others = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
-            named = shortened(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
+            named = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
             raise InputError(
                 f"cannot {what} {named}; channels that can be pinned: {others}; lip points, as y_14; curves, as "
                 "jawOpen, viseme_PP, open_jaw"
@@ -421,14 +421,14 @@ class Session:
             return None
         (steps_before, pins_before), full = self._last
         units = self._edited_units(steps_before), self._edited_units(phone_steps)
-        excerpt = excerpt_of_change(*units, {*pins} ^ {*pins_before}, len(full.motion.values))
+        excerpt = find_excerpt(*units, {*pins} ^ {*pins_before}, len(full.motion.values))
         if excerpt is None or len(units[0]) != len(full.units):
             return None
         try:
             parts = [self._of_excerpt(excerpt, *held) for held in zip(units, (pins_before, pins), strict=True)]
         except InputError:  # a pin that is refused: the whole says its time
             return None
-        sketch = with_excerpt(full, parts[0], parts[1], excerpt, units[1])
+        sketch = apply_excerpt(full, parts[0], parts[1], excerpt, units[1])
         self._last = (phone_steps, pins), sketch
         return sketch
 
@@ -438,9 +438,9 @@ class Session:
         constraints = excerpt.pinned(pins)
 
         def generation() -> Generation:
-            part = self._cache.cached("segment", place, lambda: speech_within(self._recording, excerpt.frames))
+            part = self._cache.cached("segment", place, lambda: cut_analysis(self._recording, excerpt.frames))
             spoken = replace(part, speech=self._spoken(part.speech, phones))
-            return generation_of(self.request, self.speaker, self.model, spoken, constraints)
+            return generate_motion(self.request, self.speaker, self.model, spoken, constraints)
 
         return self._cache.cached("excerpt", (place, phones, constraints), generation)
 
@@ -450,7 +450,7 @@ class Session:
         if self._motions == INTERACTIVE:
             numba_works()
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
-        generation = generation_of(self.request, self.speaker, self.model, understood, Constraints(pins))
+        generation = generate_motion(self.request, self.speaker, self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))
         if self._outlook is not None:
             generation = replace(generation, outlook=self._outlook)
@@ -458,7 +458,7 @@ class Session:
         return generation
 
 
-def own_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
+def read_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
     own = step.own if isinstance(step, WordSaid | WordsSaidSo) else {}
     return {word: (phones,) for given, phones in own.items() for word in words_of(given)}

@@ -102,12 +102,12 @@ def worker_pool(count: int) -> Iterator[Workers]:
         yield Workers([stack.enter_context(_worker()) for _ in range(count)])
 
 
-def map_in_processes(count: int, meanwhile: Callable[[], None] | None = None) -> ParallelMap:
+def map_in_processes(count: int, background: Callable[[], None] | None = None) -> ParallelMap:
     """Return a map whose calls start up to ``count`` processes, and end them; of one item or none, no process.
 
     The processes begin with the first items when the map is called: the caller can work beside them, and then take the
     results.
-    meanwhile : is called once, where processes have begun, before the first result is waited for
+    background : is called once, where processes have begun, before the first result is waited for
     """
 
     count = process_count(count)
@@ -115,7 +115,7 @@ def map_in_processes(count: int, meanwhile: Callable[[], None] | None = None) ->
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         waiting = iter(items)
         first = list(islice(waiting, count))
-        results = _begun(len(first), function, chain(first, waiting), meanwhile)
+        results = _begun(len(first), function, chain(first, waiting), background)
         next(results)
         return results
 
@@ -123,14 +123,14 @@ def map_in_processes(count: int, meanwhile: Callable[[], None] | None = None) ->
 
 
 def _begun(
-    count: int, function: Callable[[Any], Any], items: Iterable[Any], meanwhile: Callable[[], None] | None
+    count: int, function: Callable[[Any], Any], items: Iterable[Any], background: Callable[[], None] | None
 ) -> Iterator[Any]:
     """Yield None when ``count`` processes have begun with the first items, then the results."""
     with worker_pool(count) as team:
         results = team.ordered_map(function, items)
         yield None
-        if meanwhile is not None and count > 1:
-            meanwhile()
+        if background is not None and count > 1:
+            background()
         yield from results
 
 

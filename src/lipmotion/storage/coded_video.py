@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.frame_groups import FrameGroups
-from lipmotion.storage.media import MOST_PIXELS, bound_allocations, x264_instructions
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.media import MAX_PIXELS, bound_allocations, x264_instructions
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 
 Pictures = NDArray[np.uint8]
 Stream = NDArray[np.uint8]
@@ -29,9 +29,9 @@ GROUP = 8
 """Frames of a stored video that are decoded together."""
 PICTURE_GROUP = 250
 """Pictures of a stack, all of which are decoded at once, that are coded together at most."""
-MOST_FRAMES = 100_000
+MAX_FRAMES = 100_000
 """Most frames of a stored video: an hour."""
-MOST_PICTURE_BYTES = 1 << 29
+MAX_PICTURE_BYTES = 1 << 29
 """Most bytes of a stack of decoded pictures."""
 _BT601, _LIMITED_RANGE = 5, 1
 _DELIMITER, _PARAMETERS = 9, 7
@@ -58,8 +58,8 @@ class StoredVideo:
     def __post_init__(self) -> None:
         with format_errors("the stored video", _REMEDY):
             found = len(self._layout[0]) - 1
-            if found != self.count or not 1 <= self.count <= MOST_FRAMES:
-                raise ValueError(f"{found} frames, required {self.count}, at least 1 and at most {MOST_FRAMES}")
+            if found != self.count or not 1 <= self.count <= MAX_FRAMES:
+                raise ValueError(f"{found} frames, required {self.count}, at least 1 and at most {MAX_FRAMES}")
 
     def __len__(self) -> int:
         return self.count
@@ -124,8 +124,8 @@ def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
     """
     if pictures.ndim != 4 or not len(pictures):
         raise InputError(f"pictures of shape {pictures.shape}, required (N, H, W, 3), at least one")
-    if pictures.nbytes > MOST_PICTURE_BYTES:
-        raise InputError(f"pictures of {pictures.nbytes} bytes, required at most {MOST_PICTURE_BYTES}; give fewer")
+    if pictures.nbytes > MAX_PICTURE_BYTES:
+        raise InputError(f"pictures of {pictures.nbytes} bytes, required at most {MAX_PICTURE_BYTES}; give fewer")
     return np.frombuffer(b"".join(_encode(pictures, crf, PICTURE_GROUP, "yuv444p")), np.uint8)
 
 
@@ -136,7 +136,7 @@ def decode_pictures(data: Stream) -> Pictures:
         decoded = _decode(data, begins, None)
         first = next(decoded, None)
         count = len(begins) - 1
-        if first is None or count * first.nbytes > MOST_PICTURE_BYTES:
+        if first is None or count * first.nbytes > MAX_PICTURE_BYTES:
             raise ValueError(f"{count} pictures of {first.nbytes if first is not None else 0} bytes")
         pictures = np.empty((count, *first.shape), np.uint8)
         found = 0
@@ -150,7 +150,7 @@ def decode_pictures(data: Stream) -> Pictures:
         return pictures
 
 
-def stored_video_arrays(video: StoredVideo) -> dict[str, NDArray[Any]]:
+def stored_video_to_arrays(video: StoredVideo) -> dict[str, NDArray[Any]]:
     """Serialise a video."""
     return {
         "data": video.data,
@@ -164,10 +164,10 @@ def stored_video_from_arrays(arrays: Arrays) -> StoredVideo:
     """Deserialise a video. Raises ModelFormatError: an array is missing, unknown, or has a wrong shape or range."""
     with format_errors("the stored video", _REMEDY):
         refuse_undeclared(arrays, STORED_VIDEO)
-        stored = checked_arrays(arrays, STORED_VIDEO)
+        stored = check_arrays(arrays, STORED_VIDEO)
         height, width = stored["size"].tolist()
-        if height * width > MOST_PIXELS:
-            raise ValueError(f"frames of {width} × {height} pixels, required at most {MOST_PIXELS} in all")
+        if height * width > MAX_PIXELS:
+            raise ValueError(f"frames of {width} × {height} pixels, required at most {MAX_PIXELS} in all")
         return StoredVideo(stored["data"], float(stored["rate_hz"]), (height, width), int(stored["count"]))
 
 
@@ -175,7 +175,7 @@ STORED_VIDEO = {
     "data": ArraySpec(np.uint8, "B", 0, 255),
     "rate_hz": ArraySpec(np.float64, "", 1, 1000),
     "size": ArraySpec(np.intp, "2", 1, 10_000),
-    "count": ArraySpec(np.intp, "", 1, MOST_FRAMES),
+    "count": ArraySpec(np.intp, "", 1, MAX_FRAMES),
 }
 """The arrays of a stored video."""
 
@@ -207,8 +207,8 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
 def _check_picture(frame: Pictures) -> None:
     if frame.ndim != 3 or frame.shape[2] != 3 or not frame.size:
         raise InputError(f"a picture of shape {frame.shape}, required (H, W, 3)")
-    if frame.shape[0] * frame.shape[1] > MOST_PIXELS:
-        raise InputError(f"a picture of shape {frame.shape}, required at most {MOST_PIXELS} pixels; scale the video")
+    if frame.shape[0] * frame.shape[1] > MAX_PIXELS:
+        raise InputError(f"a picture of shape {frame.shape}, required at most {MAX_PIXELS} pixels; scale the video")
 
 
 def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) -> Any:
@@ -261,7 +261,7 @@ def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -
 
     bound_allocations()
     context: Any = av.CodecContext.create("h264", "r")
-    context.options = {"max_pixels": str(MOST_PIXELS), "err_detect": "explode"}
+    context.options = {"max_pixels": str(MAX_PIXELS), "err_detect": "explode"}
     context.thread_count = 1
     with _decoding_errors():
         for start, stop in pairwise(begins):

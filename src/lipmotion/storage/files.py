@@ -177,7 +177,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 
 @contextmanager
-def confined(folder: Path) -> Iterator[None]:
+def confine(folder: Path) -> Iterator[None]:
     """Follow no link inside a folder that strangers may have filled, whatever writes there while the block lasts.
 
     This holds for all functions of this module, in all threads of the process. The folder itself may be a link, which
@@ -379,7 +379,7 @@ def _place(target: Path) -> Path:
 
 
 @contextmanager
-def whole_file(target: Path) -> Iterator[Path]:
+def atomic_file(target: Path) -> Iterator[Path]:
     """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
 
     Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
@@ -400,7 +400,7 @@ def whole_file(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_folder(target: Path) -> Iterator[Path]:
+def atomic_folder(target: Path) -> Iterator[Path]:
     """Give a temporary folder to fill; rename it to ``target``, which must not exist, on success.
 
     Raises ExportError: the parent does not exist, or something cannot be written.
@@ -418,7 +418,7 @@ def whole_folder(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def made_folders(folders: Iterable[Path]) -> Iterator[None]:
+def create_folders(folders: Iterable[Path]) -> Iterator[None]:
     """Create folders, with those that hold them; if the block fails, remove those that were not there before.
 
     Raises ExportError: a folder cannot be created.
@@ -448,8 +448,8 @@ def _refused(target: Path, error: OSError) -> ExportError:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, created if needed, for this process, and confine it (``confined``).
+def lock_folder(folder: Path) -> Iterator[None]:
+    """Lock a folder, created if needed, for this process, and confine it (``confine``).
 
     The system releases the lock when the process ends in any way: no lock is left behind.
     Raises ExportError: another process has locked it, it cannot be created, or its lock is a link.
@@ -458,7 +458,7 @@ def locked(folder: Path) -> Iterator[None]:
     file = None
     try:
         try:
-            with confined(folder):
+            with confine(folder):
                 file = _lock_in(folder)
                 yield
         finally:
@@ -555,8 +555,8 @@ def temporary_folder() -> Iterator[Path]:
     """
     place = Path(tempfile.gettempdir())
     for left in place.glob(f"{BRIEF}*/{LOCK}"):
-        with suppress(ExportError, OSError), confined(place):  # it is in use, or another user's
-            with locked(left.parent):
+        with suppress(ExportError, OSError), confine(place):  # it is in use, or another user's
+            with lock_folder(left.parent):
                 for path in left.parent.iterdir():
                     if path != left:
                         remove(path)
@@ -566,7 +566,7 @@ def temporary_folder() -> Iterator[Path]:
             folder = Path(tempfile.mkdtemp(prefix=BRIEF))
             kept.callback(shutil.rmtree, folder, ignore_errors=True)
             try:
-                kept.enter_context(locked(folder))
+                kept.enter_context(lock_folder(folder))
                 break
             except ExportError:  # another process took it for one that was left, before it was locked
                 if is_last:
@@ -588,7 +588,7 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     if is_link(folder):
         raise ExportError(f"{folder}: is a link, required a folder of unfinished work; remove it")
     try:
-        with locked(folder):
+        with lock_folder(folder):
             remove_unfinished(folder)
             _sweep(target)
             try:

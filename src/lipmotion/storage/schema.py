@@ -82,21 +82,21 @@ def format_errors(what: str, remedy: str = "train or download it again", *, verb
         raise ModelFormatError(f"{what} {verb} damaged ({error}); {remedy}") from error
 
 
-def checked_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:
+def check_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:
     """Return the arrays of a table, in its types; other arrays are ignored (see ``refuse_undeclared``).
 
     sizes : of letters that are known before
     Raises ValueError: an array of another kind of number, of another shape or out of its range. KeyError: one is
     missing.
     """
-    sizes = checked_sizes(arrays, table, **sizes)
+    sizes = check_sizes(arrays, table, **sizes)
     with np.errstate(over="ignore"):
         values = {name: arrays[name].astype(member.dtype) for name, member in table.items() if name in arrays}
     return CheckedArrays(values, sizes)
 
 
-def checked_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> dict[str, int]:
-    """Return the size of each letter of a table. Raises as ``checked_arrays``."""
+def check_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> dict[str, int]:
+    """Return the size of each letter of a table. Raises as ``check_arrays``."""
     for name, member in table.items():
         if name in arrays:
             _check_kind(name, arrays[name], member)

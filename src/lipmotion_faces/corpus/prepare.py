@@ -23,12 +23,12 @@ from lipmotion.extensions import installed_version
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import confined, locked, portable_name, remove_unfinished, sha256_of
+from lipmotion.storage.files import confine, lock_folder, portable_name, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
-from lipmotion_faces.corpus.separate_sound import earlier_phones, in_step, separate_sound
+from lipmotion_faces.corpus.separate_sound import correct_rate, earlier_phones, separate_sound
 from lipmotion_faces.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
@@ -146,7 +146,7 @@ def prepare(
     chosen = tracker_named(tracker)
     packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
-    with locked(output):
+    with lock_folder(output):
         corpus = Corpus.create(output)
         folder, parts = with_long_videos_divided(folder, place, monitor, tracker)
         jobs = [
@@ -273,7 +273,7 @@ def _process(job: _Job) -> _Outcome:
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _utterance(job, source)
-        with confined(job.folder.parent.parent):  # the corpus, in this worker
+        with confine(job.folder.parent.parent):  # the corpus, in this worker
             write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
         raise  # all other recordings would fail in the same way
@@ -317,7 +317,7 @@ def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
         found = _track(job, audio.duration_s)
     else:
         own_s = None if recording.recorder is None else read_audio(recording.file, warn=False).duration_s
-        audio, found, begin_s = in_step(separate, _track(job, own_s))
+        audio, found, begin_s = correct_rate(separate, _track(job, own_s))
         labelled_s = begin_s if recording.recorder is not None else begin_s + separate.late_s
         recording = replace(recording, phones=earlier_phones(recording.phones, labelled_s))
         source = source | {"sound_late_ms": f"{separate.late_s * 1000:.3f}", "sound_found_by": separate.how}

@@ -66,7 +66,7 @@ def on_own_time(sound: SeparateSound, duration_s: float) -> Audio:
     return Audio(np.pad(overlapping, (front, max(count - front - len(overlapping), 0))), rate)
 
 
-def in_step(sound: SeparateSound, track: Track) -> tuple[Audio, Track, float]:
+def correct_rate(sound: SeparateSound, track: Track) -> tuple[Audio, Track, float]:
     """Return what sound and motion share: the sound, the motion, and the time of the motion at which both begin.
 
     Motion is cut at whole frames, the sound at the same times. Raises InputError: they share hardly anything.

@@ -11,7 +11,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.training.train import Run, about_training, train
+from lipmotion.pipeline.training.train import Run, describe_training, train
 from lipmotion.storage.files import make_folder, unfinished_work
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor
@@ -87,7 +87,7 @@ def _present(corpus: Corpus, folder: Path, engines: Sequence[str]) -> dict[str, 
     models = {name: load_model(path) for name, path in paths.items() if path.is_file()}
     if models:
         names = corpus.required("train")
-        wanted = about_training(corpus, [corpus.utterance(name) for name in names], "train", len(names))
+        wanted = describe_training(corpus, [corpus.utterance(name) for name in names], "train", len(names))
         for name, model in models.items():
             _check(paths[name], name, model, wanted)
     return {name: EngineModel(model, None) for name, model in models.items()}

@@ -16,12 +16,12 @@ from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
+from lipmotion.pipeline.analysis.speech_analysis import build_speech, recognised_speech, with_voice
+from lipmotion.pipeline.analysis.transcribe import warn_of_guesses
 from lipmotion.pipeline.generation import generate_for
 from lipmotion.pipeline.model import GEOMETRY, Model, with_prior
 from lipmotion.pipeline.training.channels import with_visual_channels
-from lipmotion.pipeline.training.train import phones_of
-from lipmotion.pipeline.understand.transcribe import warn_of_guesses
-from lipmotion.pipeline.understand.understood_speech import recognised_speech, speech_of, with_voice
+from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import (
@@ -200,7 +200,7 @@ def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
 
 def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
     try:
-        return phones_of(utterance, phones, lexicon)
+        return label_phones(utterance, phones, lexicon)
     except AlignmentError as error:
         raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
 
@@ -229,7 +229,7 @@ def speech_of_condition(
         ]
     else:
         pairs = [
-            (speech_of(engine, u.audio, u.features, units, phones.kind), None)
+            (build_speech(engine, u.audio, u.features, units, phones.kind), None)
             for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
         ]
     return [

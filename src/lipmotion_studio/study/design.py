@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import installed_version
-from lipmotion.storage.files import read_text_file, sha256_of, whole_folder
+from lipmotion.storage.files import atomic_folder, read_text_file, sha256_of
 from lipmotion.types import Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
 from lipmotion_studio.study.answers import ANCHOR, KINDS, MOS, PAIRED, RANKING, RECORDING
@@ -68,7 +68,7 @@ def design_study(
     base = RECORDING if RECORDING in sources else next(iter(sources))
     late = _late_sentences(kind, said, settings)
     texts = _texts(kind, settings)
-    with whole_folder(output) as folder:
+    with atomic_folder(output) as folder:
         (folder / VIDEOS).mkdir()
         videos: list[StudyVideo] = []
         wanted = [(sentence, name) for sentence in said for name in makers]

@@ -24,7 +24,7 @@ from lipmotion.formats.base import motion_suffixes
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
-from lipmotion.pipeline.batch.one_line import LineWork, finished_line
+from lipmotion.pipeline.batch.one_line import LineWork, finish_line
 from lipmotion.pipeline.batch.pool import WorkerDied
 from lipmotion.types import Item
 from lipmotion_faces.filmed.face import FilmedFace
@@ -248,15 +248,15 @@ def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: Job, tmp
 
 def test_a_line_that_another_worker_finished_is_not_done_again(sounds: Path, settings: Job, tmp_path: Path) -> None:
     work = waiting(sounds, settings, tmp_path / "out")[0]
-    first = finished_line(work)
+    first = finish_line(work)
     assert 0 < first["motion"] < 1
     assert 0 <= first["least_sure_s"] < first["duration_s"]
     path = tmp_path / "out" / next(iter(first["outputs"]))
     before = path.stat().st_mtime_ns
-    assert finished_line(work) == first
+    assert finish_line(work) == first
     assert path.stat().st_mtime_ns == before
     path.unlink()  # the worker died after the receipt, before the renaming
-    assert finished_line(work)["outputs"] == first["outputs"]
+    assert finish_line(work)["outputs"] == first["outputs"]
     assert path.is_file()
 
 
@@ -264,7 +264,7 @@ def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: Job, 
     work = waiting(sounds, settings, tmp_path / "out")[0]
     (work.place.own / "run").write_text("a later one")
     with pytest.raises(ExportError, match="another run of this batch has begun"):
-        finished_line(work)
+        finish_line(work)
     assert contents(tmp_path / "out").keys() == {".batch/run"}
 
 
@@ -287,7 +287,7 @@ def test_an_output_that_cannot_be_renamed_is_a_line_that_fails(
     work = waiting(sounds, settings, tmp_path / "out")[0]
     monkeypatch.setattr("lipmotion.pipeline.batch.one_line.check_target", lambda _: None)
     (tmp_path / "out" / f"{work.line.name}.json").mkdir(parents=True)
-    record = finished_line(work)
+    record = finish_line(work)
     assert (record["outcome"], record["outputs"]) == ("failed", {})
 
 
@@ -349,8 +349,8 @@ def test_what_a_killed_process_was_writing_is_deleted(toy_speech: Path, settings
     out.mkdir()
     staged = Place(str(out), "of an earlier run").staged("line000", "json")
     write = (
-        "import os, sys; from pathlib import Path; from lipmotion.storage.files import whole_file\n"
-        "with whole_file(Path(sys.argv[1])) as path:\n    path.write_text('half'); os._exit(9)"
+        "import os, sys; from pathlib import Path; from lipmotion.storage.files import atomic_file\n"
+        "with atomic_file(Path(sys.argv[1])) as path:\n    path.write_text('half'); os._exit(9)"
     )
     assert run_child([sys.executable, "-c", write, staged]).returncode == 9
     assert len(list(out.iterdir())) == 1
@@ -369,7 +369,7 @@ def many(folder: Path, speech: Path, count: int) -> Path:
     return folder
 
 
-def events_of(process: Child) -> Iterator[dict]:
+def create_events(process: Child) -> Iterator[dict]:
     assert process.stdout is not None
     for text in process.stdout:
         yield json.loads(text)
@@ -385,7 +385,7 @@ def test_kills(toy_speech: Path, settings: Job, tmp_path: Path, whom: str) -> No
     how = [sounds, "--out", tmp_path / "out", "--model", settings.request.model, "--recogniser", "own", "--jobs", 2]
     with child(command(*how)) as process:
         items = 0
-        for event in events_of(process):
+        for event in create_events(process):
             items += event["type"] == "item"
             if items == 10 and event["type"] == "item":
                 os.kill(process.pid if whom == "first process" else worker_of(process.pid), signal.SIGKILL)
@@ -453,7 +453,7 @@ def test_a_worker_of_a_cluster_is_killed(
     ]
     with child(command(*how)) as process:
         items = 0
-        for event in events_of(process):
+        for event in create_events(process):
             items += event["type"] == "item"
             if items == 15 and event["type"] == "item":
                 processes[1].kill()

@@ -17,9 +17,9 @@ from lipmotion.pipeline.batch.check import (
     Finding,
     LineToCheck,
     _findings,
-    checked_line,
+    check_line,
+    count_letters,
     expected_s,
-    letters_of,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
 
@@ -82,7 +82,7 @@ def test_every_kind_is_found(tmp_path: Path) -> None:
 def test_tags_are_no_words(tmp_path: Path) -> None:
     sound(tmp_path / "a.wav", 1.0, 1)
     line = BatchLine("a", str(tmp_path / "a.wav"), "[angry] Who is <smile> there?")
-    assert checked_line(LineToCheck(line, Request())).words == ("who", "is", "there")
+    assert check_line(LineToCheck(line, Request())).words == ("who", "is", "there")
 
 
 def test_a_folder_has_no_orphans(tmp_path: Path) -> None:
@@ -109,4 +109,4 @@ def test_short_lines_may_have_the_same_words() -> None:
 
 
 def test_letters_of_other_scripts_take_longer() -> None:
-    assert letters_of(["hello", "\uac00"]) == pytest.approx(8.0)
+    assert count_letters(["hello", "\uac00"]) == pytest.approx(8.0)

@@ -16,7 +16,7 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
 from lipmotion_faces.corpus import long_videos as module
-from lipmotion_faces.corpus.separate_sound import SeparateSound, in_step, on_own_time
+from lipmotion_faces.corpus.separate_sound import SeparateSound, correct_rate, on_own_time
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 RATE = 60.0
@@ -116,7 +116,7 @@ def track(frames: int) -> Track:
 def test_sound_and_motion_begin_together(late_s):
     """The sound is a ramp of its own time, as the motion is."""
     ramp = Audio((np.arange(4 * RATE_HZ) / RATE_HZ).astype(np.float32), RATE_HZ)
-    audio, found, start_s = in_step(SeparateSound(ramp, late_s, "x"), track(300))
+    audio, found, start_s = correct_rate(SeparateSound(ramp, late_s, "x"), track(300))
     assert found.motion.values[0, 0] == pytest.approx(start_s)
     assert audio.samples[0] == pytest.approx(start_s + late_s, abs=1 / RATE_HZ)
     assert audio.duration_s == pytest.approx(len(found.seen) / RATE, abs=1 / RATE)
@@ -130,4 +130,4 @@ def test_sounds_that_share_nothing_are_refused():
     ramp = Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)
     for late_s in (-20.0, 20.0, 0.9):
         with pytest.raises(ValueError, match=r"share 0\.\d\d s, required 0.5"):
-            in_step(SeparateSound(ramp, late_s, "clap"), track(300))
+            correct_rate(SeparateSound(ramp, late_s, "clap"), track(300))

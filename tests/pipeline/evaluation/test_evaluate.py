@@ -24,12 +24,7 @@ from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
 from lipmotion_lab.evaluation.evaluate import _was_trained_on
 from lipmotion_lab.evaluation.figures import figures_of
-from lipmotion_lab.evaluation.held_out import (
-    AUDIO_ONLY,
-    ComparedClip,
-    held_out_recordings,
-    speech_of_condition,
-)
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, held_out_recordings, speech_of_condition
 
 evaluate = partial(evaluated, recogniser="own")
 """The toy's voice is that of its model."""

@@ -64,7 +64,7 @@ def read_pipe(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def written_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], bool]]:
+def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], bool]]:
     """Let ``-`` among the outputs be a temporary file, and write it to standard output at the end.
 
     Yields the outputs, and whether standard output is one of them; then nothing else may be printed there.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.outputs.output import ShownFace
 
 
-def animated_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
+def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
     """Run a job for each of several recordings, or for all of a folder, or where the output is a folder.
 
     Each recording is reported; at the end the paths that were written are printed.
@@ -29,33 +29,33 @@ def animated_one_by_one(job: Job, given: Sequence[Path], options: argparse.Names
     Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
-    from lipmotion.pipeline.understand.recordings import is_for_several, recordings_of
+    from lipmotion.pipeline.analysis.recordings import is_for_several, list_recordings
 
     if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
     _check_named(given)
-    _animate_each(*_one_by_one(job, recordings_of(given)), options, report)
+    _animate_each(*_one_by_one(job, list_recordings(given)), options, report)
     return True
 
 
 @contextmanager
-def placed_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterator[list[Path]]:
+def place_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterator[list[Path]]:
     """Yield the output files of one recording; of folders, which are made, the files in them.
 
     kind : suffix of a file in a folder, without the dot
     If the block fails, no new folders are left.
-    Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``planned_outputs``.
+    Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``plan_outputs``.
     """
-    from lipmotion.pipeline.understand.recordings import is_for_several, planned_outputs
-    from lipmotion.storage.files import made_folders
+    from lipmotion.pipeline.analysis.recordings import is_for_several, plan_outputs
+    from lipmotion.storage.files import create_folders
 
     if not any(map(is_for_several, outputs)):
         yield [Path(output) for output in outputs]
         return
     _check_named([recording])
-    (planned,) = planned_outputs([recording], outputs, [kind])
+    (planned,) = plan_outputs([recording], outputs, [kind])
     files = [Path(file) for file in planned]
-    with made_folders({file.parent for file in files}):
+    with create_folders({file.parent for file in files}):
         yield files
 
 
@@ -77,19 +77,19 @@ def _one_by_one(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownF
     Faces and characters are opened once, for all recordings. What cannot be leaves no new folders.
     """
     from lipmotion.errors import InputError
+    from lipmotion.pipeline.analysis.recordings import plan_outputs
     from lipmotion.pipeline.job import check_outputs, open_face
-    from lipmotion.pipeline.understand.recordings import planned_outputs
-    from lipmotion.storage.files import made_folders
+    from lipmotion.storage.files import create_folders
 
     alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
     alone["posteriors"] = job.outputs.posteriors
     for name, value in alone.items():
         if value is not None and len(recordings) > 1:
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
-    planned = planned_outputs(recordings, job.outputs.files, job.outputs.kinds)
+    planned = plan_outputs(recordings, job.outputs.files, job.outputs.kinds)
     face = open_face(job.outputs)
     jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
-    with made_folders({Path(file).parent for files in planned for file in files}):
+    with create_folders({Path(file).parent for files in planned for file in files}):
         for each, recording in zip(jobs, recordings, strict=True):
             check_outputs(each, face, recording)
     return jobs, face

@@ -18,7 +18,7 @@ from packaging.markers import Marker
 from packaging.specifiers import SpecifierSet
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
-from lipmotion.extensions import install_command, installed_version, provided
+from lipmotion.extensions import install_command, installed_version, load_provided
 
 EXTRA = re.compile(r'\s*(?:\band\b)?\s*extra == "([\w-]+)"')
 
@@ -89,7 +89,7 @@ EXTRAS = {
 PHONES = (("sil", 0.3), ("m", 0.09), ("aa", 0.16), ("m", 0.09), ("ax", 0.1), ("sil", 0.3))
 WORDS = "mama"
 """A made-up second of speech: its phones with their durations in seconds, and its word."""
-LEAST_OPENING = 0.03
+MIN_OPENING = 0.03
 """Opening of the lips that *mama* has at least, in distances between the outer eye corners."""
 OPENCV = "opencv-python-headless"
 LEAN = "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"
@@ -211,7 +211,7 @@ def _phone_recogniser() -> str:
 def _face_tracking() -> str:
     """Return which OpenCV and MediaPipe are imported, and whether another OpenCV lies over that of the extra."""
     try:
-        opencv = provided("tracking_versions")()
+        opencv = load_provided("tracking_versions")()
     except MissingDependencyError as error:
         raise _AbsentError(str(error)) from error
     found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
@@ -279,8 +279,8 @@ def _main_path() -> str:
         motion = job.run().motion
         sizes = [Path(file).stat().st_size for file in files]
     widest = float(motion["opening"].max())
-    if not (math.isfinite(widest) and widest > LEAST_OPENING and min(sizes) > 0):
-        raise LipMotionError(f"the lips open by {widest:.3f}, required more than {LEAST_OPENING}; install numpy again")
+    if not (math.isfinite(widest) and widest > MIN_OPENING and min(sizes) > 0):
+        raise LipMotionError(f"the lips open by {widest:.3f}, required more than {MIN_OPENING}; install numpy again")
     written = ", ".join(Path(file).name.partition(".")[2] for file in files)
     return f"{motion.time_s[-1]:.1f} s of made-up speech → {written}; the lips open by {widest:.2f}"
 

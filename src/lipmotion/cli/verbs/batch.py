@@ -49,9 +49,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``batch`` or, with ``--check``, ``check``; print what was done. Raises InputError: some lines failed."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         job = part_of(options, options.start)
         if options.check:
             _check(options, job, report)

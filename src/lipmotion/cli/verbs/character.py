@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types.values import number_of
 
@@ -51,10 +51,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
-    from lipmotion.extensions import provided
+    from lipmotion.extensions import load_provided
     from lipmotion.meshes.files.binding_files import save_binding, write_points, write_weights
     from lipmotion.pipeline.job import open_character
-    from lipmotion.pipeline.outputs.curve_sets import described
+    from lipmotion.pipeline.outputs.curve_sets import describe_character
 
     if options.character.suffix.lower() == ".csv":
         _calibrate_rig(options)
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
         if options.write_table:
             _write_blank_table(options.character)
         raise
-    print_lines("\n".join(described(character)))
+    print_lines("\n".join(describe_character(character)))
     if options.write_table or stated:
         _write_table(character.table_file, character.table_rows(), character, stated)
     if options.write_points:
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> None:
     if options.write_binding and character.binding is not None:
         save_binding(options.write_binding, character.binding, character.mesh)
     if options.picture:
-        provided("write_picture")(options.picture, character)
+        load_provided("write_picture")(options.picture, character)
     for path in (options.write_points, options.write_weights, options.write_binding, options.picture):
         if path:
             print_line(path)
@@ -110,12 +110,12 @@ def _write_table(
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
     from lipmotion.meshes.files.rig_tables import write_rig_table
-    from lipmotion.pipeline.outputs.calibration import calibrated, posed_sources
+    from lipmotion.pipeline.outputs.calibration import calibrate_rows, pose_sources
 
-    changed = calibrated(rows, posed_sources(curves, rows), stated) if stated else rows
+    changed = calibrate_rows(rows, pose_sources(curves, rows), stated) if stated else rows
     for row in changed:
         if row not in rows:
-            print_line(f"{shortened(row.control):14} {row.source}: gain {row.gain:.3g}, offset {row.offset:.3g}")
+            print_line(f"{shorten(row.control):14} {row.source}: gain {row.gain:.3g}, offset {row.offset:.3g}")
     write_rig_table(path, changed)
     print_line(path)
 
@@ -126,8 +126,8 @@ def _stated(options: argparse.Namespace) -> dict[str, dict[str, float]]:
     for pose in CALIBRATION:
         for part in filter(None, getattr(options, pose).split(",")):
             name, _, text = part.rpartition("=")
-            value = number_of(text, f"--{pose}: the value in {shortened(part)!r} is", "NAME=X, as A=0.8")
+            value = number_of(text, f"--{pose}: the value in {shorten(part)!r} is", "NAME=X, as A=0.8")
             if not name.strip():
-                raise InputError(f"--{pose}: {shortened(part)!r} names no control, required NAME=X, as A=0.8")
+                raise InputError(f"--{pose}: {shorten(part)!r} names no control, required NAME=X, as A=0.8")
             stated.setdefault(pose, {})[name.strip()] = value
     return stated

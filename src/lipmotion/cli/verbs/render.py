@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.pipes import add_pipe_format, written_pipe
+from lipmotion.cli.arguments.pipes import add_pipe_format, write_pipe
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request
@@ -42,10 +42,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read the motion and call ``lipmotion.write``; print the paths that were written."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
 
-    with reporting(options) as report:
-        with written_pipe(options) as (files, pipe):
+    with report_progress(options) as report:
+        with write_pipe(options) as (files, pipe):
             job = part_of(options, Job()).of(options.sound or _sound_named_by(options.motion), files)
             _render(job, options.motion, options.motion_rate, report.receive)
         written = [] if pipe else list(files)
@@ -56,7 +56,7 @@ def _render(job: Job, motion: Path, rate_hz: float | None, monitor: Monitor) -> 
     import numpy as np
 
     from lipmotion.pipeline.edit_files import is_edit_file
-    from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
+    from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion.types import Audio
 
@@ -67,7 +67,7 @@ def _render(job: Job, motion: Path, rate_hz: float | None, monitor: Monitor) -> 
     planned = check_outputs(job, face, sound)
     generation = read_generation(motion, job.request.units, rate_hz)
     if isinstance(sound, Path):
-        generation = as_long_as(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
+        generation = match_duration(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
     elif any(output.draws for output in planned):
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
         sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)

@@ -42,9 +42,9 @@ def run(options: argparse.Namespace) -> None:
         options.wrong("required: a text, or --text FILE, not both")
     if options.words is not None and is_file(Path(options.words)):
         options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         if options.voices:
             _list_voices(report)
         else:
@@ -53,15 +53,15 @@ def run(options: argparse.Namespace) -> None:
 
 def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.analysis.read_request import read_lexicon
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.understand.read_request import lexicon_of
 
     job = part_of(options, Job())
     face = open_face(job.outputs)
     check_outputs(job, face)
     asked, text = job.request, read_text(options.text) if options.text else options.words
-    lexicon = lexicon_of(asked) if asked.lexicon else None
+    lexicon = read_lexicon(asked) if asked.lexicon else None
     model, corpus = load_model(asked.model), Corpus.open(options.corpus) if options.corpus else None
     sound, result = speak(
         text,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_container import GltfDocument
 from lipmotion.meshes.files.gltf_schema import COMPONENTS, COMPRESSION, LARGEST_NUMBER, WIDTHS
 from lipmotion.meshes.files.meshopt import decoded_attributes, decoded_exponents, decoded_indices, decoded_triangles
@@ -114,7 +114,7 @@ def _decoded(data: memoryview, packed: dict[str, Any], budget: Budget) -> bytes:
     count, stride, mode, kind = packed["count"], packed["byteStride"], packed["mode"], packed.get("filter", "NONE")
     budget.spend("compressed bytes", count * stride + len(data))
     if kind not in {"NONE", "EXPONENTIAL"}:
-        raise InputError(f"a compressed array under the filter {shortened(kind)!r}, which is not read")
+        raise InputError(f"a compressed array under the filter {shorten(kind)!r}, which is not read")
     if mode == "ATTRIBUTES":
         elements = decoded_attributes(bytes(data), count, stride)
         return decoded_exponents(elements).tobytes() if kind == "EXPONENTIAL" else elements.tobytes()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
 from lipmotion.meshes.files.gltf_nodes import PlacedNode, placed_nodes
@@ -422,7 +422,7 @@ class _SceneSurface:
                 continue
             if self._arrays.count(target["POSITION"]) != count:
                 found = self._arrays.count(target["POSITION"])
-                raise InputError(f"the target {shortened(name)!r} moves {found} of {count} vertices; export it again")
+                raise InputError(f"the target {shorten(name)!r} moves {found} of {count} vertices; export it again")
             moved = _mapped(linear, self._arrays.floats(target["POSITION"], 3))
             rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST_DISPLACEMENT)
             self._budget.spend("displacements", len(rows))

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_52, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.files import atomic_file, read_text_file
 from lipmotion.storage.sources import is_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
 from lipmotion.types import Channel, Motion
@@ -65,10 +65,10 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
+        raise InputError(f"{path}: no table ({shorten(str(error))}); required {','.join(COLUMNS)}") from error
     found = table.plain_names
     if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
-        raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
+        raise InputError(f"{path}: the columns are {shorten(','.join(found))!r}, required {','.join(COLUMNS)}")
     rows = []
     for line, fields in lines:
         texts = dict.fromkeys(COLUMNS, "") | dict(zip(found, map(from_field, map(str.strip, fields)), strict=False))
@@ -87,7 +87,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
                 )
             rows.append(RigRow(texts["control"], texts["source"], **numbers))
         except ValueError as error:
-            raise InputError(f"{path}: line {line}: {shortened(str(error))}") from error
+            raise InputError(f"{path}: line {line}: {shorten(str(error))}") from error
     if not rows or len(rows) > MOST_CONTROLS:
         raise InputError(f"{path}: {len(rows)} rows, required 1 to {MOST_CONTROLS}")
     return tuple(rows)
@@ -95,7 +95,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
 
 def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
     """Write a table, which ``read_rig_table`` reads. Raises ExportError: it cannot be written."""
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
         for row in rows:
@@ -110,7 +110,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
     known = list(dict.fromkeys(names))
     by_lower = {each.lower(): each for each in reversed(known)}
     near = [by_lower[each] for each in get_close_matches(name.lower(), by_lower, 3)]
-    return f"nearest: {', '.join(near)}" if near else f"there are {shortened(', '.join(known)) or 'none'}"
+    return f"nearest: {', '.join(near)}" if near else f"there are {shorten(', '.join(known)) or 'none'}"
 
 
 def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
@@ -124,7 +124,7 @@ def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float6
     for row in rows:
         if row.source and row.source not in sources:
             raise InputError(
-                f"the control {shortened(row.control)!r} follows {shortened(row.source)!r}, which is no curve; "
+                f"the control {shorten(row.control)!r} follows {shorten(row.source)!r}, which is no curve; "
                 f"{nearest(row.source, sources)}"
             )
         value = row.gain * sources[row.source] if row.source else np.zeros(len(next(iter(sources.values()))))
@@ -159,7 +159,7 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
         return {}
     found: dict[str, RigRow] = {}
     for row in read_rig_table(path):
-        control, source = shortened(row.control), shortened(row.source)
+        control, source = shorten(row.control), shorten(row.source)
         if row.control not in mesh.shape_names:
             raise InputError(f"{path}: there is no blendshape {control!r}; {nearest(row.control, mesh.shape_names)}")
         if row.source not in {"", row.control, *SOURCES}:

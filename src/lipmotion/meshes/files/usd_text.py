@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError, shortened
+from lipmotion.errors import ExportError, shorten
 from lipmotion.printable import is_line
 from lipmotion.storage.files import as_text
 
@@ -86,7 +86,7 @@ def asset(path: str) -> str:
     ('@./welcome.flac@', '@@@../a@b.wav@@@', '@@@./a\\\\@@@b.wav@@@')
     """
     if not is_line(path):
-        raise ExportError(f"the name {shortened(path)!r} has a character that .usda cannot refer to; rename the file")
+        raise ExportError(f"the name {shorten(path)!r} has a character that .usda cannot refer to; rename the file")
     mark = "@@@" if "@" in path else "@"
     absolute = path.startswith(("/", "../")) or ":" in path
     return mark + ("" if absolute else "./") + path.replace("@@@", "\\@@@") + mark

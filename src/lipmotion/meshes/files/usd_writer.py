@@ -15,7 +15,7 @@ from lipmotion.meshes.files.usd_text import asset, matrix, numbers, prim, prim_n
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
 from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
 from lipmotion.meshes.model.textures import linear
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 
 ROOT = "Character"
 SKELETON, ANIMATION, LOOKS, FACE = f"/{ROOT}/Skeleton", f"/{ROOT}/Animation", f"/{ROOT}/Looks", f"/{ROOT}/Face"
@@ -35,7 +35,7 @@ def write_usda(path: Path, scene: Scene) -> None:
     Raises ExportError: the file cannot be written.
     """
     normals = shading_normals(scene.mesh, split=scene.split)
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
         for line in _lines(scene, normals):
             file.write(line + "\n")
 

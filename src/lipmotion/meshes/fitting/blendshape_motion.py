@@ -20,7 +20,7 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion
 
 Array = NDArray[np.float64]
 
-LEAST_OPENING = 0.05
+MIN_OPENING = 0.05
 """A blendshape that parts the lips by more, in eye distances, opens the mouth."""
 ARTICULATORY = {
     "tongue": (("tongueOut", 3.0),),
@@ -106,7 +106,7 @@ def given_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
     by_name = {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in shapes.names if name in motion.names}
     by_known = arkit_weights(motion)
     curves = [by_name.get(name, by_known.get(known)) for name, known in zip(shapes.names, shapes.known, strict=True)]
-    if not any(curve is not None and gap > LEAST_OPENING for curve, gap in zip(curves, shapes.gap, strict=True)):
+    if not any(curve is not None and gap > MIN_OPENING for curve, gap in zip(curves, shapes.gap, strict=True)):
         return None
     nothing = np.zeros(len(motion.values))
     values = np.stack([nothing if curve is None else curve for curve in curves], axis=1)

@@ -18,7 +18,7 @@ from lipmotion.articulation.lip_points import (
     MouthTemplate,
     mouth_template,
 )
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import arkit_name, viseme_name, vowel_name
 from lipmotion.meshes.model.surface import MeshSurface, mesh_surface
@@ -96,7 +96,7 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     middle = _slit(mesh.vertices, surface, drop, skin)
     if len(middle) < 3:
         raise InputError(
-            f"the blendshape {shortened(shape.name)!r} parts no lips; name the lip points by their vertices "
+            f"the blendshape {shorten(shape.name)!r} parts no lips; name the lip points by their vertices "
             "(docs/meshes.md)"
         )
     template = mouth_template()
@@ -182,7 +182,7 @@ def opening_shape(mesh: Mesh) -> Blendshape:
         found = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.called)), None)
         if found is not None:
             return found
-    names = shortened(", ".join(mesh.shape_names)) or "none"
+    names = shorten(", ".join(mesh.shape_names)) or "none"
     raise InputError(
         f"no blendshape opens the mouth, required jawOpen, viseme_aa or aa; the mesh has: {names}. Say which one "
         "does in a table beside the character, or name the lip points by their vertices (docs/meshes.md)"

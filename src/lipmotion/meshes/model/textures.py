@@ -24,7 +24,7 @@ MOST_SCANS = 100
 DIRECT = {"RGB", "L"}
 """Modes of pictures that are reduced as they are; all others get an opacity first."""
 PICTURES = ("PNG", "JPEG", "WEBP")
-MOST_COLUMNS = 1024
+MAX_COLUMNS = 1024
 """Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
 FULL_SCALE = 65535
 
@@ -86,7 +86,7 @@ class Texture:
 
 
 def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> Texture | None:
-    """Return the texture in the bytes of a picture, reduced to ``MOST_COLUMNS`` pixels across.
+    """Return the texture in the bytes of a picture, reduced to ``MAX_COLUMNS`` pixels across.
 
     budget : counts its pixels before they are decoded; None: of this picture alone
     None: the picture is damaged, too large, or of another format than PNG, JPEG and WebP.
@@ -99,12 +99,12 @@ def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> T
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
                 pixels = picture.width * picture.height
-                picture.draft("RGB", (MOST_COLUMNS, MOST_COLUMNS))
+                picture.draft("RGB", (MAX_COLUMNS, MAX_COLUMNS))
                 if _bytes_to_decode(picture, pixels) > MOST_BYTES or _scans(picture, content) > MOST_SCANS:
                     return None
                 (budget or Budget()).spend("pixels of pictures", pixels)
                 small = picture if _is_direct(picture) else picture.convert("RGBA")
-                small.thumbnail((MOST_COLUMNS, MOST_COLUMNS))
+                small.thumbnail((MAX_COLUMNS, MAX_COLUMNS))
                 return Texture(np.asarray(small.convert("RGBA")))
     except InputError:
         raise

@@ -11,13 +11,13 @@ from pathlib import Path
 from statistics import median
 
 from lipmotion.errors import CorpusError, InputError, LipMotionError
+from lipmotion.pipeline.analysis.read_request import read_request
+from lipmotion.pipeline.analysis.spoken_language import detect_english
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
 from lipmotion.pipeline.batch.pool import WorkerDied, local_pool
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import read_request
-from lipmotion.pipeline.understand.spoken_language import english_spoken
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript, silent_monitor
@@ -29,7 +29,7 @@ from lipmotion.units.text_normalisation import words_in, written_words
 
 SILENT_DB = -60.0
 """A recording that is nowhere louder, in dB of full scale, is silent."""
-LEAST_SPOKEN_S = 0.1
+MIN_SPOKEN_S = 0.1
 """A recording with less sound above its quiet level has nothing said in it."""
 SHORTEST_TOLD_S, FEWEST_TOLD_WORDS = 8.0, 5
 """The language of shorter speech, or of fewer words, is not told: it takes a dozen long words to be sure."""
@@ -66,7 +66,7 @@ class CheckedLine:
     words: tuple[str, ...] = ()
 
 
-def checked_line(work: LineToCheck) -> CheckedLine:
+def check_line(work: LineToCheck) -> CheckedLine:
     """Return what is found in the recording of a line, and what is to be said in it."""
     line, path = work.line, Path(work.line.recording)
     if not path.exists():
@@ -81,22 +81,22 @@ def checked_line(work: LineToCheck) -> CheckedLine:
     if loudest_db < SILENT_DB:
         return CheckedLine(line.name, "silent", f"nowhere louder than {loudest_db:.0f} dB of full scale")
     spoken_s = sum(end_s - start_s for start_s, end_s in spoken_spans(levels))
-    if spoken_s < LEAST_SPOKEN_S:
+    if spoken_s < MIN_SPOKEN_S:
         return CheckedLine(line.name, "silent", "no sound longer than a click")
     return CheckedLine(
         line.name,
         reason=_wrong_language(work.request.language, words, audio, spoken_s),
         digest=hashlib.sha256(sixteen_bits(audio.samples).tobytes()).hexdigest(),
         spoken_s=spoken_s,
-        letters=letters_of(words),
+        letters=count_letters(words),
         words=words,
     )
 
 
-def letters_of(words: Sequence[str]) -> float:
+def count_letters(words: Sequence[str]) -> float:
     """Return how many letters words have, those of other scripts as many as take as long to say.
 
-    >>> letters_of(["ab", "c"]), letters_of(["你"])
+    >>> count_letters(["ab", "c"]), count_letters(["你"])
     (3.0, 4.0)
     """
     return sum((LETTERS_OF.get(script_of(letter), 1.0) for word in words for letter in word), 0.0)
@@ -126,7 +126,7 @@ def _wrong_language(language: str, words: Sequence[str], audio: Audio, spoken_s:
         return f"the words are in {told}, required {wanted}"
     if not wanted or spoken_s < SHORTEST_TOLD_S:
         return ""
-    english = english_spoken(audio)
+    english = detect_english(audio)
     if english is None or english == (wanted == ENGLISH):
         return ""
     return f"the speech is {'' if english else 'not '}English, required {wanted}"
@@ -201,7 +201,7 @@ def check(
     checked: dict[str, CheckedLine] = {}
     try:
         with local_pool(jobs or os.cpu_count() or 1) as pool:
-            for each in pool(checked_line, [LineToCheck(line, job.request) for line in lines]):
+            for each in pool(check_line, [LineToCheck(line, job.request) for line in lines]):
                 checked[each.name] = each
                 monitor(Progress(STAGE, len(checked), len(lines), len(checked) / len(lines)))
     except WorkerDied as error:

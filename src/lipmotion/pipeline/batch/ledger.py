@@ -20,17 +20,17 @@ from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, BatchLine
-from lipmotion.pipeline.batch.settings import InputFile, input_paths, line_fingerprint
+from lipmotion.pipeline.batch.settings import InputFile, fingerprint_line, input_paths
 from lipmotion.storage.files import (
     TEMPORARY,
+    atomic_file,
     check_own,
-    confined,
-    locked,
+    confine,
+    lock_folder,
     make_folder,
     open_own,
     remove,
     sha256_of,
-    whole_file,
 )
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, whole
@@ -140,7 +140,7 @@ def read_receipt(path: Path) -> Record | None:
 
 def write_receipt(path: Path, record: Mapping[str, Any]) -> None:
     """Write the receipt of a line. Raises ExportError: it cannot be written."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text(as_json(record), encoding="utf-8")
 
 
@@ -214,7 +214,7 @@ class Ledger:
 
         It need not if it was done with the same settings from the same files, and all its outputs exist.
         """
-        fingerprint = line_fingerprint(line, of_settings)
+        fingerprint = fingerprint_line(line, of_settings)
         if self._last.get(_key(line.name), ("", 0))[0] != fingerprint:
             return None
         record = self.finished(line, out)
@@ -257,7 +257,7 @@ def _name_in(row: bytes) -> str | None:
 
 
 @contextmanager
-def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
+def open_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     """Open the ledger of a folder of outputs for a new run, and end what an earlier one left undone.
 
     lines : those of the batch: what earlier runs did of others stays in the ledger and is not looked at
@@ -268,10 +268,10 @@ def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     """
     for path in (place.own / RUN, *(Path(place.out) / name for name in OWN_FILES)):
         check_own(path)
-    with confined(Path(place.out)), locked(place.own):
+    with confine(Path(place.out)), lock_folder(place.own):
         for folder in (place.own / RECEIPTS, place.own / WORK):
             make_folder(folder)
-        with whole_file(place.own / RUN) as temporary:  # from now on, workers of earlier runs finish nothing
+        with atomic_file(place.own / RUN) as temporary:  # from now on, workers of earlier runs finish nothing
             temporary.write_text(place.run, encoding="ascii")
         path = Path(place.out) / LEDGER
         try:

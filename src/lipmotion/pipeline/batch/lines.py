@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.storage.files import check_listable, portable_name, read_text_file
 from lipmotion.storage.text_table import read_table
@@ -26,11 +26,11 @@ OWN_FILES = ("batch.jsonl", "report.csv", "report.html", "marks.csv")
 """Files of a batch itself beside the outputs of its lines."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
-LARGEST_LIST_BYTES, MOST_LINES = 1 << 27, 200_000
+LARGEST_LIST_BYTES, MAX_LINES = 1 << 27, 200_000
 """Most bytes of a list, and most lines of a batch: the words of a very long game."""
 LONGEST_PART_BYTES = 255
 """Most bytes of the name of a file or a folder, on the usual file systems."""
-MOST_NAMED_LINES = 3
+MAX_NAMED_LINES = 3
 CONTROL = re.compile(r"[\x00-\x1f]")
 
 
@@ -105,7 +105,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
             file = f"{line.name}.{kind}"
             if any(len(os.fsencode(part)) > LONGEST_PART_BYTES for part in file.split("/")):
                 raise ExportError(
-                    f"{line.recording}: the output {shortened(file)!r} has a part of more than {LONGEST_PART_BYTES} "
+                    f"{line.recording}: the output {shorten(file)!r} has a part of more than {LONGEST_PART_BYTES} "
                     "bytes; give a shorter name in a column 'output' of the list"
                 )
             other = next((each for each in longer[kind] if file.lower().endswith(each)), None)
@@ -178,8 +178,8 @@ def _in_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
 
 
 def _check_count(source: Path, count: int) -> None:
-    if count > MOST_LINES:
-        raise InputError(f"{source}: {count} lines, required at most {MOST_LINES} in one batch; divide the list")
+    if count > MAX_LINES:
+        raise InputError(f"{source}: {count} lines, required at most {MAX_LINES} in one batch; divide the list")
 
 
 def _shared_folder(paths: Sequence[str], base: str) -> str:
@@ -216,7 +216,7 @@ def _table(source: Path, text: str) -> list[dict[str, str]] | None:
         raise InputError(f"{source}: not a readable table ({error}); export it again as CSV") from error
     unused = [name for name in header if name and name != file and name not in COLUMNS]
     if unused:
-        named = ", ".join(map(shortened, unused[:MOST_NAMED_LINES]))
+        named = ", ".join(map(shorten, unused[:MAX_NAMED_LINES]))
         LOG.warning("%s: columns that are not used: %s; used are %s", source, named, ", ".join((file, *COLUMNS)))
     return [_row(source, number, header, file, cells) for number, cells in rows]
 

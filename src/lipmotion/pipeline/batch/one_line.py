@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 
 from lipmotion.errors import ExportError, LipMotionError
-from lipmotion.extensions import failed_extension, provided
+from lipmotion.extensions import describe_failed_extension, load_provided
 from lipmotion.formats.base import motion_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     FAILED,
@@ -34,17 +35,16 @@ from lipmotion.pipeline.batch.ledger import (
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.batch.settings import CUES, input_files, line_fingerprint
+from lipmotion.pipeline.batch.settings import CUES, fingerprint_line, input_files
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import (
     check_target,
-    confined,
+    confine,
     make_folder,
     put_in_place,
     remove,
@@ -55,7 +55,7 @@ from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
-MOST_WARNINGS = 10
+MAX_WARNINGS = 10
 SILENCE_S = 0.5
 """Seconds of silence with which the settings are tried out."""
 
@@ -64,7 +64,7 @@ SILENCE_S = 0.5
 class LineWork:
     """What a worker needs to know of a line.
 
-    of_settings : from ``fingerprint_of``
+    of_settings : from ``fingerprint_job``
     """
 
     line: BatchLine
@@ -77,7 +77,7 @@ class RunReplacedError(ExportError):
     """A later run has begun in the same folder."""
 
 
-def finished_line(work: LineWork) -> Record:
+def finish_line(work: LineWork) -> Record:
     """Return the record of a line, whose outputs are in place; or that of an error, without outputs.
 
     A line whose receipt is there, because another worker died after it had finished it, is not done again.
@@ -87,7 +87,7 @@ def finished_line(work: LineWork) -> Record:
     if receipt is not None and receipt["run"] == work.place.run and are_in_place(Path(work.place.out), receipt):
         return receipt
     folder = work.place.work(work.line.name)
-    with confined(Path(work.place.out)):
+    with confine(Path(work.place.out)):
         remove(folder)
         make_folder(folder)
         try:
@@ -104,7 +104,7 @@ def _finished(work: LineWork) -> Record:
         "name": work.line.name,
         "recording": work.line.recording,
         "run": work.place.run,
-        "fingerprint": line_fingerprint(work.line, work.of_settings),
+        "fingerprint": fingerprint_line(work.line, work.of_settings),
         "outcome": DONE,
         "inputs": [],
         "outputs": {},
@@ -123,14 +123,14 @@ def _finished(work: LineWork) -> Record:
 
 
 def _taken(start_s: float, warnings: list[str]) -> Record:
-    return {"warnings": warnings[:MOST_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
+    return {"warnings": warnings[:MAX_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
 
 
 def _reason(error: BaseException) -> str:
     if isinstance(error, LipMotionError | OSError | MemoryError):
         return str(error) or type(error).__name__
     unexpected = f"unexpected {type(error).__name__}: {error}; this is a bug of lipmotion: please report it"
-    return failed_extension(error) or unexpected
+    return describe_failed_extension(error) or unexpected
 
 
 def _is_final(error: BaseException) -> bool:
@@ -262,14 +262,14 @@ class _Shared:
 @lru_cache(maxsize=1)
 def _cached(job: Job, of_run: str) -> _Shared:  # noqa: ARG001 (files may change between two runs)
     """Return what the lines of a run share. Raises as ``open_face``, ``Lexicon.from_file`` and ``load_model``."""
-    lexicon = None if job.request.lexicon is None else lexicon_of(job.request)
+    lexicon = None if job.request.lexicon is None else read_lexicon(job.request)
     return _Shared(load_model(job.request.model), open_face(job.outputs), lexicon)
 
 
 @lru_cache(maxsize=8)
 def _map_onto(model: Model, face: Any, speaker: str) -> SpeakerMap:
     """Return the map of the motion of a speaker onto a face: the same for all lines, and slow to make."""
-    return provided("map_onto")(model, face, speaker=speaker)
+    return load_provided("map_onto")(model, face, speaker=speaker)
 
 
 def check_line_job(job: Job, of_run: str) -> None:

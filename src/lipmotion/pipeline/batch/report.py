@@ -19,7 +19,7 @@ from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.marks import APPROVE, Mark, is_due
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
-from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.files import as_text, atomic_file
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.text_table import as_field
 from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
@@ -45,7 +45,7 @@ def write_reports(
     Raises ExportError: they cannot be written.
     Memory: a number and a reference a line; the records are read one by one.
     """
-    doubts = [doubt_of(ledger.record_of(line.name) or {}) for line in lines]
+    doubts = [rate_doubt(ledger.record_of(line.name) or {}) for line in lines]
     order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
     table, page = out / CSV_REPORT, out / HTML_REPORT
     marks = marks or {}
@@ -53,7 +53,7 @@ def write_reports(
     page_text = page_text.replace(BASIS, _digest(marks))
     before, _, after = page_text.partition(ROWS)
     with ExitStack() as stack:
-        paths = [stack.enter_context(whole_file(path)) for path in (table, page)]
+        paths = [stack.enter_context(atomic_file(path)) for path in (table, page)]
         table_file = stack.enter_context(paths[0].open("w", encoding="utf-8", newline=""))
         page_file = stack.enter_context(paths[1].open("w", encoding="utf-8"))
         rows = csv.writer(table_file)
@@ -69,7 +69,7 @@ def write_reports(
     return table, page
 
 
-def doubt_of(record: Record) -> float:
+def rate_doubt(record: Record) -> float:
     """Return how much a line deserves to be looked at, 0 (nothing is known against it) to 100 (it failed)."""
     if record.get("outcome") in (FAILED, None):
         return 100.0
@@ -91,7 +91,7 @@ def doubt_of(record: Record) -> float:
 def _records(lines: Sequence[BatchLine], ledger: Ledger, order: Sequence[int]) -> Iterator[Record]:
     for number in order:
         record = ledger.record_of(lines[number].name) or {"name": lines[number].name, "outcome": "missing"}
-        yield record | {"doubt": doubt_of(record), "outputs": list(record.get("outputs", ()))}
+        yield record | {"doubt": rate_doubt(record), "outputs": list(record.get("outputs", ()))}
 
 
 def _shown_mark(mark: Mark | None, record: Record) -> Mark | None:

@@ -10,14 +10,14 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import CorpusError, ExportError, shortened
-from lipmotion.pipeline.batch.ledger import DONE, FAILED, Ledger, Place, Record, are_same_inputs, opened_ledger
-from lipmotion.pipeline.batch.lines import MOST_NAMED_LINES, BatchLine, check_names, read_lines
-from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merged, read_marks, write_marks
-from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finished_line
+from lipmotion.errors import CorpusError, ExportError, shorten
+from lipmotion.pipeline.batch.ledger import DONE, FAILED, Ledger, Place, Record, are_same_inputs, open_ledger
+from lipmotion.pipeline.batch.lines import MAX_NAMED_LINES, BatchLine, check_names, read_lines
+from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merge_marks, read_marks, write_marks
+from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finish_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
 from lipmotion.pipeline.batch.report import write_reports
-from lipmotion.pipeline.batch.settings import check_job, fingerprint_of, line_fingerprint
+from lipmotion.pipeline.batch.settings import check_job, fingerprint_job, fingerprint_line
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.workers import process_count
 from lipmotion.storage.sources import Source, check_apart
@@ -25,7 +25,7 @@ from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
 LOG = logging.getLogger("lipmotion")
 STAGE = "animating"
-MOST_DEATHS = 3
+MAX_DEATHS = 3
 """After so many deaths of workers in a row that no line explains, the batch ends."""
 
 
@@ -102,8 +102,8 @@ def batch(
     _check_outside(lines, place)
     chosen = _chosen_marks(Path(place.out), marks, lines)
     check_line_job(job, place.run)
-    of_settings = fingerprint_of(job)
-    with opened_ledger(place, lines) as ledger:
+    of_settings = fingerprint_job(job)
+    with open_ledger(place, lines) as ledger:
         if marks is not None:
             write_marks(Path(place.out) / MARKS, chosen)
         counter = _Counter(len(lines), monitor)
@@ -135,7 +135,7 @@ def _chosen_marks(out: Path, given: str | Path | None, lines: Sequence[BatchLine
     """Return the marks in a folder of outputs, with those of a further file in their place. Raises InputError."""
     kept = read_marks(out / MARKS) if (out / MARKS).is_file() else {}
     later = read_marks(Path(given)) if given is not None else {}
-    marks = merged(kept, later)
+    marks = merge_marks(kept, later)
     names = {line.name for line in lines}
     unknown = [name for name in later if name not in names]
     if unknown:
@@ -167,7 +167,7 @@ def _kept_names(
 
 
 def _some(names: Sequence[str]) -> str:
-    return ", ".join(map(shortened, names[:MOST_NAMED_LINES])) + ", ..." * (len(names) > MOST_NAMED_LINES)
+    return ", ".join(map(shorten, names[:MAX_NAMED_LINES])) + ", ..." * (len(names) > MAX_NAMED_LINES)
 
 
 def _with_mark(record: Record, marks: Mapping[str, Mark]) -> Record:
@@ -188,14 +188,14 @@ def _finished(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None
     left, deaths = {work.line.name: work for work in waiting}, 0
     while left:
         try:
-            for record in each(finished_line, list(left.values())):
+            for record in each(finish_line, list(left.values())):
                 del left[record["name"]]
                 deaths = 0
                 yield record
         except WorkerDied as error:
             deaths += 1
             suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
-            if not suspects and deaths >= MOST_DEATHS:
+            if not suspects and deaths >= MAX_DEATHS:
                 raise CorpusError(
                     f"the worker processes die before they begin ({error}); is there enough memory? what is finished "
                     "is kept: run it again, with fewer --jobs"
@@ -208,13 +208,13 @@ def _finished(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None
 def _alone(each: Pool, work: LineWork) -> Record:
     """Return the record of a line that was being done when a worker died, done while nothing else is."""
     try:
-        return next(iter(each(finished_line, [work])))
+        return next(iter(each(finish_line, [work])))
     except WorkerDied:
         return {
             "name": work.line.name,
             "recording": work.line.recording,
             "run": work.place.run,
-            "fingerprint": line_fingerprint(work.line, work.of_settings),
+            "fingerprint": fingerprint_line(work.line, work.of_settings),
             "outcome": FAILED,
             "inputs": [],
             "outputs": {},

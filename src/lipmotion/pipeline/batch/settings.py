@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.extensions import installed_version, provided
+from lipmotion.extensions import installed_version, load_provided
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.label_files import LABEL_SUFFIXES, label_files_beside
@@ -48,7 +48,7 @@ def check_job(job: Job) -> None:
 
 def possible_kinds() -> tuple[str, ...]:
     """Return the kinds of outputs that a batch can write, without the first dot."""
-    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *provided("video_suffixes"), *provided("scene_suffixes"))
+    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *load_provided("video_suffixes"), *load_provided("scene_suffixes"))
     return (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
 
 
@@ -63,14 +63,14 @@ def check_kinds(kinds: Sequence[str]) -> None:
         raise ExportError(f"the outputs are {', '.join(kinds)}: one is given twice; give every kind once")
 
 
-def fingerprint_of(job: Job) -> str:
+def fingerprint_job(job: Job) -> str:
     """Return a digest of a job, with the content of the files that it names, and of what is installed: the version of
     lipmotion, and the recogniser of phones."""
     request = replace(job.request, model=job.request.model or shipped_path())
     parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
     parts += [job.delivery.as_mapping(), job.staging.as_mapping()]
-    if provided("is_drawings")(job.outputs.face):
-        parts.append({path.name: sha256_of(path) for path in provided("picture_files")(Path(job.outputs.face))})
+    if load_provided("is_drawings")(job.outputs.face):
+        parts.append({path.name: sha256_of(path) for path in load_provided("picture_files")(Path(job.outputs.face))})
     parts += _table(job.outputs.character)
     return _digest(as_json([*parts, installed_version(), installed_phone_recogniser()]))
 
@@ -88,7 +88,7 @@ def _told(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def line_fingerprint(line: BatchLine, of_settings: str) -> str:
+def fingerprint_line(line: BatchLine, of_settings: str) -> str:
     """Return a digest of what a line's row says, and of the settings; not of the content of its files."""
     return _digest(as_json([of_settings, line.name, line.recording, line.transcript, line.speaker]))
 

@@ -13,9 +13,9 @@ from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.generation import explanation_for
+from lipmotion.pipeline.generation import map_explanation
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import NO_EDITS, Session
 from lipmotion.printable import printable
 from lipmotion.types import (
@@ -60,7 +60,7 @@ def explain(
     >>> first.state, second.frame
     ('rest', 100)
     """
-    session = Session(request_of(speech, transcript), model=model)
+    session = Session(as_request(speech, transcript), model=model)
     return explain_session(session, NO_EDITS, [at] if isinstance(at, int | float) else at)
 
 
@@ -69,11 +69,11 @@ def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> t
     """Return what determined the frames nearest to some times, in seconds, of a session's motion with some edits.
 
     Of what pins, gains and locks change it says nothing: it is what the model did with the phones.
-    Raises InputError: a time lies outside the recording; else as ``Session.generated``.
+    Raises InputError: a time lies outside the recording; else as ``Session.generate``.
     """
-    speech, person = session.understood(edits).speech, session.speaker
+    speech, person = session.analyse(edits).speech, session.speaker
     frames = [_frame(time_s, len(speech.features.values)) for time_s in times]
-    generation = session.generated(edits)
+    generation = session.generate(edits)
     found = []
     for frame in frames:
         whole = [] if speech.parts is not None else [SpeechPart(0, slice(0, len(speech.features.values)), speech)]
@@ -86,7 +86,7 @@ def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> t
         if by_engine is None:
             found.append(explain_by_trace(generation, frame))
         else:
-            found.append(_placed(explanation_for(person, by_engine[0], part), first))
+            found.append(_placed(map_explanation(person, by_engine[0], part), first))
     if generation.confidence is None:
         return tuple(found)
     return tuple(replace(each, confidence=float(generation.confidence[each.frame])) for each in found)
@@ -198,7 +198,7 @@ def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
 def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
     """Return the motion of a session with some edits, and the posterior probabilities of every chain of its model.
 
-    Raises InputError: as ``Session.generated``, or the model's engine has no chains of states.
+    Raises InputError: as ``Session.generate``, or the model's engine has no chains of states.
     """
     engine, learned = session.model.engine, session.model.learned
     if type(engine).posteriors is Engine.posteriors:
@@ -207,4 +207,4 @@ def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"
         )
-    return session.generated(edits), engine.posteriors(learned, session.understood(edits).speech)
+    return session.generate(edits), engine.posteriors(learned, session.analyse(edits).speech)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.kernels.threads import one_thread
-from lipmotion.storage.files import check_target, whole_file
+from lipmotion.storage.files import atomic_file, check_target
 from lipmotion.types import ChainPosteriors, Generation
 from lipmotion.types.audio import Audio
 from lipmotion.units import is_silent
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from PIL import Image, ImageDraw, ImageFont
 
 SUFFIX = ".png"
-MOST_COLUMNS = 2000
+MAX_COLUMNS = 2000
 """Most columns of a plot; in a longer recording, each column is the mean of several frames."""
-LEAST_COLUMNS = 600
+MIN_COLUMNS = 600
 ROW_PX, GAP_PX, LEFT_PX, RIGHT_PX, TITLE_PX = 16, 14, 120, 16, 20
 CURVE_PX = 90
 """Height of the plot of the opening."""
-LEAST_PROBABILITY = 0.05
+MIN_PROBABILITY = 0.05
 """Units whose posterior probability never reaches this have no row."""
 STEPS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600, 1800)
-LEAST_PHONE_WIDTH = 8
+MIN_PHONE_WIDTH = 8
 """Mean pixels per phone that are needed to write the phones."""
-LEAST_TICK_DISTANCE = 80
+MIN_TICK_DISTANCE = 80
 """Least distance between two times on the axis, in pixels."""
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
 COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
@@ -54,7 +54,7 @@ def write_posteriors(path: Path, generation: Generation, posteriors: tuple[Chain
     Raises ExportError: another suffix, or the file cannot be written.
     """
     check_picture(path)
-    with whole_file(path) as unfinished:
+    with atomic_file(path) as unfinished:
         draw_posteriors(generation, posteriors).save(unfinished, optimize=True)
 
 
@@ -90,7 +90,7 @@ def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors
     from PIL import Image, ImageChops, ImageDraw
 
     frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
-    axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, LEAST_COLUMNS, MOST_COLUMNS)))
+    axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, MIN_COLUMNS, MAX_COLUMNS)))
     leader = posteriors[0].name if posteriors else ""
     panels = [panel for number, chain in enumerate(posteriors) for panel in _panels(axis, chain, leader, number)]
     channels = generation.motion.names
@@ -126,7 +126,7 @@ def _panels(
     """Return title, names of the rows and colours [shape=(columns, rows, 3)] of each panel of a chain."""
     colour = COLOURS[number % len(COLOURS)]
     most = chain.probability.max(axis=0)
-    shown = np.flatnonzero(most >= min(LEAST_PROBABILITY, most.max()))
+    shown = np.flatnonzero(most >= min(MIN_PROBABILITY, most.max()))
     first = (chain.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
     shown = shown[np.argsort(first, kind="stable")]
     names = [chain.units[unit] for unit in shown]
@@ -182,7 +182,7 @@ class PlotPainter:
 
     def phones(self, generation: Generation, bottom: float) -> None:
         """Write the phones at the top, and draw lines where they begin, if there is room for them."""
-        if len(generation.units) * LEAST_PHONE_WIDTH > self.axis.columns:
+        if len(generation.units) * MIN_PHONE_WIDTH > self.axis.columns:
             return
         free = 0.0
         for span in generation.units:
@@ -197,7 +197,7 @@ class PlotPainter:
     def times(self, y: float) -> None:
         """Draw the time axis."""
         length_s = self.axis.frames / self.axis.rate_hz
-        step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= LEAST_TICK_DISTANCE), STEPS_S[-1])
+        step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= MIN_TICK_DISTANCE), STEPS_S[-1])
         for number in range(int(length_s / step_s) + 1):
             x = self.axis.x(number * step_s)
             self.on.line([(x, y), (x, y + 5)], fill=INK)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.rig_tables import RigRow, nearest
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.shape_weights import shape_weights
-from lipmotion.pipeline.outputs.curve_sets import rig_sources
+from lipmotion.pipeline.outputs.curve_sets import make_rig_sources
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 Sources = Mapping[str, Sequence[float]]
@@ -25,11 +25,11 @@ OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
 """Their openings, in eye distances (the first is as wide as talkers open their mouths), and widths, that at rest 1."""
 RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
 DIGITS = 6
-LEAST_CHANGE = 1e-3
+MIN_CHANGE = 1e-3
 """A control that changes by less between two poses does not follow them."""
 
 
-def calibrated(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
+def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
     """Return the rows of a table with gains and offsets by which controls have the stated values.
 
     sources : of the curves that the rows follow
@@ -41,7 +41,7 @@ def calibrated(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Ma
     lines = {}
     for control in dict.fromkeys(name for given in stated.values() for name in given):
         if control not in values:
-            raise InputError(f"the table has no {shortened(control)!r}; {nearest(control, values)}")
+            raise InputError(f"the table has no {shorten(control)!r}; {nearest(control, values)}")
         now = values[control]
         wanted = {number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})}
         if len(wanted) == 1:
@@ -60,14 +60,14 @@ def calibrated(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Ma
     return moved
 
 
-def posed_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
+def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
     """Return the values of curves in ``POSES``: those of a character, or those that the rows of a rig follow.
 
     Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
     """
     motion, units, frames = _spoken()
     if isinstance(curves, Path):
-        found = rig_sources(motion, units, rows)
+        found = make_rig_sources(motion, units, rows)
         return {name: curve[frames].tolist() for name, curve in found.items()}
     if curves.shapes is None:
         raise InputError("the character is moved by control points, which have no weights to calibrate")
@@ -103,9 +103,9 @@ def _values(rows: Sequence[RigRow], sources: Sources) -> dict[str, np.ndarray]:
 def _line(control: str, now: np.ndarray, wanted: np.ndarray) -> tuple[float, float]:
     """Return gain and offset that bring a control's values nearest to the wanted ones."""
     apart = now - now.mean()
-    if np.abs(apart).max() < LEAST_CHANGE:
+    if np.abs(apart).max() < MIN_CHANGE:
         raise InputError(
-            f"{shortened(control)!r} follows no curve that tells these poses apart; give it another source in the table"
+            f"{shorten(control)!r} follows no curve that tells these poses apart; give it another source in the table"
         )
     gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
     return gain, round(float(wanted.mean() - gain * now.mean()), DIGITS)

@@ -40,7 +40,7 @@ and MPEG-4's facial animation parameters of lips and jaw."""
 
 
 def check_curve_set(curves: str | Path) -> None:
-    """Raise InputError unless there is such a set of curves, or such a table of a rig, for ``curves_of``."""
+    """Raise InputError unless there is such a set of curves, or such a table of a rig, for ``make_curves``."""
     if Path(curves).suffix.lower() == ".csv":
         read_rig_table(Path(curves))
     elif curves not in SHAPE_SETS:
@@ -54,7 +54,7 @@ def curve_names(curves: str | Path | DrivenCharacter) -> tuple[str, ...]:
     return () if curves in SHAPE_SETS else tuple(row.control for row in read_rig_table(Path(curves)))
 
 
-def curves_of(
+def make_curves(
     motion: Motion,
     units: Timeline[Unit],
     curves: str | Path | DrivenCharacter,
@@ -73,17 +73,17 @@ def curves_of(
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
     if isinstance(curves, DrivenCharacter):
-        return edited_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
+        return edit_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
     check_curve_set(curves)
     if curves in SHAPE_SETS:
         return with_edited_curves(_curves_of(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
-    sources = rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
+    sources = make_rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
     own = [edit for edit in edits if edit.channel not in sources]
     return with_edited_curves(rig_motion(rows, sources, motion.rate_hz), units, own)
 
 
-def rig_sources(
+def make_rig_sources(
     motion: Motion,
     units: Timeline[Unit],
     rows: Sequence[RigRow],
@@ -95,7 +95,7 @@ def rig_sources(
     """Return the curves that controls of a rig may follow, by their names [each shape=(T,)].
 
     Channels of motion, ARKit's blendshapes, visemes; where rows ask for others, also vowels, moods, eyes, brows and the
-    head. staging, prosody, edits : as of ``curves_of``
+    head. staging, prosody, edits : as of ``make_curves``
     """
 
     def plain(name: str) -> Motion:
@@ -108,7 +108,7 @@ def rig_sources(
     return {name: np.zeros(len(motion.values)) for name in ARKIT_OTHERS} | sources
 
 
-def edited_weights(
+def edit_weights(
     weights: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit], known: Mapping[str, str] | None = None
 ) -> Motion:
     """Return weights of a character with pins and gains, which name its blendshapes as it does or as ``known``.
@@ -135,9 +135,9 @@ def _curves_of(
     motion = with_mouth(motion)
     if name == WHOLE_FACE:
         mouth = shape_weights(motion, units, arkit_mouth())
-        return beside(mouth, living_curves(motion, units, staging, prosody))
+        return join_channels(mouth, living_curves(motion, units, staging, prosody))
     if name == VOWELS:
-        return beside(_vowel_motion(motion, units), living_curves(motion, units, staging, prosody))
+        return join_channels(_vowel_motion(motion, units), living_curves(motion, units, staging, prosody))
     return viseme_motion(units, spoken_mouth(motion, units)) if name == "visemes" else fap_motion(motion, units)
 
 
@@ -151,10 +151,10 @@ def _vowel_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
     curves |= {name: curve * mouth.free for name, curve in shown.items()}
     channels = tuple(Channel(name, WEIGHT) for name in curves)
     added = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
-    return beside(shape_weights(motion, units, vowel_mouth()), added)
+    return join_channels(shape_weights(motion, units, vowel_mouth()), added)
 
 
-def beside(first: Motion, second: Motion) -> Motion:
+def join_channels(first: Motion, second: Motion) -> Motion:
     """Return two motions of the same frames as one, the channels of the first one before those of the second one.
 
     Raises InputError: other numbers of frames, or a channel that both have.
@@ -173,20 +173,20 @@ def with_curves(
     staging: Staging | None = None,
     prosody: Prosody | None = None,
 ) -> tuple[Generation, tuple[str, ...]]:
-    """Return a generation with the channels of ``curves_of`` after its own, and the names of those channels.
+    """Return a generation with the channels of ``make_curves`` after its own, and the names of those channels.
 
-    Channels that the motion has already are replaced. The variance of all channels of ``curves_of`` is 0.
-    Raises InputError: as ``curves_of``.
+    Channels that the motion has already are replaced. The variance of all channels of ``make_curves`` is 0.
+    Raises InputError: as ``make_curves``.
     """
     edits = generation.curve_edits
-    added = curves_of(generation.motion, generation.units, curves, staging=staging, prosody=prosody, edits=edits)
+    added = make_curves(generation.motion, generation.units, curves, staging=staging, prosody=prosody, edits=edits)
     kept = [name for name in generation.motion.names if name not in added.names]
     if len(kept) < len(generation.motion.names):
         generation = generation.selected(kept)
-    return generation.with_motion(beside(generation.motion, added)), added.names
+    return generation.with_motion(join_channels(generation.motion, added)), added.names
 
 
-def described(character: DrivenCharacter) -> Iterator[str]:
+def describe_character(character: DrivenCharacter) -> Iterator[str]:
     """Yield what was found in a character's files, line by line."""
     mesh, placement = character.mesh, character.placement
     parts = ", ".join(part.name or "(no name)" for part in mesh.parts)

@@ -25,10 +25,17 @@ from lipmotion.meshes.fitting.facial_animation import FAP
 from lipmotion.meshes.fitting.living_curves import living_curves
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
-from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves
-from lipmotion.pipeline.outputs.delivered import delivered, held_mouth
+from lipmotion.pipeline.outputs.curve_sets import (
+    ARKIT,
+    LIVING_SETS,
+    WHOLE_FACE,
+    join_channels,
+    make_curves,
+    with_curves,
+)
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import recorded_prosody
+from lipmotion.pipeline.outputs.prosody import measure_recorded_prosody
 from lipmotion.storage.files import as_text, sound_reference
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 from lipmotion.types.motion import RADIAN
@@ -58,18 +65,18 @@ class MotionOutput(Output):
         settings = self.settings
         check_rate(self.path, settings.outputs.rate_hz)
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         settings = self.settings
         spoken, chosen, asked = performance.cached(_chosen)
         lives = motion_format(self.path).curves in LIVING_SETS or settings.curves in LIVING_SETS
-        prosody = performance.cached(recorded_prosody) if lives else None
+        prosody = performance.cached(measure_recorded_prosody) if lives else None
         rate_hz, named = settings.outputs.rate_hz, settings.outputs.channels
-        held = in_format(self.path, spoken, chosen, rate_hz, settings.staging, prosody, named)
+        held = fit_to_format(self.path, spoken, chosen, rate_hz, settings.staging, prosody, named)
         warn_of_unused(self.path, held, asked)
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
-        held = held_mouth(held, frames, performance.cached(_closed_s))
+        held = hold_mouth(held, frames, performance.cached(_closed_s))
         if motion_format(self.path).keyed and settings.delivery.key_tolerance:
-            held = thinned(held, Thinning(settings.delivery.key_tolerance, tuple(closed_times(held))))
+            held = thin_keys(held, Thinning(settings.delivery.key_tolerance, tuple(closed_times(held))))
         check_motion(self.path, held.motion)
         return partial(self._write, held, performance)
 
@@ -86,7 +93,7 @@ class MotionOutput(Output):
         write_motion(self.path, held, source=source, model=model)
 
 
-def thinned(held: Generation, thinning: Thinning) -> Generation:
+def thin_keys(held: Generation, thinning: Thinning) -> Generation:
     """Return a generation whose weights go straight between the keys that are kept of each.
 
     Weights that never exceed the tolerance are left out, and held poses stay as they are.
@@ -108,7 +115,7 @@ def _delivered(performance: Performance) -> Generation:
     generation, settings = performance.generation, performance.settings
     if {*settings.outputs.channels} & {*GESTURES}:
         generation = with_articulation(generation, settings.outputs.channels)
-    return delivered(generation, settings.delivery)
+    return deliver(generation, settings.delivery)
 
 
 def _closed_s(performance: Performance) -> list[float]:
@@ -125,13 +132,13 @@ def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[
     asked: Sequence[str] = channels or ()
     names: Sequence[str] | None = channels
     if curves is not None:
-        prosody = performance.cached(recorded_prosody) if curves in LIVING_SETS else None
+        prosody = performance.cached(measure_recorded_prosody) if curves in LIVING_SETS else None
         spoken, found = with_curves(spoken, curves, staging=settings.staging, prosody=prosody)
         asked = asked if channels or isinstance(curves, DrivenCharacter) else found
         names = found if channels is None else channels
     chosen = spoken.selected(names) if names is not None else spoken
     if rate_hz is not None:
-        chosen = chosen.resampled(rate_hz) if curves is None else resampled_curves(chosen, spoken, rate_hz)
+        chosen = chosen.resampled(rate_hz) if curves is None else resample_curves(chosen, spoken, rate_hz)
     return spoken, chosen, asked
 
 
@@ -147,7 +154,7 @@ def _text(value: object) -> str:
     return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
-def in_format(
+def fit_to_format(
     path: Path,
     generation: Generation,
     chosen: Generation,
@@ -185,10 +192,10 @@ def in_format(
         return held
     if held is chosen or held is generation:
         return held.resampled(hertz)
-    return resampled_curves(held, generation, hertz)
+    return resample_curves(held, generation, hertz)
 
 
-def resampled_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
+def resample_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
     """Return curves at another rate, in whose frames the lips touch as in pictures of the motion at that rate.
 
     held       : the curves;  generation : the motion that they are of, with as many frames
@@ -226,16 +233,18 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     motion, units = generation.motion, generation.units
     own = _held_already(motion, name)
     if own is None:
-        return curves_of(motion, units, name, staging=staging, prosody=prosody)
+        return make_curves(motion, units, name, staging=staging, prosody=prosody)
     if name in (ARKIT, WHOLE_FACE):
         moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
-        own = _closed(own, curves_of(beside(own, generation.selected(moods).motion) if moods else own, units, ARKIT))
+        own = _closed(
+            own, make_curves(join_channels(own, generation.selected(moods).motion) if moods else own, units, ARKIT)
+        )
     if name != WHOLE_FACE:
         return own
     living = living_curves(with_mouth(motion), units, staging, prosody)
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
-    return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
+    return join_channels(own, Motion(living.values[:, added], motion.rate_hz, channels))
 
 
 def _closed(own: Motion, mouth: Motion) -> Motion:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
 from lipmotion.printable import printable
@@ -87,14 +87,14 @@ def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
     left_out = sorted({channel.name for kind in kinds for channel in kind if channel not in common})
     LOG.warning(
         "%d kinds of motion: training on the %d channels that all have (%s); left out: %s",
-        *(len(kinds), len(common), _some(common), printable(shortened(", ".join(left_out)))),
+        *(len(kinds), len(common), _some(common), printable(shorten(", ".join(left_out)))),
     )
     return [_with_channels(utterance, common) for utterance in utterances]
 
 
 def _some(channels: Sequence[Channel]) -> str:
     """Return the names of some channels, for a message."""
-    return printable(shortened(", ".join(channel.name for channel in channels)))
+    return printable(shorten(", ".join(channel.name for channel in channels)))
 
 
 def _with_channels(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:

@@ -18,13 +18,12 @@ from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.types import Item, Monitor, ParallelMap, Progress, Span, Timeline, Unit, Utterance
 
 LOG = logging.getLogger("lipmotion")
-MOST_NAMED_RECORDINGS = 10
+MAX_NAMED_RECORDINGS = 10
 """Largest number of recordings that one warning names."""
 
 
 def warn_of_doubtful_transcripts(
-    labelled: Iterable[tuple[Utterance, Timeline[Unit]]],
-    realigned: Callable[[Utterance], Timeline[Unit]] | None = None,
+    labelled: Iterable[tuple[Utterance, Timeline[Unit]]], realigned: Callable[[Utterance], Timeline[Unit]] | None = None
 ) -> None:
     """Log a warning that names the utterances whose transcripts do not fit the sound.
 
@@ -79,8 +78,8 @@ def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
 
 def _listed(names: Sequence[str]) -> str:
     """Return the first names, and how many more there are."""
-    more = len(names) - MOST_NAMED_RECORDINGS
-    return printable(", ".join(names[:MOST_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_NAMED_RECORDINGS
+    return printable(", ".join(names[:MAX_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
 
 
 UTTERANCES_PER_CHECKPOINT = 32

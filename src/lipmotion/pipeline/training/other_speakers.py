@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
-from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shortened
+from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shorten
 from lipmotion.formats.label_files import labels_beside
+from lipmotion.pipeline.analysis.transcribe import align_or_recognise
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
-from lipmotion.pipeline.understand.transcribe import phones_in_time
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score
 from lipmotion.speech.recognition.recogniser import Recogniser
@@ -78,7 +78,7 @@ def is_held_out_speaker(speaker: str) -> bool:
     return zlib.crc32(speaker.encode()) % SPEAKER_PARTS == HELD_OUT_PART
 
 
-def synthetic_sentences(
+def synthesise_sentences(
     texts: Sequence[str] | None = None,
     voices: Sequence[SyntheticVoice] | None = None,
     *,
@@ -104,7 +104,7 @@ def synthetic_sentences(
         yield from sentences
 
 
-def recorded_sentences(
+def align_recordings(
     folder: str | Path,
     phones: Recogniser,
     *,
@@ -150,11 +150,11 @@ def _check_language(words: Sequence[str], lexicon: Lexicon) -> None:
     foreign = [word for word in words if not word.isascii() and not lexicon.known(word)]
     if foreign:
         raise InputError(
-            f"no pronunciation of {shortened(foreign[0])!r}; required English words, or a lexicon file with the others"
+            f"no pronunciation of {shorten(foreign[0])!r}; required English words, or a lexicon file with the others"
         )
 
 
-def voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
+def make_voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
     """Yield sentences as training data; features are computed when an item is taken, and not kept."""
     return (VoiceExample(analysed(sentence.audio).mfcc(), sentence.phones, sentence.speaker) for sentence in sentences)
 
@@ -172,14 +172,14 @@ def other_voices(
     recordings : a folder of transcribed recordings, which are aligned by the general phone models
     lexicon    : pronunciations of words, ahead of those of the dictionary
     monitor    : called with the recordings that cannot be used
-    Raises MissingDependencyError, CorpusError: as ``synthetic_sentences`` and ``recorded_sentences``.
+    Raises MissingDependencyError, CorpusError: as ``synthesise_sentences`` and ``align_recordings``.
     """
     if recordings is not None:
         general = Recogniser(load_model().phones, "general")
-        yield from voice_examples(recorded_sentences(recordings, general, lexicon=lexicon, monitor=monitor))
+        yield from make_voice_examples(align_recordings(recordings, general, lexicon=lexicon, monitor=monitor))
     if synthetic:
         chosen = [voice for voice in installed_voices() if not is_held_out_speaker(voice.speaker)]
-        yield from voice_examples(synthetic_sentences(voices=chosen, lexicon=lexicon))
+        yield from make_voice_examples(synthesise_sentences(voices=chosen, lexicon=lexicon))
 
 
 def _sentences_of_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:
@@ -213,7 +213,7 @@ def _speaker(name: str, inner: Path, speakers: Mapping[str, str]) -> str:
 def _aligned(path: Path, words: Sequence[str], phones: Recogniser, lexicon: Lexicon) -> tuple[Audio, Timeline[Unit]]:
     """Return the sound of a recording and its aligned phones. Raises InputError: they do not agree."""
     audio = read_audio(path)
-    units = phones_in_time(phones, audio, analysed(audio).mfcc(), words, lexicon)
+    units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
     score = agreement_score(audio, units)
     if score < DOUBTFUL_SCORE:
         raise InputError(

@@ -16,9 +16,7 @@ from lipmotion.units import Lexicon, is_silent, words_of
 SHIPPED = "english.txt"
 
 
-def pronounced_sentences(
-    text: str | Path | None, lexicon: Lexicon
-) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
+def pronounce_sentences(text: str | Path | None, lexicon: Lexicon) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
     """Return the phones of the sentences of a file, and the unknown word of every sentence that cannot be used.
 
     text    : a file with a sentence a line; None: the list in the package
@@ -33,7 +31,7 @@ def pronounced_sentences(
     return usable, left_out
 
 
-def recorded_phones(corpus: Corpus, lexicon: Lexicon) -> Iterator[list[tuple[str, ...]]]:
+def read_corpus_phones(corpus: Corpus, lexicon: Lexicon) -> Iterator[list[tuple[str, ...]]]:
     """Yield for each utterance of a corpus the sequences of phones between silences, those of its labels or words.
 
     An utterance without labels, and without words that the lexicon knows, has none.

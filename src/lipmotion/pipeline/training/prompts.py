@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.training.phone_sequences import pronounced_sentences, recorded_phones
+from lipmotion.pipeline.training.phone_sequences import pronounce_sentences, read_corpus_phones
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon
 
 PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
@@ -66,12 +66,12 @@ def prompts(
     if count < 1:
         raise InputError(f"{count} prompts asked for, required at least 1")
     lexicon = lexicon or Lexicon()
-    usable, left_out = pronounced_sentences(text, lexicon)
+    usable, left_out = pronounce_sentences(text, lexicon)
     index: dict[UnitName, int] = {}
-    units = [_numbered(units_of(phones), index) for phones in usable.values()]
+    units = [_numbered(find_units(phones), index) for phones in usable.values()]
     recorded = (
         _numbered(
-            {unit for run in chain.from_iterable(recorded_phones(have, lexicon)) for unit in units_of(run)}, index
+            {unit for run in chain.from_iterable(read_corpus_phones(have, lexicon)) for unit in find_units(run)}, index
         )
         if have
         else None
@@ -80,7 +80,7 @@ def prompts(
     if recorded is not None:
         weights[recorded] = 0
     costs = [len(phones) for phones in usable.values()]
-    order = greedy_cover(units, costs, weights.copy(), count)
+    order = cover_greedily(units, costs, weights.copy(), count)
     covered = weights == 0
     is_phone, is_diphone = (np.array([name[0] == kind for name in index]) for kind in (PHONE, DIPHONE))
     chosen, sentences = [], list(usable)
@@ -90,7 +90,7 @@ def prompts(
     return Prompts(tuple(chosen), int(is_phone.sum()), int(is_diphone.sum()), len(usable), left_out)
 
 
-def units_of(phones: Sequence[str]) -> set[UnitName]:
+def find_units(phones: Sequence[str]) -> set[UnitName]:
     """Return the units in a sequence of phones between two silences; silence counts as a neighbour only."""
     sequence = [SILENCE, *phones, SILENCE]
     units: set[UnitName] = {(DIPHONE, left, right) for left, right in pairwise(sequence)}
@@ -100,7 +100,7 @@ def units_of(phones: Sequence[str]) -> set[UnitName]:
     return units
 
 
-def greedy_cover(
+def cover_greedily(
     sets: Sequence[NDArray[np.intp]], costs: Sequence[float], weights: NDArray[np.float64], count: int
 ) -> list[int]:
     """Return the numbers of the sets to take, in order: each time the set that adds most weight for its cost.

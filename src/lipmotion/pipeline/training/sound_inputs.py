@@ -31,11 +31,7 @@ LONGEST_VOICE_S = 10.0
 
 
 def with_sound_inputs(
-    engine: Engine[Any],
-    examples: Sequence[Example],
-    sound: Mapping[str, Audio],
-    monitor: Monitor,
-    each: ParallelMap,
+    engine: Engine[Any], examples: Sequence[Example], sound: Mapping[str, Audio], monitor: Monitor, each: ParallelMap
 ) -> list[Example]:
     """Return examples with what the engine's training takes from their sound (``Inputs``).
 

@@ -21,6 +21,7 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import model_motion
 from lipmotion.motion.speaker_maps import SpeakerMaps, mean_person_examples, with_habits
+from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses
 from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
 from lipmotion.pipeline.training.channels import (
     check_visual,
@@ -28,7 +29,7 @@ from lipmotion.pipeline.training.channels import (
     with_common_channels,
     with_visual_channels,
 )
-from lipmotion.pipeline.training.fingerprint import fingerprint
+from lipmotion.pipeline.training.fingerprint import fingerprint_training
 from lipmotion.pipeline.training.labels import (
     label_utterances,
     warn_of_doubtful_transcripts,
@@ -36,7 +37,6 @@ from lipmotion.pipeline.training.labels import (
 )
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
-from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
@@ -165,7 +165,7 @@ def train(  # noqa: PLR0913
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = with_common_channels([with_visual_channels(each, visual, eigenlips) for each in utterances])
-    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
+    job = fingerprint_training(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
     checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
     with worker_pool(min(process_count(run.workers), len(chosen) // UTTERANCES_PER_WORKER)) as team:
         monitor = sub_monitor(run.monitor, 0, 0.5)
@@ -181,7 +181,7 @@ def train(  # noqa: PLR0913
     if not fit.uses_prior:
         prior = None
     used = tuple(example.name for example in examples)
-    about = about_training(
+    about = describe_training(
         corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
     )
     if selection.speakers and selection.names is None:
@@ -237,12 +237,12 @@ def examples_without_motion(
         yield Example(speaker, Speech(features, units), no_motion, np.zeros(frames, bool))
 
 
-def phones_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
+def label_phones(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
     """Return the phones in time of an utterance: labelled, or aligned if its words are known, or recognised."""
     if utterance.phones is not None:
         return utterance.phones
     features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
-    return phones_in_time(phones, utterance.audio, features, utterance.words, lexicon)
+    return align_or_recognise(phones, utterance.audio, features, utterance.words, lexicon)
 
 
 def _check_prior(prior: Model | None) -> None:
@@ -327,7 +327,7 @@ def _examples(
     skipped: dict[str, str] = {}
     labelled: list[tuple[Utterance, Timeline[Unit]]] = []
     warn_of_missing_transcripts(utterances)
-    labeller = partial(phones_of, phones=phones, lexicon=lexicon)
+    labeller = partial(label_phones, phones=phones, lexicon=lexicon)
     for utterance, units in label_utterances(utterances, labeller, monitor, checkpoint, each):
         if isinstance(units, str):
             skipped[utterance.name] = units
@@ -341,11 +341,11 @@ def _examples(
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
     general = Recogniser(phones.own, "general")
-    warn_of_doubtful_transcripts(labelled, partial(phones_of, phones=general, lexicon=lexicon))
+    warn_of_doubtful_transcripts(labelled, partial(label_phones, phones=general, lexicon=lexicon))
     return examples, skipped
 
 
-def about_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
+def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
     """Return the part of the header of a model that is for users: corpus, licence, attribution, versions.
 
     utterances : all that the training was given

@@ -4,7 +4,7 @@ import { made, onDrag } from "../dom.js";
 import { say } from "../sentences.js";
 import { TEXT, filled } from "../strings.js";
 
-const LEAST_PX = 3, LABEL_PX = 6, NARROW_PX = 13, LEAST_BORDER_PX = 3, LEAST_PHONE_S = 0.01, SURE = 0.5;
+const LEAST_PX = 3, LABEL_PX = 6, NARROW_PX = 13, LEAST_BORDER_PX = 3, MIN_PHONE_S = 0.01, SURE = 0.5;
 
 /** A finger needs more room; a border leaves half of a short phone to the phone. */
 const BORDER_PX = matchMedia("(pointer: coarse)").matches ? 19 : 9;
@@ -118,7 +118,7 @@ export class Tier {
 
   /** Show a border elsewhere, between the phones beside it, and let the face follow. */
   drag(before, time_s) {
-    const { phones } = this.store.line, least = phones[before].start_s + LEAST_PHONE_S, most = phones[before + 1].end_s - LEAST_PHONE_S;
+    const { phones } = this.store.line, least = phones[before].start_s + MIN_PHONE_S, most = phones[before + 1].end_s - MIN_PHONE_S;
     if (this.dragged?.before !== before || this.dragged.dropped) {
       this.drop();
       this.dragged = { before, time_s: null, sent_s: null, loop: null, earlier: Promise.all([this.settled, this.timeline.studio.edits]), dropped: false };

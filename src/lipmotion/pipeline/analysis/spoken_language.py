@@ -17,16 +17,16 @@ from lipmotion.units.ipa_phones import token_phones
 from lipmotion.units.languages_told import is_english
 
 LOG = logging.getLogger("lipmotion")
-LEAST_CONFIDENCE = 0.4
+MIN_CONFIDENCE = 0.4
 """English words are recognised with at least this confidence in clear English (0.8 to 0.9 there), and with less in
 other languages and in English played backwards (0.18 to 0.25), and in noise."""
-LEAST_TOLD_S = 1.0
+MIN_TOLD_S = 1.0
 """Speech that lasts less says nothing of its language."""
 PART_S = 28.0
 """So many seconds from the beginning of a recording tell its language."""
 
 
-def english_spoken(audio: Audio) -> bool | None:
+def detect_english(audio: Audio) -> bool | None:
     """Return whether a recording is in English; None: not known, or no phone recogniser is installed.
 
     audio : at 16 kHz
@@ -45,17 +45,17 @@ def english_spoken(audio: Audio) -> bool | None:
     return is_english(tuple(phone for phone, _ in token_phones(word)) for word in words)
 
 
-def confidence_of(found: Recognition) -> float:
+def score_words(found: Recognition) -> float:
     """Return the confidence of recognised words times their share of the speech, 0 to 1."""
     return (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
 
 
 def warn_of_another_language(found: Recognition) -> None:
     """Log a warning where English words were recognised in what is hardly English."""
-    confidence = confidence_of(found)
-    if found.word_s >= LEAST_TOLD_S and confidence < LEAST_CONFIDENCE:
+    confidence = score_words(found)
+    if found.word_s >= MIN_TOLD_S and confidence < MIN_CONFIDENCE:
         LOG.warning(
             "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then "
             "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
-            *(confidence, LEAST_CONFIDENCE),
+            *(confidence, MIN_CONFIDENCE),
         )

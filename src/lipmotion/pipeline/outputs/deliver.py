@@ -10,14 +10,7 @@ from typing import Final
 import numpy as np
 
 from lipmotion.articulation.curve_edits import with_gain
-from lipmotion.articulation.delivery import (
-    Delivery,
-    closed_on_grid,
-    closed_times,
-    held,
-    intensified,
-    moved_in_time,
-)
+from lipmotion.articulation.delivery import Delivery, closed_on_grid, closed_times, held, intensified, moved_in_time
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
@@ -68,7 +61,7 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
     return generation
 
 
-def delivered(generation: Generation, delivery: Delivery) -> Generation:
+def deliver(generation: Generation, delivery: Delivery) -> Generation:
     """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``held``).
 
     Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
@@ -84,17 +77,14 @@ def delivered(generation: Generation, delivery: Delivery) -> Generation:
     return moved_in_time(larger, delivery)
 
 
-def shown(
-    generation: Generation,
-    delivery: Delivery,
-    fps: float,
-    character: DrivenCharacter | None = None,
+def deliver_to_face(
+    generation: Generation, delivery: Delivery, fps: float, character: DrivenCharacter | None = None
 ) -> Generation:
     """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
 
     character : whose weights are shown, if the face is a character with blendshapes
     """
-    moved = with_drawn_channels(delivered(generation, delivery))
+    moved = with_drawn_channels(deliver(generation, delivery))
     if moved.curve_edits and character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
     frames = delivery.hold_frames(fps)
@@ -104,7 +94,7 @@ def shown(
     closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
-    return held_mouth(moved.resampled(fps), frames, closed_s)
+    return hold_mouth(moved.resampled(fps), frames, closed_s)
 
 
 def with_drawn_channels(generation: Generation) -> Generation:
@@ -114,7 +104,7 @@ def with_drawn_channels(generation: Generation) -> Generation:
     return generation.with_motion(with_mouth(generation.motion))
 
 
-def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
+def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
     """Return a generation whose mouth is held (``held``); eyes, brows, cheeks and head move as before.
 
     frames : 0: everything moves as before; 1: every frame is a pose, which formats that can say so hold

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import AlignmentError, shortened
+from lipmotion.errors import AlignmentError, shorten
 from lipmotion.hmm.loudness import frames_above
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
@@ -41,23 +41,17 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscrip
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.phones import phone_edits
 
-__all__ = [
-    "Transcription",
-    "guesses",
-    "phones_in_time",
-    "transcribe",
-    "warn_of_guesses",
-]
+__all__ = ["Transcription", "align_or_recognise", "guesses", "transcribe", "warn_of_guesses"]
 LOG = logging.getLogger("lipmotion")
-MOST_WARNINGS = 20
+MAX_WARNINGS = 20
 """Largest number of guessed pronunciations that are reported one by one."""
-FOREIGN_SHARE, LEAST_FOREIGN = 0.25, 3
+FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
 """A text of which so large a share, and so many different words, are not in the dictionary is not English."""
-MOST_STRETCHES = 3
+MAX_STRETCHES = 3
 """Largest number of stretches without words that are named in one warning."""
 REACH_S = 0.1
 """A phone of a word may be heard so far from the middle that its recognition has."""
-LEAST_INSERTED = 2
+MIN_INSERTED = 2
 """Fewer phones between words than this belong to them: recognition errs by one."""
 ALIKE_SHARE = 0.34
 """Words are said all the same where recognition finds their phones, but for so small a share."""
@@ -106,10 +100,14 @@ def transcribe(
     name = None if isinstance(lexicon, LanguageLexicon) else network_of(phones.kind)
     refused: AlignmentError | None = None
     try:
-        units = phones_in_time(phones, audio, features, words, lexicon)
+        units = align_or_recognise(phones, audio, features, words, lexicon)
     except AlignmentError as error:  # too much for the recording: some of the words may be said all the same
         check_words(spoken, audio.duration_s)
-        if name is None or recognised is None or heard_phones(name, analysed(audio))[1] < PHONE_POSTERIORS[0]:
+        if (
+            name is None
+            or recognised is None
+            or compute_phone_posteriors(name, analysed(audio))[1] < PHONE_POSTERIORS[0]
+        ):
             raise
         refused = error
         units = _evenly_spread(spoken, lexicon, audio.duration_s)
@@ -119,7 +117,7 @@ def transcribe(
     if name is None:
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    heard, sure = heard_phones(name, analysed(audio))
+    heard, sure = compute_phone_posteriors(name, analysed(audio))
     costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
     evidence = transcript_evidence(heard, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
     if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
@@ -147,7 +145,7 @@ def _evenly_spread(words: Sequence[str], lexicon: Lexicon, duration_s: float) ->
     return Timeline(tuple(Span(start_s, end_s, Unit(phone, word=word)) for start_s, end_s, (phone, word) in timed))
 
 
-def heard_phones(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
+def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
     """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
     posteriors = recording_posteriors(name, audio)
     hears = any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
@@ -175,7 +173,7 @@ def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Trans
         after_s = words[after].start_s if after < len(words) else np.inf
         between = beside[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
         lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
-        is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= LEAST_INSERTED)
+        is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= MIN_INSERTED)
         if after > before + 1 or (lasts and is_more):
             start_s, end_s = (between[0].start_s, between[-1].end_s) if between else (before_s, before_s)
             others.append(OtherSpeech(start_s, end_s, before + 1, after))
@@ -280,7 +278,7 @@ def _corrected(
     return Timeline(tuple(spans))
 
 
-def phones_in_time(
+def align_or_recognise(
     phones: Recogniser,
     audio: Audio,
     features: Features,
@@ -310,8 +308,8 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
         )
         return
     if fit.unsaid:
-        named = [f"{shortened(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MOST_STRETCHES]]
-        more = len(fit.unsaid) - MOST_STRETCHES
+        named = [f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES]]
+        more = len(fit.unsaid) - MAX_STRETCHES
         LOG.warning(
             "the transcript seems to have words that are not said: %s%s%s; correct it",
             *(", ".join(named), f" and {more} more" if more > 0 else ""),
@@ -335,14 +333,14 @@ def warn_of_label_misfit(fit: TranscriptFit, filled: bool) -> None:
     for problem, places in problems.items():
         if places:
             done = "; what is said there is recognised" if filled and places is fit.missing else ""
-            LOG.warning("the units %s at %s%s; correct them, or leave them out", problem, named_places(places), done)
+            LOG.warning("the units %s at %s%s; correct them, or leave them out", problem, format_places(places), done)
 
 
-def named_places(places: Sequence[tuple[float, float]]) -> str:
+def format_places(places: Sequence[tuple[float, float]]) -> str:
     """Return the longest of some stretches of time, for a message."""
-    longest = sorted(places, key=lambda place: place[0] - place[1])[:MOST_STRETCHES]
+    longest = sorted(places, key=lambda place: place[0] - place[1])[:MAX_STRETCHES]
     named = ", ".join(f"{start_s:.1f} to {end_s:.1f} s" for start_s, end_s in sorted(longest))
-    more = len(places) - MOST_STRETCHES
+    more = len(places) - MAX_STRETCHES
     return named + (f" and at {more} more places" if more > 0 else "")
 
 
@@ -356,18 +354,18 @@ def _judgement(fit: TranscriptFit) -> str:
 
 def _places(fit: TranscriptFit) -> str:
     """Return where words are missing, the longest stretches, and how much of the speech that is, for a message."""
-    return f"at {named_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
+    return f"at {format_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
 
 
 def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:
     """Return whether words seem to be of another language than their lexicon."""
     unknown = [word for word in words if not lexicon.known(word)]
-    return len({*unknown}) >= LEAST_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
+    return len({*unknown}) >= MIN_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
 
 
 def guesses(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
-    """Return the first ``MOST_WARNINGS`` words whose pronunciation is a guess, with it."""
-    return {word: lexicon.pronunciations(word)[0] for word in _unknown(words, lexicon)[:MOST_WARNINGS]}
+    """Return the first ``MAX_WARNINGS`` words whose pronunciation is a guess, with it."""
+    return {word: lexicon.pronunciations(word)[0] for word in _unknown(words, lexicon)[:MAX_WARNINGS]}
 
 
 def _unknown(words: Sequence[str], lexicon: Lexicon) -> list[str]:
@@ -375,10 +373,10 @@ def _unknown(words: Sequence[str], lexicon: Lexicon) -> list[str]:
 
 
 def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
-    """Log a warning for every word whose pronunciation is a guess; after ``MOST_WARNINGS``, for how many more."""
+    """Log a warning for every word whose pronunciation is a guess; after ``MAX_WARNINGS``, for how many more."""
     for word, guessed in guesses(words, lexicon).items():
-        told = map(shortened, (word, " ".join(guessed)))
+        told = map(shorten, (word, " ".join(guessed)))
         LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *told)
-    more = len(_unknown(words, lexicon)) - MOST_WARNINGS
+    more = len(_unknown(words, lexicon)) - MAX_WARNINGS
     if more > 0:
         LOG.warning("%d more words are not in the dictionary; a lexicon file can say better", more)

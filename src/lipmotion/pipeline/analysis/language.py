@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import cast
 
 from lipmotion.errors import InputError
+from lipmotion.pipeline.analysis.read_request import read_lexicon
+from lipmotion.pipeline.analysis.speech_analysis import read_recording
+from lipmotion.pipeline.analysis.spoken_language import detect_english
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import lexicon_of
-from lipmotion.pipeline.understand.spoken_language import english_spoken
-from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
@@ -21,7 +21,7 @@ from lipmotion.units.text_normalisation import written_words
 LOG = logging.getLogger("lipmotion")
 
 
-def in_language(request: Request) -> Request:
+def resolve_language(request: Request) -> Request:
     """Return a request, of ``read_request``, whose words are those of its language, with the lexicon that has them.
 
     A request in English stays as it is. ``AUTO`` stays where the speech is known not to be English, and no more.
@@ -36,7 +36,7 @@ def in_language(request: Request) -> Request:
     language = request.language if request.language != AUTO else _told(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)
-    lexicon = LanguageLexicon(lexicon_of(request).user, language)
+    lexicon = LanguageLexicon(read_lexicon(request).user, language)
     if transcript is not None and request.units is None:
         transcript = transcript.with_words(lambda word: written_words(word) if any(map(str.isalnum, word)) else ())
         lexicon = lexicon.with_words(transcript.words)
@@ -55,7 +55,7 @@ def _told(request: Request, transcript: TimedTranscript | None) -> str:
             raise InputError(f"the language of the transcript is not known; give it, one of: {', '.join(LANGUAGES)}")
         LOG.warning("the transcript is taken for %s; --language says otherwise", LANGUAGES[language].name)
         return language
-    english = english_spoken(audio_of(request))
+    english = detect_english(read_recording(request))
     LOG.warning(
         {
             True: "the speech is taken for English; --language says otherwise",

@@ -35,7 +35,7 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
     transcript, units = request.transcript, request.units
     spoken_by = _speaker_of_labels(request, is_typed=is_typed)
     if is_typed and isinstance(transcript, str):
-        transcript = text_or_file_content(transcript, request.tier, spoken_by)
+        transcript = read_text_or_file(transcript, request.tier, spoken_by)
     elif isinstance(transcript, Path) or (isinstance(transcript, str) and ":" in transcript):  # perhaps subtitles
         transcript = _read_words(transcript, request.tier, spoken_by)
     if isinstance(units, Path):
@@ -50,12 +50,12 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
         request,
         transcript=transcript,
         units=units,
-        lexicon=None if request.lexicon is None else lexicon_of(request),
+        lexicon=None if request.lexicon is None else read_lexicon(request),
         speaker="" if spoken_by else request.speaker,
     )
 
 
-def lexicon_of(request: Request) -> Lexicon:
+def read_lexicon(request: Request) -> Lexicon:
     """Return the pronunciations of a request; those of the dictionary alone, where it has none.
 
     Raises InputError: its file cannot be read.
@@ -77,7 +77,7 @@ def _speaker_of_labels(request: Request, *, is_typed: bool) -> str:
     return request.speaker if request.speaker.lower() in speakers else ""
 
 
-def text_or_file_content(argument: str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
+def read_text_or_file(argument: str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
     """Return the content of the file that the argument names, else the argument itself.
 
     tier, speaker : of a file of labels, which tier and whose words

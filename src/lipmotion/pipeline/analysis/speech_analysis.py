@@ -16,17 +16,17 @@ import numpy as np
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.pipeline.model import Model, with_prior
-from lipmotion.pipeline.request import DETECTED, Request
-from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
-from lipmotion.pipeline.understand.spoken_language import warn_of_another_language
-from lipmotion.pipeline.understand.transcribe import (
-    heard_phones,
-    named_places,
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
+from lipmotion.pipeline.analysis.spoken_language import warn_of_another_language
+from lipmotion.pipeline.analysis.transcribe import (
+    compute_phone_posteriors,
+    format_places,
     transcribe,
     warn_of_guesses,
     warn_of_label_misfit,
 )
+from lipmotion.pipeline.model import Model, with_prior
+from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
@@ -75,14 +75,7 @@ from lipmotion.types import (
 )
 from lipmotion.types.languages import ENGLISH
 from lipmotion.types.moods import MoodTag
-from lipmotion.units import (
-    SILENCE,
-    UNKNOWN_PHONES,
-    check_phones,
-    check_text,
-    is_silent,
-    without_gaps,
-)
+from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, is_silent, without_gaps
 from lipmotion.units.mood_tags import tagged_text
 from lipmotion.units.text_normalisation import checked_tokens
 
@@ -101,7 +94,7 @@ REACH_S = 0.1
 """Phones are recognised so far around the first and the last one that is heard."""
 LATEST_S = 1e15
 """Later units are refused: frames of such times cannot be counted."""
-LEAST_SPEECH_S = 0.2
+MIN_SPEECH_S = 0.2
 """A shorter time of recognised speech is none: the edge of a tone or of noise, taken as a consonant."""
 WORDS = (0.2, 0.9)
 """Shares of the work at which the recognition of words begins and ends, in reports."""
@@ -109,7 +102,7 @@ LOG = logging.getLogger("lipmotion")
 
 
 @dataclass(frozen=True, eq=False)
-class UnderstoodSpeech:
+class SpeechAnalysis:
     """The speech of a recording as input of an engine, and what was recognised in it.
 
     recognition : None where words or phones were given, or the engine's own model recognised the speaker
@@ -134,29 +127,29 @@ class UnderstoodSpeech:
     @property
     def is_without_speech(self) -> bool:
         """Whether no speech was recognised."""
-        return not self.speech.units_known and self.speech_s < LEAST_SPEECH_S
+        return not self.speech.units_known and self.speech_s < MIN_SPEECH_S
 
 
-def understand(model: Model, request: Request, each: ParallelMap = map) -> Speech:
+def analyse(model: Model, request: Request, each: ParallelMap = map) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
     each : applies a function to many items, perhaps in several processes
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
-    return understood_speech(model, request, each).speech.with_arrays()
+    return analyse_speech(model, request, each).speech.with_arrays()
 
 
-def understood_speech(
+def analyse_speech(
     model: Model, request: Request, each: ParallelMap = map, monitor: Monitor = silent_monitor
-) -> UnderstoodSpeech:
-    """Return the speech of a request as ``understand`` does, with what was recognised.
+) -> SpeechAnalysis:
+    """Return the speech of a request as ``analyse`` does, with what was recognised.
 
     monitor : receives reports of the progress; the share is that of recognition, up to ``WORDS[1]``
     """
     request = read_request(request, is_typed=False)
     monitor(Progress("reading the sound", 0, 1, 0.0))
-    audio = analysed(audio_of(request))
+    audio = analysed(read_recording(request))
     monitor(Progress("recognising phones", 0, 1, 0.02))
     understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
     if request.manner == DETECTED:
@@ -165,7 +158,7 @@ def understood_speech(
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     elif audio.tones:
         places = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
-        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", named_places(places))
+        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(places))
     speech, found = understood.speech, understood.recognition
     if found is not None and request.language == ENGLISH:
         warn_of_another_language(found)
@@ -179,9 +172,9 @@ def with_voice(
 ) -> Speech:
     """Return speech that says how well a model knows its voice, that of the recording and that of each passage.
 
-    phones, found, given : as of ``known_voice``
+    phones, found, given : as of ``measure_voice_similarity``
     """
-    voice, parts = known_voice(phones, audio, speech, found, given=given), speech.parts
+    voice, parts = measure_voice_similarity(phones, audio, speech, found, given=given), speech.parts
     if parts is not None:
         sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
         is_recognised = not given and not speech.units_known
@@ -198,7 +191,7 @@ def _voice_of(phones: UnitHmm, audio: AnalysedAudio) -> float:
     return voice_knowledge(speaker_similarity(phones, audio).score)
 
 
-def _detected(understood: UnderstoodSpeech, audio: AnalysedAudio) -> UnderstoodSpeech:
+def _detected(understood: SpeechAnalysis, audio: AnalysedAudio) -> SpeechAnalysis:
     """Return understood speech with its voice events; phones that were recognised in laughter are silence."""
     events = voice_events(audio, understood.speech.units)
     units = without_laughter(understood.speech.units, events)
@@ -215,7 +208,7 @@ def prepare_search(request: Request) -> None:
             english_words()
 
 
-def known_voice(
+def measure_voice_similarity(
     phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None, *, given: bool = False
 ) -> float:
     """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker.
@@ -233,7 +226,7 @@ def known_voice(
     return _voice_of(phones, analysed(audio))
 
 
-def aligned_within(
+def align_between(
     model: Model,
     request: Request,
     audio: AnalysedAudio,
@@ -251,10 +244,7 @@ def aligned_within(
     """
     installed = request.recogniser in INSTALLED_RECOGNISERS
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
-    (first, stop), lexicon = (
-        (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
-        lexicon_of(request),
-    )
+    (first, stop), lexicon = ((round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)), read_lexicon(request))
     words = checked_tokens(word)
     warn_of_guesses(words, lexicon)
     piece = audio.stretch(first, stop)
@@ -290,7 +280,7 @@ def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> Paralle
     return mapped
 
 
-def _understood(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> UnderstoodSpeech:
+def _understood(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
     """Return the speech of a request, without what the model that this one stands on makes of it."""
     kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
     if request.recogniser not in kinds:
@@ -313,21 +303,21 @@ def _understood(model: Model, request: Request, audio: AnalysedAudio, each: Para
         if request.transcript is not None:
             LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
         units, fit = _followed(model, request, audio, phones.kind, lambda: recognised().units)
-        speech = speech_of(model.engine, audio, features, units, phones.kind, each)
-        return UnderstoodSpeech(replace(speech, times_given=True), None, range_db, fit)
+        speech = build_speech(model.engine, audio, features, units, phones.kind, each)
+        return SpeechAnalysis(replace(speech, times_given=True), None, range_db, fit)
     words = _words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     if words is not None:
-        said, fit = transcribe(phones, audio, audio.mfcc(), words, lexicon_of(request), lambda: recognised().units)
+        said, fit = transcribe(phones, audio, audio.mfcc(), words, read_lexicon(request), lambda: recognised().units)
         if said is not None:
-            speech = speech_of(model.engine, audio, features, said, phones.kind, each)
+            speech = build_speech(model.engine, audio, features, said, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
-            return UnderstoodSpeech(speech, None, range_db, fit, tags)
-    return UnderstoodSpeech(recognised(), found[0] if found else None, range_db, fit)
+            return SpeechAnalysis(speech, None, range_db, fit, tags)
+    return SpeechAnalysis(recognised(), found[0] if found else None, range_db, fit)
 
 
-def audio_of(request: Request) -> Audio:
+def read_recording(request: Request) -> Audio:
     """Return the samples of a request's recording. Raises InputError: it cannot be read."""
     recording = request.recording
     if isinstance(recording, Audio):
@@ -338,7 +328,7 @@ def audio_of(request: Request) -> Audio:
     return read_audio(Path(recording))
 
 
-def speech_of(
+def build_speech(
     engine: Animator[Any],
     audio: Audio,
     features: Features,
@@ -361,7 +351,7 @@ def speech_of(
     parts = None
     if not audio.is_passage:
         parts = tuple(
-            SpeechPart(first, own, speech_of(engine, sound, sound.mfcc(), Timeline(()), kind, each))
+            SpeechPart(first, own, build_speech(engine, sound, sound.mfcc(), Timeline(()), kind, each))
             for first, own, sound in audio.passages
         )
     speech = Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, parts=parts)
@@ -430,7 +420,7 @@ def recognised_speech(
     training were; else the result of ``recognise`` is used.
     """
     audio = analysed(audio, features)
-    speech = speech_of(engine, audio, features, Timeline(()), phones.kind, each)
+    speech = build_speech(engine, audio, features, Timeline(()), phones.kind, each)
     passages = (SpeechPart(0, slice(0, len(features.values)), speech),) if speech.parts is None else speech.parts
     units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
@@ -446,7 +436,7 @@ def recognised_speech(
         if within is None:
             found = found or recognise()
             within = part.between(relied_on(found.units, found.reliability))
-        if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < LEAST_SPEECH_S:
+        if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < MIN_SPEECH_S:
             continue  # a click, a knock
         spoken.append(part._replace(speech=replace(part.speech, voice=float(knows_voice))))  # else ``with_voice`` says
         units.append(placed_units(within, part.first, part.own))
@@ -487,7 +477,7 @@ def _followed(
             continue
         try:
             word = span.label.word
-            inside = aligned_within(model, request, audio, word, span.start_s, end_s) if word else []
+            inside = align_between(model, request, audio, word, span.start_s, end_s) if word else []
             aligned += [f"{word!r} at {span.start_s:.1f} s"] if inside else []
         except (AlignmentError, InputError):
             inside = []
@@ -497,12 +487,12 @@ def _followed(
     if aligned:
         LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
     if guessed:
-        LOG.warning("the units do not say which phones are said at %s: they are recognised", named_places(guessed))
+        LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
     units = without_gaps(Timeline(tuple(spans)), audio.duration_s)
     if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
     name = network_of(kind) if request.language == ENGLISH else None
-    heard, sure = heard_phones(name, audio) if name is not None else (None, 0.0)
+    heard, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
     is_sure = sure >= WORD_POSTERIORS[0]
     fit = label_fit(audio, units, heard if is_sure else None)
     edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), audio.duration_s]
