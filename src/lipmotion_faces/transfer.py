@@ -17,7 +17,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import model_motion
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.motion.transfer_map import measured_speech_s, transfer_map, with_channels
-from lipmotion.pipeline.analysis.speech_analysis import analyse, read_recording
+from lipmotion.pipeline.analysis.read_request import read_recording
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.generation import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request

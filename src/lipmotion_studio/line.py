@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
-from lipmotion.pipeline.analysis.transcribe import guesses
+from lipmotion.pipeline.analysis.transcribe import guess_pronunciations
 from lipmotion.pipeline.edit_files import EditFile
 from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, parse_step
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
@@ -155,7 +155,7 @@ class OpenLine:
         for step in map(parse_step, map(str, steps)):
             if isinstance(step, WordStep):
                 own, text = read_pronunciations(step), step.word if isinstance(step, WordIs | WordSaid) else step.words
-                found |= guesses([word for word in words_of(text) if word not in own], lexicon)
+                found |= guess_pronunciations([word for word in words_of(text) if word not in own], lexicon)
         return [{"word": word, "phones": list(phones)} for word, phones in found.items()]
 
     @property

@@ -16,7 +16,7 @@ from typing import Any
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shorten
-from lipmotion.pipeline.workers import begun_apart
+from lipmotion.pipeline.workers import start_process
 from lipmotion.storage.files import UNFINISHED, atomic_file, make_folder, read_text_file, remove, work_folder
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, tupled, value_of, whole
@@ -193,7 +193,7 @@ class Trainer:
                 self._wanted, self._told = before
                 raise
             self._begun_s, self._first_share, self._ends_s = self._clock(), None, None
-            self._process, pipe = begun_apart(carry_out, order)
+            self._process, pipe = start_process(carry_out, order)
             self._thread = threading.Thread(
                 target=self._follow, args=(self._process, pipe), name="training", daemon=True
             )

@@ -14,7 +14,7 @@ from lipmotion import Model
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis import speech_analysis as pipeline_analysis
-from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognised_speech
+from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognise_speech
 from lipmotion.pipeline.generation import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, predict_outlook
 from lipmotion.pipeline.request import Request, as_request
 from lipmotion.speech.features.analysed_audio import analysed
@@ -53,7 +53,7 @@ RECOGNITION = Recognition(RECOGNISED, Timeline(()), 0.0, 0.0, None)
 
 def recognised(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
     phones, features = Recogniser(model.phones, kind), analysed(sentence.audio).mfcc()
-    return recognised_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
+    return recognise_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
 
 
 def test_phones_that_the_engine_recognises_are_aligned_as_in_training(

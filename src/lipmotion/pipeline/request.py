@@ -38,10 +38,10 @@ RATE = Rule(1, most=1000, unit=" a second")
 """Frame rates of a file; a mistyped rate must not fill the memory."""
 
 
-def _file(reads: str, metavar: str, says: str, **told: Any) -> Any:
+def _file(reads: str, metavar: str, help: str, **more: Any) -> Any:
     """Return the option of a file that is read, None where there is none; ``reads``: what it is, in messages."""
-    told |= {"metavar": metavar} if metavar else {}
-    return option(None, kind=Path, reads=reads, help=says, **told)
+    more |= {"metavar": metavar} if metavar else {}
+    return option(None, kind=Path, reads=reads, help=help, **more)
 
 
 def _shipped() -> Path:
@@ -319,12 +319,13 @@ class Outputs(Configuration):
 
 def locate_paths(part: PartT, folder: Path) -> PartT:
     """Return a part with paths that begin at a folder; a text that is no file there, or folder of drawings, stays."""
-    found: dict[str, Any] = {}
+    changed: dict[str, Any] = {}
     for each in fields(part):
         value = getattr(part, each.name)
         if isinstance(value, Path) and str(value) != "-":
-            found[each.name] = folder / value
-        elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves"):
-            is_read = is_file(folder / value) or (each.name == "face" and load_provided("is_drawings")(value, folder))
-            found |= {each.name: str(folder / value)} if is_read else {}
-    return replace(part, **found)
+            changed[each.name] = folder / value
+        elif not isinstance(value, str) or ("reads" not in each.metadata and each.name != "curves"):
+            continue
+        elif is_file(folder / value) or (each.name == "face" and load_provided("is_drawings")(value, folder)):
+            changed[each.name] = str(folder / value)
+    return replace(part, **changed)

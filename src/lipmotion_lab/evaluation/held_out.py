@@ -16,7 +16,7 @@ from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
-from lipmotion.pipeline.analysis.speech_analysis import build_speech, recognised_speech, with_voice
+from lipmotion.pipeline.analysis.speech_analysis import build_speech, recognise_speech, with_voice
 from lipmotion.pipeline.analysis.transcribe import warn_of_guesses
 from lipmotion.pipeline.generation import generate_for
 from lipmotion.pipeline.model import GEOMETRY, Model, with_prior
@@ -248,7 +248,7 @@ def _recognised(
         asked.append(found)
         return found
 
-    speech = recognised_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
+    speech = recognise_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
     return speech, found if asked else None
 
 

@@ -1,24 +1,38 @@
-"""The language of a request: its transcript in the words of that language, and what pronounces them."""
+"""The language of a request: detected by text and sound; its transcript in the words of that language."""
 
 from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from itertools import groupby
 from typing import cast
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.analysis.read_request import read_lexicon
-from lipmotion.pipeline.analysis.speech_analysis import read_recording
-from lipmotion.pipeline.analysis.spoken_language import detect_english
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording
 from lipmotion.pipeline.request import Request
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.recognition.network.posteriors import (
+    WORD_BOUNDARY,
+    installed_phone_recogniser,
+    posterior_stretches,
+)
+from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
-from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
+from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
-from lipmotion.units.languages_told import language_of_text
+from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units.languages_told import is_english, language_of_text
 from lipmotion.units.mood_tags import tagged_text
 from lipmotion.units.text_normalisation import written_words
 
 LOG = logging.getLogger("lipmotion")
+MIN_CONFIDENCE = 0.4
+"""English words are recognised with at least this confidence in clear English (0.8 to 0.9 there), and with less in
+other languages and in English played backwards (0.18 to 0.25), and in noise."""
+MIN_TOLD_S = 1.0
+"""Speech that lasts less says nothing of its language."""
+PART_S = 28.0
+"""So many seconds from the beginning of a recording tell its language."""
 
 
 def resolve_language(request: Request) -> Request:
@@ -32,8 +46,9 @@ def resolve_language(request: Request) -> Request:
         return request
     transcript = cast("str | TimedTranscript | None", request.transcript)
     if isinstance(transcript, str):
-        transcript = _plain_transcript(transcript)
-    language = request.language if request.language != AUTO else _told(request, transcript)
+        plain, tags = tagged_text(transcript, lambda part: written_words(part) if part.strip() else ())
+        transcript = TimedTranscript((TranscriptLine(tuple(map(TimedWord, written_words(plain)))),), tags)
+    language = request.language if request.language != AUTO else _detect_language(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)
     lexicon = LanguageLexicon(read_lexicon(request).user, language)
@@ -43,7 +58,7 @@ def resolve_language(request: Request) -> Request:
     return replace(request, language=language, transcript=transcript, lexicon=lexicon)
 
 
-def _told(request: Request, transcript: TimedTranscript | None) -> str:
+def _detect_language(request: Request, transcript: TimedTranscript | None) -> str:
     """Return the language of a request that names none; a warning says which.
 
     Without a transcript: ``AUTO``, where it is not English; English also where it is not known, as without the option.
@@ -66,7 +81,36 @@ def _told(request: Request, transcript: TimedTranscript | None) -> str:
     return AUTO if english is False else ENGLISH
 
 
-def _plain_transcript(text: str) -> TimedTranscript:
-    """Return the words of a text, without times, as a transcript. Raises InputError: there is no word in it."""
-    plain, tags = tagged_text(text, lambda part: written_words(part) if part.strip() else ())
-    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, written_words(plain)))),), tags)
+def detect_english(audio: Audio) -> bool | None:
+    """Return whether a recording is in English; None: not known, or no phone recogniser is installed.
+
+    audio : at 16 kHz
+    The network writes every language with the phones of English: it cannot say which other one it is.
+    """
+    name = installed_phone_recogniser()
+    if name is None:
+        return None
+    part = analysed(Audio(audio.samples[: int(PART_S * audio.rate_hz)], audio.rate_hz))
+    tokens = [
+        token
+        for _, posteriors in posterior_stretches(name, part)
+        for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
+    ]
+    words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
+    return is_english(tuple(phone for phone, _ in token_phones(word)) for word in words)
+
+
+def weigh_words(found: Recognition) -> float:
+    """Return the confidence of recognised words times their share of the speech, 0 to 1."""
+    return (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
+
+
+def warn_of_another_language(found: Recognition) -> None:
+    """Log a warning where English words were recognised in what is hardly English."""
+    confidence = weigh_words(found)
+    if found.word_s >= MIN_TOLD_S and confidence < MIN_CONFIDENCE:
+        LOG.warning(
+            "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then "
+            "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
+            *(confidence, MIN_CONFIDENCE),
+        )

@@ -41,7 +41,6 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscrip
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.phones import phone_edits
 
-__all__ = ["Transcription", "align_or_recognise", "guesses", "transcribe", "warn_of_guesses"]
 LOG = logging.getLogger("lipmotion")
 MAX_WARNINGS = 20
 """Largest number of guessed pronunciations that are reported one by one."""
@@ -110,22 +109,24 @@ def transcribe(
         ):
             raise
         refused = error
-        units = _evenly_spread(spoken, lexicon, audio.duration_s)
+        labels = [Unit(phone, word=word) for word in spoken for phone in lexicon.pronunciations(word)[0]]
+        edges_s = np.linspace(0, audio.duration_s, len(labels) + 1).tolist()  # each for the same time
+        units = Timeline(tuple(map(Span, edges_s[:-1], edges_s[1:], labels)))
     if words is None or phones.kind == "own":
         return Transcription(units, None)
     fit = transcript_fit(audio, units)
     if name is None:
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    heard, sure = compute_phone_posteriors(name, analysed(audio))
+    posteriors, sure = compute_phone_posteriors(name, analysed(audio))
     costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
-    evidence = transcript_evidence(heard, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
+    evidence = transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
     if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
         fit = fit.with_evidence(evidence)
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    found = recognised()
-    evidence = _compared(evidence, found)
+    phones_recognised = recognised()
+    evidence = _compare(evidence, phones_recognised)
     fit = fit.with_evidence(evidence)
     warn_of_misfit(fit, corrected=True)
     if fit.is_doubtful:
@@ -133,16 +134,8 @@ def transcribe(
     if refused is not None and not evidence.unsaid:
         raise refused
     if evidence.gaps or evidence.unsaid:
-        units = _corrected(phones, audio, features, evidence, found, lexicon)
+        units = _correct(phones, audio, features, evidence, phones_recognised, lexicon)
     return Transcription(units, fit)
-
-
-def _evenly_spread(words: Sequence[str], lexicon: Lexicon, duration_s: float) -> Timeline[Unit]:
-    """Return the phones of words, each for the same time."""
-    said = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
-    edges_s = np.linspace(0, duration_s, len(said) + 1).tolist()
-    timed = zip(edges_s[:-1], edges_s[1:], said, strict=True)
-    return Timeline(tuple(Span(start_s, end_s, Unit(phone, word=word)) for start_s, end_s, (phone, word) in timed))
 
 
 def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
@@ -153,7 +146,7 @@ def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[n
     return posteriors.of_phones.astype(float), sure
 
 
-def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
+def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
     """Return evidence of a transcript that is wrong somewhere, compared with what is recognised.
 
     Words are said, and there, where recognition finds most of their phones; words that were doubted together, if it
@@ -162,16 +155,16 @@ def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Trans
     transcript is known to leave out something, recognised phones between those of its words are more of it.
     """
     spans = [span for span in recognised if not is_silent(span.label.phone)]
-    words, taken = _found_words(evidence, spans)
-    beside = [span for place, span in enumerate(spans) if place not in taken]
-    middles_s = [(span.start_s + span.end_s) / 2 for span in beside]
+    words, taken = _match_words(evidence, spans)
+    others_said = [span for place, span in enumerate(spans) if place not in taken]
+    middles_s = [(span.start_s + span.end_s) / 2 for span in others_said]
     known = {(other.first, other.stop) for other in evidence.others}
     said = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
     others = []
     for before, after in pairwise(said):
         before_s = words[before].end_s if before >= 0 else 0.0
         after_s = words[after].start_s if after < len(words) else np.inf
-        between = beside[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
+        between = others_said[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
         lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
         is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= MIN_INSERTED)
         if after > before + 1 or (lasts and is_more):
@@ -180,8 +173,8 @@ def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Trans
     return TranscriptEvidence(tuple(words), tuple(others))
 
 
-def _found_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
-    """Return the words of ``_compared``, those that are found with the times that they have there, and their phones.
+def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
+    """Return the words of ``_compare``, those that are found with the times that they have there, and their phones.
 
     spans : recognised phones; those of the words that are found are returned by their numbers
     """
@@ -213,7 +206,7 @@ def _found_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
     return words, taken
 
 
-def _recognised_within(
+def _select_recognised(
     recognised: Timeline[Unit], evidence: TranscriptEvidence, other: OtherSpeech
 ) -> list[list[Span[Unit]]]:
     """Return the recognised phones where something else is said than the transcript has, by words.
@@ -236,19 +229,18 @@ def _recognised_within(
         stop = int(np.searchsorted(middles_s, after_s))
         near = range(*np.searchsorted(middles_s, [after_s - REACH_S, after_s + REACH_S]))
         stop = min([n for n in near if spans[n].label.phone == words[other.stop].phones[0]], default=stop)
-    found: list[list[Span[Unit]]] = []
-    numbered = groupby(enumerate(spans), key=lambda pair: pair[1].label.word)
-    for word, group in numbered:
+    runs: list[list[Span[Unit]]] = []
+    for word, group in groupby(enumerate(spans), key=lambda pair: pair[1].label.word):
         run = list(group)
         middle_s = (run[0][1].start_s + run[-1][1].end_s) / 2
         if word and (before_s + other.start_s) / 2 <= middle_s <= (other.end_s + after_s) / 2:
-            found.append([span for _, span in run])
+            runs.append([span for _, span in run])
         elif not word and (inside := [span for number, span in run if first <= number < stop]):
-            found.append(inside)
-    return found
+            runs.append(inside)
+    return runs
 
 
-def _corrected(
+def _correct(
     phones: Recogniser,
     audio: Audio,
     features: Features,
@@ -264,7 +256,7 @@ def _corrected(
     variants: dict[str, tuple[Pronunciation, ...]] = {}
     for number, word in enumerate((*evidence.words, None)):
         for other in (each for each in evidence.others if each.first == number):
-            for run in _recognised_within(recognised, evidence, other):
+            for run in _select_recognised(recognised, evidence, other):
                 variants[str(len(labels))] = (tuple(span.label.phone for span in run),)
                 labels.append((run[0].label.word, run[0].label.confidence))
         if word is not None and word.is_said:
@@ -300,26 +292,31 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
 
     corrected : whether what is said instead is recognised
     """
+    places = f"at {format_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
     if fit.is_doubtful:
+        why = f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
+        if fit.evidence is not None:
+            said = sum(word.is_said for word in fit.evidence.words)
+            why = f"{said} of its {len(fit.evidence.words)} words are heard"
         LOG.warning(
             "the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out",
-            *(_judgement(fit), f" or to leave out words {_places(fit)}" if fit.missing else ""),
+            *(why, f" or to leave out words {places}" if fit.missing else ""),
             "the sound is recognised instead: " if corrected else "",
         )
         return
     if fit.unsaid:
-        named = [f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES]]
+        words = [f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES]]
         more = len(fit.unsaid) - MAX_STRETCHES
         LOG.warning(
             "the transcript seems to have words that are not said: %s%s%s; correct it",
-            *(", ".join(named), f" and {more} more" if more > 0 else ""),
+            *(", ".join(words), f" and {more} more" if more > 0 else ""),
             ", which are left out" if corrected else "",
         )
     if fit.missing:
         done = "what is said there is recognised" if corrected else "the lips are wrong there"
         LOG.warning(
             "the transcript seems to leave out words %s: %s; add the words, or leave the whole transcript out",
-            *(_places(fit), done),
+            *(places, done),
         )
 
 
@@ -344,39 +341,23 @@ def format_places(places: Sequence[tuple[float, float]]) -> str:
     return named + (f" and at {more} more places" if more > 0 else "")
 
 
-def _judgement(fit: TranscriptFit) -> str:
-    """Return why a transcript is doubtful: value found, value required."""
-    if fit.evidence is not None:
-        said = sum(word.is_said for word in fit.evidence.words)
-        return f"{said} of its {len(fit.evidence.words)} words are heard"
-    return f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
-
-
-def _places(fit: TranscriptFit) -> str:
-    """Return where words are missing, the longest stretches, and how much of the speech that is, for a message."""
-    return f"at {format_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
-
-
 def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:
     """Return whether words seem to be of another language than their lexicon."""
     unknown = [word for word in words if not lexicon.known(word)]
     return len({*unknown}) >= MIN_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
 
 
-def guesses(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
+def guess_pronunciations(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
     """Return the first ``MAX_WARNINGS`` words whose pronunciation is a guess, with it."""
-    return {word: lexicon.pronunciations(word)[0] for word in _unknown(words, lexicon)[:MAX_WARNINGS]}
-
-
-def _unknown(words: Sequence[str], lexicon: Lexicon) -> list[str]:
-    return [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+    return {word: lexicon.pronunciations(word)[0] for word in unknown[:MAX_WARNINGS]}
 
 
 def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
     """Log a warning for every word whose pronunciation is a guess; after ``MAX_WARNINGS``, for how many more."""
-    for word, guessed in guesses(words, lexicon).items():
-        told = map(shorten, (word, " ".join(guessed)))
-        LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *told)
-    more = len(_unknown(words, lexicon)) - MAX_WARNINGS
+    for word, guess in guess_pronunciations(words, lexicon).items():
+        shown = map(shorten, (word, " ".join(guess)))
+        LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *shown)
+    more = sum(not lexicon.known(word) for word in dict.fromkeys(words)) - MAX_WARNINGS
     if more > 0:
         LOG.warning("%d more words are not in the dictionary; a lexicon file can say better", more)

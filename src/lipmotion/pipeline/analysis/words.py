@@ -8,7 +8,7 @@ from typing import Any
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.analysis.speech_analysis import read_recording
+from lipmotion.pipeline.analysis.read_request import read_recording
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes

@@ -11,8 +11,8 @@ from pathlib import Path
 from statistics import median
 
 from lipmotion.errors import CorpusError, InputError, LipMotionError
+from lipmotion.pipeline.analysis.language import detect_english
 from lipmotion.pipeline.analysis.read_request import read_request
-from lipmotion.pipeline.analysis.spoken_language import detect_english
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
 from lipmotion.pipeline.batch.pool import WorkerDied, local_pool
