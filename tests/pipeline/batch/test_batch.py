@@ -83,16 +83,21 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: Job, tmp_path:
 
 @pytest.mark.long
 def test_the_face_of_another_person_is_mapped_onto_once(
-    filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
+    filmed_face: FilmedFace, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mapped: list[str] = []
-    monkeypatch.setattr(one_line, "provided", lambda _: lambda *_, speaker: mapped.append(speaker) or Path("a map"))
+    mapped, requests = list[str](), list[Request]()
+    monkeypatch.setattr(
+        one_line, "load_provided", lambda _: lambda *_, speaker: mapped.append(speaker) or Path("a map")
+    )
     other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
-    shared = one_line._Shared(other, shown_face(filmed_face), None)
-    assert [one_line._request(line, Request(), shared).onto for line in lines] == [Path("a map")] * 2
+    monkeypatch.setattr(one_line, "run", lambda job, **_: requests.append(job.request))
+    for model, line in ((other, lines[0]), (other, lines[1]), (toy_model, lines[0])):
+        shared = one_line._Shared(model, shown_face(filmed_face), None)
+        monkeypatch.setattr(one_line, "_share", lambda *_, shared=shared: shared)
+        one_line._write_line(LineWork(line, Job(), "", Place(str(tmp_path), "a run")))
+    assert [request.onto for request in requests] == [Path("a map"), Path("a map"), None]
     assert mapped == [""]
-    assert one_line._request(lines[0], Request(), replace(shared, model=toy_model)).onto is None
 
 
 def test_what_was_done_is_kept(sounds: Path, settings: Job, tmp_path: Path) -> None:
@@ -230,7 +235,7 @@ def waiting(sounds: Path, settings: Job, out: Path) -> list[LineWork]:
 @pytest.mark.parametrize(("times", "outcome"), [(1, "done"), (2, "failed")])
 def test_a_worker_dies(sounds: Path, settings: Job, tmp_path: Path, times: int, outcome: str) -> None:
     works = waiting(sounds, settings, tmp_path / "out")
-    records = list(run_module._finished(DyingPool("one", times), works))
+    records = list(run_module._finish_lines(DyingPool("one", times), works))
     assert {record["name"]: record["outcome"] for record in records} == {
         "one": outcome, "three": "done", "deep/two": "done",
     }  # fmt: skip
@@ -243,7 +248,7 @@ def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: Job, tmp
         yield
 
     with pytest.raises(CorpusError, match="die before they begin"):
-        list(run_module._finished(dead, waiting(sounds, settings, tmp_path / "out")))
+        list(run_module._finish_lines(dead, waiting(sounds, settings, tmp_path / "out")))
 
 
 def test_a_line_that_another_worker_finished_is_not_done_again(sounds: Path, settings: Job, tmp_path: Path) -> None:
@@ -297,7 +302,7 @@ def test_a_bug_that_one_line_meets_does_not_end_the_batch(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division")
 
-    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._written", broken)
+    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._write_line", broken)
     found = batch(sounds, tmp_path / "out", settings, jobs=1)
     assert found.failed == 3
     assert "unexpected ZeroDivisionError: float division" in ledger_rows(tmp_path / "out")[0]["error"]

@@ -16,7 +16,7 @@ from lipmotion.pipeline.batch.check import (
     CheckedLine,
     Finding,
     LineToCheck,
-    _findings,
+    _find_problems,
     check_line,
     count_letters,
     expected_s,
@@ -98,14 +98,14 @@ def test_the_measure_of_length_is_the_usual_rate() -> None:
         usual = [CheckedLine(f"{n}", spoken_s=share * expected_s(60), letters=60) for n in range(FEWEST_LINES)]
         return [*usual, CheckedLine("x", spoken_s=2.6 * expected_s(60), letters=60)]
 
-    assert [each.name for each in _findings(lines(0.8), [])] == ["x"]
-    assert list(_findings(lines(1.3), [])) == []
+    assert [each.name for each in _find_problems(lines(0.8), [])] == ["x"]
+    assert list(_find_problems(lines(1.3), [])) == []
 
 
 def test_short_lines_may_have_the_same_words() -> None:
     long, short = ("who", "goes", "there", "now"), ("yes", "sir")
     checked = [CheckedLine(name, words=words) for name, words in zip("abcd", (long, short, long, short), strict=True)]
-    assert list(_findings(checked, [])) == [Finding("same words", "c", "as of a")]
+    assert list(_find_problems(checked, [])) == [Finding("same words", "c", "as of a")]
 
 
 def test_letters_of_other_scripts_take_longer() -> None:

@@ -20,7 +20,7 @@ from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
-from lipmotion.types import Audio, Monitor, Progress, TimedTranscript, silent_monitor
+from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
 from lipmotion.types.audio import sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, script_of
 from lipmotion.units.languages_told import COMMON_WORDS, language_of_text
@@ -73,7 +73,7 @@ def check_line(work: LineToCheck) -> CheckedLine:
         return CheckedLine(line.name, "missing", f"{path}: no such file")
     try:
         audio = read_audio(path, warn=False)
-        words = _words(work)
+        words = _read_words(work)
     except (LipMotionError, OSError) as error:
         return CheckedLine(line.name, "unreadable", str(error))
     levels = levels_db(audio)
@@ -83,14 +83,16 @@ def check_line(work: LineToCheck) -> CheckedLine:
     spoken_s = sum(end_s - start_s for start_s, end_s in spoken_spans(levels))
     if spoken_s < MIN_SPOKEN_S:
         return CheckedLine(line.name, "silent", "no sound longer than a click")
-    return CheckedLine(
-        line.name,
-        reason=_wrong_language(work.request.language, words, audio, spoken_s),
-        digest=hashlib.sha256(sixteen_bits(audio.samples).tobytes()).hexdigest(),
-        spoken_s=spoken_s,
-        letters=count_letters(words),
-        words=words,
-    )
+    detected = language_of_text(words) if len(words) >= FEWEST_TOLD_WORDS else ""
+    required, reason = work.request.language if work.request.language != AUTO else detected, ""
+    if detected and required in COMMON_WORDS and detected != required:
+        reason = f"the words are in {detected}, required {required}"
+    elif required and spoken_s >= SHORTEST_TOLD_S:
+        english = detect_english(audio)
+        if english is not None and english != (required == ENGLISH):
+            reason = f"the speech is {'' if english else 'not '}English, required {required}"
+    digest = hashlib.sha256(sixteen_bits(audio.samples).tobytes()).hexdigest()
+    return CheckedLine(line.name, "", reason, digest, spoken_s, count_letters(words), words)
 
 
 def count_letters(words: Sequence[str]) -> float:
@@ -102,34 +104,16 @@ def count_letters(words: Sequence[str]) -> float:
     return sum((LETTERS_OF.get(script_of(letter), 1.0) for word in words for letter in word), 0.0)
 
 
-def _words(work: LineToCheck) -> tuple[str, ...]:
+def _read_words(work: LineToCheck) -> tuple[str, ...]:
     """Return the words of a line without tags, numbers spelled out where they are English; none: they are not known."""
-    line, request = work.line, work.request
-    named = replace(request, recording=Path(line.recording), lexicon=None)
-    given = line.transcript or read_request(named, words_beside=True).transcript
-    if given is None or isinstance(given, TimedTranscript):
-        return given.words if given else ()
-    text = tagged_text(str(given)).text
+    request = replace(work.request, recording=Path(work.line.recording), lexicon=None)
+    transcript = work.line.transcript or read_request(request, words_beside=True).transcript
+    if transcript is None or isinstance(transcript, TimedTranscript):
+        return transcript.words if transcript else ()
+    text = tagged_text(str(transcript)).text
     if request.language == ENGLISH:
         return words_in(text)
     return written_words(text) if text.strip() else ()
-
-
-def _wrong_language(language: str, words: Sequence[str], audio: Audio, spoken_s: float) -> str:
-    """Return what is wrong with the language of words and speech; empty: nothing that is known.
-
-    language : that they should be in; ``AUTO``: both in the same one
-    """
-    told = language_of_text(words) if len(words) >= FEWEST_TOLD_WORDS else ""
-    wanted = language if language != AUTO else told
-    if told and wanted in COMMON_WORDS and told != wanted:
-        return f"the words are in {told}, required {wanted}"
-    if not wanted or spoken_s < SHORTEST_TOLD_S:
-        return ""
-    english = detect_english(audio)
-    if english is None or english == (wanted == ENGLISH):
-        return ""
-    return f"the speech is {'' if english else 'not '}English, required {wanted}"
 
 
 STAGE = "checking"
@@ -207,22 +191,29 @@ def check(
     except WorkerDied as error:
         raise CorpusError(f"a process that listened to recordings died ({error}); run it with --jobs 1") from error
     in_order = [checked[line.name] for line in lines]
-    return CheckSummary(len(lines), tuple(_findings(in_order, _orphans(Path(source), lines))))
+    return CheckSummary(len(lines), tuple(_find_problems(in_order, _find_orphans(Path(source), lines))))
 
 
-def _findings(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> Iterator[Finding]:
+def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> Iterator[Finding]:
     """Yield what is wrong, line after line, and then what is there twice, and the recordings of no line."""
-    usual = _usual(checked)
+    rates = [each.spoken_s / expected_s(each.letters) for each in checked if each.letters]
+    usual = min(max(median(rates), 1 / SLOWEST), SLOWEST) if len(rates) >= FEWEST_LINES else 1.0
     for each in checked:
         if each.problem:
             yield Finding(each.problem, each.name, each.reason)
             continue
         if each.reason:
             yield Finding("language", each.name, each.reason)
-        if each.letters:
-            yield from _length(each, usual)
-    yield from _doubles("same sound", checked, lambda each: each.digest)
-    yield from _doubles("same words", checked, lambda each: each.words if len(each.words) >= FEWEST_SAME_WORDS else ())
+        wanted_s = usual * expected_s(each.letters)
+        text = f"{each.spoken_s:.1f} s of speech, about {wanted_s:.1f} s for its {len(each.words)} words"
+        if each.letters and each.spoken_s < SHORT * wanted_s:
+            yield Finding("too short", each.name, text)
+        elif each.letters and each.spoken_s > LONG * wanted_s + LONGER_S:
+            yield Finding("too long", each.name, text)
+    yield from _find_doubles("same sound", checked, lambda each: each.digest)
+    yield from _find_doubles(
+        "same words", checked, lambda each: each.words if len(each.words) >= FEWEST_SAME_WORDS else ()
+    )
     yield from (Finding("orphaned", path, "no line has this recording") for path in orphans)
 
 
@@ -235,46 +226,31 @@ def expected_s(letters: float) -> float:
     return PAUSE_S + letters / LETTERS_PER_S
 
 
-def _usual(checked: Sequence[CheckedLine]) -> float:
-    """Return how many times as long as usual the lines of a batch take; 1 where there are too few to tell."""
-    shares = [each.spoken_s / expected_s(each.letters) for each in checked if each.letters]
-    return min(max(median(shares), 1 / SLOWEST), SLOWEST) if len(shares) >= FEWEST_LINES else 1.0
-
-
-def _length(each: CheckedLine, usual: float) -> Iterator[Finding]:
-    wanted_s = usual * expected_s(each.letters)
-    text = f"{each.spoken_s:.1f} s of speech, about {wanted_s:.1f} s for its {len(each.words)} words"
-    if each.spoken_s < SHORT * wanted_s:
-        yield Finding("too short", each.name, text)
-    elif each.spoken_s > LONG * wanted_s + LONGER_S:
-        yield Finding("too long", each.name, text)
-
-
-def _doubles(kind: str, checked: Sequence[CheckedLine], key: Callable[[CheckedLine], object]) -> Iterator[Finding]:
+def _find_doubles(kind: str, checked: Sequence[CheckedLine], key: Callable[[CheckedLine], object]) -> Iterator[Finding]:
     """Yield the lines that have the same as an earlier one; where the key is empty, they have nothing."""
     first: dict[object, str] = {}
     for each in checked:
-        if found := key(each):
-            if found in first:
-                yield Finding(kind, each.name, f"as of {first[found]}")
-            first.setdefault(found, each.name)
+        value = key(each)
+        if value and value in first:
+            yield Finding(kind, each.name, f"as of {first[value]}")
+        first.setdefault(value, each.name)
 
 
-def _orphans(source: Path, lines: Sequence[BatchLine]) -> list[str]:
+def _find_orphans(source: Path, lines: Sequence[BatchLine]) -> list[str]:
     """Return the paths of recordings that no line of a list has; of a folder, every recording is a line."""
     if source.is_dir():
         return []
     used = {os.path.realpath(line.recording) for line in lines}
     folders = {Path(line.recording).parent for line in lines}
-    own = Path(os.path.abspath(source)).parent  # noqa: PTH100 # links are not followed
-    is_inside = all(folder.is_relative_to(own) for folder in folders)
+    list_folder = Path(os.path.abspath(source)).parent  # noqa: PTH100 # links are not followed
+    is_inside = all(folder.is_relative_to(list_folder) for folder in folders)
     roots, depth = ([Path(os.path.commonpath(folders))], "**/*") if is_inside else (sorted(folders), "*")
-    found = (path for root in roots for path in sorted(root.glob(depth)) if is_recording(path) and path.is_file())
-    return [str(path) for path in found if os.path.realpath(path) not in used and not _is_output(path, roots)]
-
-
-def _is_output(path: Path, roots: Sequence[Path]) -> bool:
-    """Return whether a recording is hidden, or lies in a folder that a batch has written."""
-    inner = next(path.relative_to(root) for root in roots if path.is_relative_to(root))
-    folders = path.parents[: len(inner.parts)]
-    return any(part.startswith(".") for part in inner.parts) or any((folder / LEDGER).exists() for folder in folders)
+    orphans = []
+    for root in roots:
+        for path in sorted(root.glob(depth)):
+            parts = path.relative_to(root).parts
+            is_written = any((folder / LEDGER).exists() for folder in path.parents[: len(parts)])  # by a batch
+            is_hidden = any(part.startswith(".") for part in parts)
+            if is_recording(path) and path.is_file() and os.path.realpath(path) not in used:
+                orphans += [] if is_hidden or is_written else [str(path)]
+    return orphans

@@ -6,7 +6,7 @@ import csv
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from importlib import resources
 from pathlib import Path
@@ -50,7 +50,8 @@ def write_reports(
     table, page = out / CSV_REPORT, out / HTML_REPORT
     marks = marks or {}
     page_text = coloured(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
-    page_text = page_text.replace(BASIS, _digest(marks))
+    rows_of_marks = as_json([[name, mark.kind, mark.when] for name, mark in marks.items()])
+    page_text = page_text.replace(BASIS, hashlib.sha256(rows_of_marks.encode()).hexdigest())
     before, _, after = page_text.partition(ROWS)
     with ExitStack() as stack:
         paths = [stack.enter_context(atomic_file(path)) for path in (table, page)]
@@ -59,12 +60,21 @@ def write_reports(
         rows = csv.writer(table_file)
         rows.writerow(COLUMNS)
         page_file.write(before)
-        for number, record in enumerate(_records(lines, ledger, order)):
-            mark = _shown_mark(marks.get(record["name"]), record)
-            record["mark"] = mark.kind if mark else None
+        for place, number in enumerate(order):
+            record = ledger.record_of(lines[number].name) or {"name": lines[number].name, "outcome": "missing"}
+            mark = marks.get(record["name"])
+            if mark is not None and mark.kind != APPROVE and not is_due(mark, record):
+                mark = None  # what it asked for is done
+            outputs = list(record.get("outputs", ()))
+            record |= {"doubt": rate_doubt(record), "outputs": outputs, "mark": mark.kind if mark else None}
             values = [record.get(name) for name in COLUMNS]
             rows.writerow([_field(value) for value in values])
-            page_file.write(f"{',' if number else ''}\n{_for_page(record, values, out, mark)}")
+            links = [quote(as_text(name)) for name in outputs]
+            sound = _address(record["recording"], out) if "recording" in record else None
+            row = [*map(_visible, values), links, sound, mark.when if mark else None]
+            text = json.dumps(row, ensure_ascii=True, separators=(",", ":"))
+            text = text.replace("<", "\\u003c")  # nothing that a name says ends the script
+            page_file.write(f"{',' if place else ''}\n{text}")
         page_file.write(after)
     return table, page
 
@@ -88,21 +98,6 @@ def rate_doubt(record: Record) -> float:
     return round(min(doubt, 99.0), 1)
 
 
-def _records(lines: Sequence[BatchLine], ledger: Ledger, order: Sequence[int]) -> Iterator[Record]:
-    for number in order:
-        record = ledger.record_of(lines[number].name) or {"name": lines[number].name, "outcome": "missing"}
-        yield record | {"doubt": rate_doubt(record), "outputs": list(record.get("outputs", ()))}
-
-
-def _shown_mark(mark: Mark | None, record: Record) -> Mark | None:
-    """Return the mark of a line as the reports show it; None: it has none, or what it asked for is done."""
-    return mark if mark is not None and (mark.kind == APPROVE or is_due(mark, record)) else None
-
-
-def _digest(marks: Mapping[str, Mark]) -> str:
-    return hashlib.sha256(as_json([[name, mark.kind, mark.when] for name, mark in marks.items()]).encode()).hexdigest()
-
-
 def _field(value: Any) -> str:
     """Return a value as a field of the CSV file."""
     if value is None:
@@ -110,16 +105,6 @@ def _field(value: Any) -> str:
     if not isinstance(value, list | str):
         return str(value)
     return as_field(BETWEEN.join(value) if isinstance(value, list) else value)
-
-
-def _for_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | None) -> str:
-    """Return a row of the page: its values, the addresses of outputs and recording, and when it was marked."""
-    links = [quote(as_text(name)) for name in record["outputs"]]
-    sound = _address(record["recording"], out) if "recording" in record else None
-    text = json.dumps(
-        [*map(_visible, values), links, sound, mark.when if mark else None], ensure_ascii=True, separators=(",", ":")
-    )
-    return text.replace("<", "\\u003c")  # nothing that a name says ends the script
 
 
 def _address(recording: str, out: Path) -> str | None:
