@@ -91,17 +91,21 @@ def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors
 
     frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
     axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, MIN_COLUMNS, MAX_COLUMNS)))
-    leader = posteriors[0].name if posteriors else ""
-    panels = [panel for number, chain in enumerate(posteriors) for panel in _panels(axis, chain, leader, number)]
+    panels = []  # of each: title, names of the rows, colours [shape=(columns, rows, 3)]
+    for number, chain in enumerate(posteriors):
+        highest = chain.probability.max(axis=0)
+        units = np.flatnonzero(highest >= min(MIN_PROBABILITY, highest.max()))
+        first = (chain.probability[:, units] >= highest[units] / 2).argmax(axis=0)
+        units = units[np.argsort(first, kind="stable")]
+        colours = _shade(axis, chain.probability[:, units], COLOURS[number % len(COLOURS)])
+        panels.append((f"chain {number + 1}: {chain.name}", [chain.units[unit] for unit in units], colours))
+        if chain.leads:
+            leads = [f"{lead:+d}" if lead else "0" for lead in chain.leads]
+            title = f"asynchrony: states that {chain.name} is ahead of {posteriors[0].name}"
+            panels.append((title, leads, _shade(axis, chain.lead, INK)))
     channels = generation.motion.names
     curve = "opening" if "opening" in channels else channels[0]
-    height = (
-        TITLE_PX
-        + sum(TITLE_PX + ROW_PX * len(names) + GAP_PX for _, names, _ in panels)
-        + TITLE_PX
-        + CURVE_PX
-        + 2 * TITLE_PX
-    )
+    height = 4 * TITLE_PX + CURVE_PX + sum(TITLE_PX + ROW_PX * len(names) + GAP_PX for _, names, _ in panels)
     picture = Image.new("RGB", (LEFT_PX + axis.columns + RIGHT_PX, height), WHITE)
     pen = PlotPainter(ImageDraw.Draw(picture), axis)
     pen.phones(generation, height - 2 * TITLE_PX)
@@ -120,25 +124,7 @@ def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors
     return picture
 
 
-def _panels(
-    axis: TimeAxis, chain: ChainPosteriors, leader: str, number: int
-) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
-    """Return title, names of the rows and colours [shape=(columns, rows, 3)] of each panel of a chain."""
-    colour = COLOURS[number % len(COLOURS)]
-    most = chain.probability.max(axis=0)
-    shown = np.flatnonzero(most >= min(MIN_PROBABILITY, most.max()))
-    first = (chain.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
-    shown = shown[np.argsort(first, kind="stable")]
-    names = [chain.units[unit] for unit in shown]
-    panels = [(f"chain {number + 1}: {chain.name}", names, _shaded(axis, chain.probability[:, shown], colour))]
-    if chain.leads:
-        named = [f"{lead:+d}" if lead else "0" for lead in chain.leads]
-        title = f"asynchrony: states that {chain.name} is ahead of {leader}"
-        panels.append((title, named, _shaded(axis, chain.lead, INK)))
-    return panels
-
-
-def _shaded(axis: TimeAxis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
+def _shade(axis: TimeAxis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
     share = np.clip(axis.averaged(probability), 0, 1)[:, :, None]
     return np.round(255 + share * (np.array(colour, float) - 255)).astype(np.uint8)
 

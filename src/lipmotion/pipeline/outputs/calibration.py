@@ -37,27 +37,40 @@ def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str
               through what is stated allows
     Raises InputError: no such control, or one that does not change between the poses.
     """
-    values = _values(rows, sources)
+    values: dict[str, np.ndarray] = {}  # of each control in the poses, without its limits
+    for row in rows:
+        followed = np.array(sources.get(row.source, np.zeros(len(POSES))))
+        values[row.control] = values.get(row.control, 0.0) + row.offset + row.gain * followed
     lines = {}
-    for control in dict.fromkeys(name for given in stated.values() for name in given):
+    for control in dict.fromkeys(name for controls in stated.values() for name in controls):
         if control not in values:
             raise InputError(f"the table has no {shorten(control)!r}; {nearest(control, values)}")
         now = values[control]
-        wanted = {number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})}
-        if len(wanted) == 1:
-            only = next(iter(wanted))
+        targets = {
+            number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})
+        }
+        if len(targets) == 1:
+            only = next(iter(targets))
             other = int(np.abs(now - now[only]).argmax())
-            wanted[other] = float(now[other])
-        lines[control] = _line(control, now[list(wanted)], np.array(list(wanted.values())))
-    moved, seen = [], set[str]()
+            targets[other] = float(now[other])
+        before, wanted = now[list(targets)], np.array(list(targets.values()))
+        apart = before - before.mean()
+        if np.abs(apart).max() < MIN_CHANGE:
+            raise InputError(
+                f"{shorten(control)!r} follows no curve that tells these poses apart; give it another source in the "
+                "table"
+            )
+        gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
+        lines[control] = gain, round(float(wanted.mean() - gain * before.mean()), DIGITS)
+    calibrated, seen = [], set[str]()
     for row in rows:
         if row.control in lines:
             gain, offset = lines[row.control]
             first = offset if row.control not in seen else 0.0
             row = replace(row, gain=gain * row.gain, offset=gain * row.offset + first)  # noqa: PLW2901
             seen.add(row.control)
-        moved.append(row)
-    return moved
+        calibrated.append(row)
+    return calibrated
 
 
 def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
@@ -65,7 +78,7 @@ def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sour
 
     Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
     """
-    motion, units, frames = _spoken()
+    motion, units, frames = _pose_motion()
     if isinstance(curves, Path):
         found = make_rig_sources(motion, units, rows)
         return {name: curve[frames].tolist() for name, curve in found.items()}
@@ -76,7 +89,7 @@ def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sour
     return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}
 
 
-def _spoken() -> tuple[Motion, Timeline[Unit], list[int]]:
+def _pose_motion() -> tuple[Motion, Timeline[Unit], list[int]]:
     """Return a motion with its phones, and the frames of the poses."""
     edges = PAUSE_S + PHONE_S * np.arange(len(PHONES) + 1)
     spans = [Span(0.0, PAUSE_S, Unit("sil"))]
@@ -89,23 +102,3 @@ def _spoken() -> tuple[Motion, Timeline[Unit], list[int]]:
     width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * mouth_template().width
     motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
     return motion, Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
-
-
-def _values(rows: Sequence[RigRow], sources: Sources) -> dict[str, np.ndarray]:
-    """Return the value of each control in ``POSES``, without its limits [each shape=(3,)]."""
-    values: dict[str, np.ndarray] = {}
-    for row in rows:
-        followed = np.array(sources.get(row.source, np.zeros(len(POSES))))
-        values[row.control] = values.get(row.control, 0.0) + row.offset + row.gain * followed
-    return values
-
-
-def _line(control: str, now: np.ndarray, wanted: np.ndarray) -> tuple[float, float]:
-    """Return gain and offset that bring a control's values nearest to the wanted ones."""
-    apart = now - now.mean()
-    if np.abs(apart).max() < MIN_CHANGE:
-        raise InputError(
-            f"{shorten(control)!r} follows no curve that tells these poses apart; give it another source in the table"
-        )
-    gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
-    return gain, round(float(wanted.mean() - gain * now.mean()), DIGITS)

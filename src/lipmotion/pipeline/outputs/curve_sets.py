@@ -76,7 +76,7 @@ def make_curves(
         return edit_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
     check_curve_set(curves)
     if curves in SHAPE_SETS:
-        return with_edited_curves(_curves_of(motion, units, str(curves), staging, prosody), units, edits)
+        return with_edited_curves(_make_set(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
     sources = make_rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
     own = [edit for edit in edits if edit.channel not in sources]
@@ -99,7 +99,7 @@ def make_rig_sources(
     """
 
     def plain(name: str) -> Motion:
-        return with_edited_curves(_curves_of(motion, units, name, staging, prosody), units, edits)
+        return with_edited_curves(_make_set(motion, units, name, staging, prosody), units, edits)
 
     sets = [with_mouth(motion), plain(ARKIT), plain("visemes")]
     if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
@@ -126,7 +126,7 @@ def known_names(mesh: Mesh) -> dict[str, str]:
     return {arkit_name(shape.called) or shape.called: shape.name for shape in reversed(mesh.shapes) if shape.called}
 
 
-def _curves_of(
+def _make_set(
     motion: Motion, units: Timeline[Unit], name: str, staging: Staging | None, prosody: Prosody | None
 ) -> Motion:
     """Return the curves of one of ``SHAPE_SETS``."""
@@ -136,22 +136,17 @@ def _curves_of(
     if name == WHOLE_FACE:
         mouth = shape_weights(motion, units, arkit_mouth())
         return join_channels(mouth, living_curves(motion, units, staging, prosody))
-    if name == VOWELS:
-        return join_channels(_vowel_motion(motion, units), living_curves(motion, units, staging, prosody))
+    if name == VOWELS:  # with how far the lips are pressed together, and VRM's expressions of moods
+        mouth, moods = spoken_mouth(motion, units), expression_weights(moods_shown(motion))
+        curves = {CLOSED: mouth.closing if CLOSED not in motion.names else motion[CLOSED]}
+        curves |= {
+            mood: curve * mouth.free for mood, curve in moods.items()
+        }  # only the model knows which part the lips
+        channels = tuple(Channel(curve, WEIGHT) for curve in curves)
+        pressed = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
+        vowels = join_channels(shape_weights(motion, units, vowel_mouth()), pressed)
+        return join_channels(vowels, living_curves(motion, units, staging, prosody))
     return viseme_motion(units, spoken_mouth(motion, units)) if name == "visemes" else fap_motion(motion, units)
-
-
-def _vowel_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
-    """Return the weights of the vowels of VRM, how far the lips are pressed together, and VRM's expressions of moods.
-
-    Expressions vanish where the lips are pressed: whether one parts them, the model alone knows.
-    """
-    mouth, shown = spoken_mouth(motion, units), expression_weights(moods_shown(motion))
-    curves = {CLOSED: mouth.closing if CLOSED not in motion.names else motion[CLOSED]}
-    curves |= {name: curve * mouth.free for name, curve in shown.items()}
-    channels = tuple(Channel(name, WEIGHT) for name in curves)
-    added = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
-    return join_channels(shape_weights(motion, units, vowel_mouth()), added)
 
 
 def join_channels(first: Motion, second: Motion) -> Motion:
@@ -161,9 +156,8 @@ def join_channels(first: Motion, second: Motion) -> Motion:
     """
     if len(first.values) != len(second.values):
         raise InputError(f"motions have {len(first.values)} and {len(second.values)} frames, required the same number")
-    return Motion(
-        np.concatenate([first.values, second.values], axis=1), first.rate_hz, first.channels + second.channels
-    )
+    values = np.concatenate([first.values, second.values], axis=1)
+    return Motion(values, first.rate_hz, first.channels + second.channels)
 
 
 def with_curves(

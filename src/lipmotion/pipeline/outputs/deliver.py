@@ -70,11 +70,16 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
     Raises InputError: the offset leaves nothing.
     """
     keys = with_detected(in_time((*delivery.moods, *generation.moods)), generation.events)
-    larger = _larger(with_manners(generation, keys), delivery.intensity)
+    generation = with_manners(generation, keys)
+    if delivery.intensity != 1:
+        motion = generation.motion
+        opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
+        generation = intensified(generation, delivery.intensity, opening)
     if not all(key.is_manner for key in keys):
-        moods = with_moods(larger.motion, keys)
-        larger = larger.selected(tuple(n for n in larger.motion.names if not is_mood(n))).with_motion(moods)
-    return moved_in_time(larger, delivery)
+        moods = with_moods(generation.motion, keys)
+        names = tuple(name for name in generation.motion.names if not is_mood(name))
+        generation = generation.selected(names).with_motion(moods)
+    return moved_in_time(generation, delivery)
 
 
 def deliver_to_face(
@@ -124,11 +129,3 @@ def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     values, variance = motion.values.astype(np.float64), np.array(generation.variance)
     values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance
     return replace(mouth, motion=replace(motion, values=values), spread=variance)
-
-
-def _larger(generation: Generation, intensity: float) -> Generation:
-    if intensity == 1:
-        return generation
-    motion = generation.motion
-    opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
-    return intensified(generation, intensity, opening)
