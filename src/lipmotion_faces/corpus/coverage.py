@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.pipeline.training.phone_sequences import pronounce_sentences, read_corpus_phones
+from lipmotion.pipeline.training.prompts import pronounce_sentences, read_corpus_phones
 from lipmotion.printable import printable
 from lipmotion.units import PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, Lexicon, most_similar_lips
 from lipmotion.units.classes import CLASSES
