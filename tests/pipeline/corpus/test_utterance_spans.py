@@ -6,7 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from lipmotion_faces.corpus.utterance_spans import LEAST_S, LONGEST_S, MARGIN_S, SHORTEST_S, SpokenPart, utterance_spans
+from lipmotion_faces.corpus.long_videos import (
+    LEAST_S,
+    LONGEST_S,
+    MARGIN_S,
+    SHORTEST_S,
+    SpokenPart,
+    utterance_spans,
+)
 
 
 def middle(low_s: float, high_s: float) -> float:

@@ -9,8 +9,15 @@ from typing import Final
 
 import numpy as np
 
-from lipmotion.articulation.curve_edits import with_gain
-from lipmotion.articulation.delivery import Delivery, closed_on_grid, closed_times, held, intensified, moved_in_time
+from lipmotion.articulation.curve_edits import apply_gain
+from lipmotion.articulation.delivery import (
+    Delivery,
+    close_on_frame_grid,
+    find_closed_times,
+    hold_poses,
+    intensify,
+    shift_in_time,
+)
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
@@ -57,12 +64,12 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
     for key, stop_s in ((key, later.time_s) for key, later in pairwise((*manners, last))):
         factor = 1 + key.strength * (FACTORS[key.mood] - 1)
         if factor != 1 and key.time_s < stop_s:
-            generation = with_gain(generation, Gain(key.time_s, stop_s, factor))
+            generation = apply_gain(generation, Gain(key.time_s, stop_s, factor))
     return generation
 
 
 def deliver(generation: Generation, delivery: Delivery) -> Generation:
-    """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``held``).
+    """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``hold_poses``).
 
     Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
     without any, motion keeps the moods that it has. So do manners of speaking. Where none is asked for, those that are
@@ -74,12 +81,12 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
     if delivery.intensity != 1:
         motion = generation.motion
         opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
-        generation = intensified(generation, delivery.intensity, opening)
+        generation = intensify(generation, delivery.intensity, opening)
     if not all(key.is_manner for key in keys):
         moods = with_moods(generation.motion, keys)
         names = tuple(name for name in generation.motion.names if not is_mood(name))
         generation = generation.selected(names).with_motion(moods)
-    return moved_in_time(generation, delivery)
+    return shift_in_time(generation, delivery)
 
 
 def deliver_to_face(
@@ -87,7 +94,7 @@ def deliver_to_face(
 ) -> Generation:
     """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
 
-    character : whose weights are shown, if the face is a character with blendshapes
+    character : whose weights are deliver_to_face, if the face is a character with blendshapes
     """
     moved = with_drawn_channels(deliver(generation, delivery))
     if moved.curve_edits and character is not None and character.shapes is not None:
@@ -96,7 +103,7 @@ def deliver_to_face(
     if not frames:
         return moved
     moved = moved.with_motion(with_gestures(moved.motion, moved.units))
-    closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
+    closed_s, moved = find_closed_times(moved), close_on_frame_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
     return hold_mouth(moved.resampled(fps), frames, closed_s)
@@ -110,7 +117,7 @@ def with_drawn_channels(generation: Generation) -> Generation:
 
 
 def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
-    """Return a generation whose mouth is held (``held``); eyes, brows, cheeks and head move as before.
+    """Return a generation whose mouth is held (``hold_poses``); eyes, brows, cheeks and head move as before.
 
     frames : 0: everything moves as before; 1: every frame is a pose, which formats that can say so hold
     """
@@ -122,7 +129,7 @@ def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     )
     if not frames or not names:
         return generation
-    mouth = replace(held(generation.selected(names), frames, closed_s), stepped=names)
+    mouth = replace(hold_poses(generation.selected(names), frames, closed_s), stepped=names)
     if names == motion.names:
         return mouth
     columns = [motion.column(name) for name in names]

@@ -10,19 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.articulation.contact import in_pictures
-from lipmotion.articulation.curve_edits import with_edited_curves
-from lipmotion.articulation.delivery import closed_on_grid, closed_times
+from lipmotion.articulation.contact import sample_pictures
+from lipmotion.articulation.curve_edits import apply_curve_edits
+from lipmotion.articulation.delivery import close_on_frame_grid, find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
+from lipmotion.formats.fap import FAP
 from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.fitting.living_curves import living_curves
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import (
@@ -81,7 +81,7 @@ class MotionOutput(Output):
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
         held = hold_mouth(held, frames, performance.cached(_find_closed_s))
         if form.keyed and settings.delivery.key_tolerance:
-            held = thin_keys(held, Thinning(settings.delivery.key_tolerance, tuple(closed_times(held))))
+            held = thin_keys(held, Thinning(settings.delivery.key_tolerance, tuple(find_closed_times(held))))
         check_motion(self.path, held.motion)
         return partial(self._write, held, performance)
 
@@ -111,7 +111,7 @@ def thin_keys(held: Generation, thinning: Thinning) -> Generation:
         if channel.unit != WEIGHT or np.abs(curve).max(initial=0.0) > thinning.tolerance:
             kept.append(channel.name)
         if channel.unit == WEIGHT and channel.name not in held.stepped:
-            keys = thinning.kept(motion.time_s, curve[:, None])
+            keys = thinning.choose(motion.time_s, curve[:, None])
             values[:, column] = np.interp(motion.time_s, motion.time_s[keys], curve[keys])
     return replace(held, motion=replace(motion, values=values)).selected(kept)
 
@@ -126,7 +126,7 @@ def _deliver(performance: Performance) -> Generation:
 
 def _find_closed_s(performance: Performance) -> list[float]:
     """Return the times of p, b and m that held poses show; none, where poses are not held."""
-    return closed_times(performance.cached(_deliver)) if performance.settings.delivery.hold_ms else []
+    return find_closed_times(performance.cached(_deliver)) if performance.settings.delivery.hold_ms else []
 
 
 def _choose(performance: Performance) -> tuple[Generation, Generation, Sequence[str]]:
@@ -134,7 +134,7 @@ def _choose(performance: Performance) -> tuple[Generation, Generation, Sequence[
     settings, spoken = performance.settings, performance.cached(_deliver)
     rate_hz, curves, channels = settings.outputs.rate_hz, settings.curves, settings.outputs.channels or None
     if rate_hz is not None and (performance.cached(_find_closed_s) or rate_hz < spoken.motion.rate_hz):
-        spoken = closed_on_grid(spoken, rate_hz)
+        spoken = close_on_frame_grid(spoken, rate_hz)
     asked: Sequence[str] = channels or ()
     names: Sequence[str] | None = channels
     if curves is not None:
@@ -182,7 +182,7 @@ def fit_to_format(
     others = form.other_curves and not is_all and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
         curves = _make_curves(generation, form.curves, staging, prosody)
-        curves = with_edited_curves(curves, generation.units, generation.curve_edits)
+        curves = apply_curve_edits(curves, generation.units, generation.curve_edits)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
         named = [name for name in channels or () if name in curves.names]
         held = held.selected(named) if named else held
@@ -206,7 +206,7 @@ def resample_curves(held: Generation, generation: Generation, rate_hz: float) ->
     if OPENING not in shown.names or len(held.motion.values) != len(shown.values):
         return resampled
     contact = spoken_mouth(shown, generation.units).contact
-    rows = in_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
+    rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 
@@ -237,7 +237,7 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
     face = Motion(values, motion.rate_hz, tuple(known[name] for name in curves))
     if name != WHOLE_FACE:
         return face
-    living = living_curves(with_mouth(motion), units, staging, prosody)
+    living = compute_living_curves(with_mouth(motion), units, staging, prosody)
     columns = [column for column, name in enumerate(living.names) if name not in face.names]
     channels = tuple(living.channels[column] for column in columns)
     return join_channels(face, Motion(living.values[:, columns], motion.rate_hz, channels))

@@ -17,7 +17,7 @@ import numpy as np
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shorten
-from lipmotion.formats.label_files import labels_beside
+from lipmotion.formats.label_files import find_labels
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
@@ -136,7 +136,7 @@ def align_recordings(
         named = (speaker for pattern, speaker in (speakers or {}).items() if fnmatchcase(name, pattern))
         speaker = next(named, inner.parts[0] if len(inner.parts) > 1 else name)
         try:
-            words = labels_beside(path).words
+            words = find_labels(path).words
             if words is None:
                 continue
             is_any_transcribed = True
