@@ -20,9 +20,10 @@ from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
-from lipmotion.types.values import clock_seconds, number_of
-from lipmotion.units import SILENCE, VISEMES, closing_phones, is_silent, words_in_time
-from lipmotion.units.mouth_chart import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, drawn_shape
+from lipmotion.types.values import parse_clock, parse_number
+from lipmotion.units import SILENCE, VISEMES, is_silent, mark_closing_phones
+from lipmotion.units.mouth_chart import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape
+from lipmotion.units.word_spans import group_words
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
@@ -55,7 +56,7 @@ class CueSheet:
     @property
     def rest(self) -> str:
         """The shape before and after speech."""
-        return drawn_shape(REST, self.drawn)
+        return choose_drawn_shape(REST, self.drawn)
 
     @property
     def rows(self) -> list[tuple[float, str]]:
@@ -101,7 +102,7 @@ def whole_hundredths(duration_s: float) -> float:
 def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
     """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
     starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
-    shapes = [shape for _, shape in segments] or [drawn_shape(REST, drawn)]
+    shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
     ends = [*starts[1:], whole_hundredths(duration_s)]
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
 
@@ -300,7 +301,7 @@ def _relative_spread(width: Array, nominal: Array, voiced: Array) -> Array:
 def _required_shapes(generation: Generation, frames: int, fps: float) -> Iterator[tuple[int, str, float]]:
     """Yield the frame in which each p b m and f v must be shown, its shape, and the cost of other shapes."""
     units = generation.units
-    for span, closing in zip(units, closing_phones(units), strict=True):
+    for span, closing in zip(units, mark_closing_phones(units), strict=True):
         if closing:
             yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "A", UNCLOSED_COST
         elif span.label.phone in LIP_BITING:
@@ -350,13 +351,15 @@ def choose_cues(
         cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE_COST)
     sheet = lay_out_cues([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
-    return replace(sheet, words=Timeline(tuple(span for span in words_in_time(generation.units) if span.label)))
+    return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
 
 
 def _costs_of_drawn_shapes(cost: NDArray[np.float64], drawn: str) -> NDArray[np.float64]:
     """Return the cost of the drawn shapes [shape=(frames, drawn)]: the least cost of those that each one stands for."""
     names = list(SHAPES)
-    groups = [[column for column, other in enumerate(names) if drawn_shape(other, drawn) == name] for name in drawn]
+    groups = [
+        [column for column, other in enumerate(names) if choose_drawn_shape(other, drawn) == name] for name in drawn
+    ]
     return np.stack([cost[:, group].min(axis=1) for group in groups], axis=1)
 
 
@@ -406,9 +409,9 @@ def parse_cue_time(text: str, place: str) -> float:
 
     Raises InputError: it is none, with its place.
     """
-    value = clock_seconds(text)
+    value = parse_clock(text)
     if math.isnan(value):
-        value = number_of(text.replace(",", "."), f"{place}: the time is", "a number from 0 on")
+        value = parse_number(text.replace(",", "."), f"{place}: the time is", "a number from 0 on")
     if not 0 <= value <= LONGEST_S * 1000:
         raise InputError(f"{place}: the time is {value:g}, required a number from 0 to {LONGEST_S * 1000:g}")
     return value

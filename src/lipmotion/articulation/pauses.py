@@ -13,7 +13,7 @@ from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.voice_event import BREATH, LAUGHTER
-from lipmotion.units import closing_phones, is_silent
+from lipmotion.units import is_silent, mark_closing_phones
 
 Curve = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def rest_in_pauses(
 def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
     """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]; 0 away from breaths."""
     least = np.zeros(len(time_s))
-    phones = zip(units, closing_phones(units), strict=True)
+    phones = zip(units, mark_closing_phones(units), strict=True)
     spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
     begins_s = np.array([span.start_s for span, _ in spoken])
     for start_s, end_s, _, before_speech in find_pauses(units):

@@ -16,7 +16,7 @@ from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.storage.files import read_text_file
-from lipmotion.units import words_of
+from lipmotion.units import split_words
 
 KIND = "GRID corpus"
 RIGHTS = {
@@ -201,7 +201,7 @@ def _grid_words(directory: Path, video: Path, said: Mapping[str, str]) -> Words 
 
 
 def _crema_words(_directory: Path, _video: Path, said: Mapping[str, str]) -> Words | None:
-    return words_of(CREMA_SENTENCES[said["sentence"]])
+    return split_words(CREMA_SENTENCES[said["sentence"]])
 
 
 def _tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words | None:
@@ -215,7 +215,7 @@ def _tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words
     if not rows or not all(rows):
         return read_labels(script).words
     spoken = [row[1] for row in rows if row and row[1].lower() not in SILENCES]
-    return words_of(" ".join(spoken))
+    return split_words(" ".join(spoken))
 
 
 def _research(attribution: str) -> dict[str, str]:

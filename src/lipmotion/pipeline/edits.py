@@ -12,10 +12,10 @@ from typing import Any, ClassVar, get_type_hints
 from lipmotion.errors import InputError, shorten
 from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery
-from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
+from lipmotion.types.moods import MoodKey, format_moods, parse_moods, sort_moods
 from lipmotion.types.staging import Staging
-from lipmotion.types.values import described, number_of, whole_of
-from lipmotion.units import PHONES, is_silent, unknown_phone_message
+from lipmotion.types.values import describe_value, parse_number, parse_whole
+from lipmotion.units import PHONES, describe_unknown_phone, is_silent
 
 MIN_PHONE_S = 0.01
 """Shortest phone that an edit may leave."""
@@ -30,11 +30,11 @@ class Text(str):
 _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 Numbers = tuple[float, ...]
 _READ: dict[Any, tuple[str, Any]] = {
-    int: (r"[0-9]+", whole_of),
-    float: (_NUMBER, number_of),
+    int: (r"[0-9]+", parse_whole),
+    float: (_NUMBER, parse_number),
     str: (r"\S+", str),
     Text: (r"\S.*?", lambda text: Text(" ".join(text.split()))),
-    Numbers: (rf"{_NUMBER}(?:\s+{_NUMBER})*", lambda text: tuple(map(number_of, text.split()))),
+    Numbers: (rf"{_NUMBER}(?:\s+{_NUMBER})*", lambda text: tuple(map(parse_number, text.split()))),
 }
 """How the values of fields are written, and what reads them."""
 
@@ -80,7 +80,7 @@ class PhoneStep(Step):
 def _unit_of(phone: str, word: str = "") -> Unit:
     """Return the label of a phone that a user gives. Raises InputError: there is no such phone."""
     if phone not in PHONES:
-        raise InputError(unknown_phone_message(phone))
+        raise InputError(describe_unknown_phone(phone))
     return Unit(phone, word=word)
 
 
@@ -446,7 +446,7 @@ class SetStep(Step):
             return _TRUTH[self.value]
         if isinstance(usual, str):
             return self.value
-        return (whole_of if isinstance(usual, int) else number_of)(self.value, f"{self.name} is")
+        return (parse_whole if isinstance(usual, int) else parse_number)(self.value, f"{self.name} is")
 
 
 @dataclass(frozen=True)
@@ -462,8 +462,8 @@ class MoodStep(Step):
 
     @property
     def key(self) -> MoodKey:
-        """The mood, its strength, and its time. Raises InputError: as ``moods_of``."""
-        keys = moods_of(f"{self.mood} at {self.time_s!r}")
+        """The mood, its strength, and its time. Raises InputError: as ``parse_moods``."""
+        keys = parse_moods(f"{self.mood} at {self.time_s!r}")
         if len(keys) != 1:
             raise InputError(f"{str(self)!r}: required one mood, as happy:0.7")
         return keys[0]
@@ -494,9 +494,9 @@ def parse_step(sentence: str) -> Step:
     'pin jawOpen 0.2 at 1.0'
     """
     if not isinstance(sentence, str):
-        raise InputError(f"an edit is {described(sentence)}, required a sentence: {FORMS[0]!r}")
+        raise InputError(f"an edit is {describe_value(sentence)}, required a sentence: {FORMS[0]!r}")
     for kind in STEPS:
-        pattern, readers = _read_form(kind)
+        pattern, readers = _read_form(kind)  # type: ignore[arg-type] # a class can be hashed
         if match := pattern.fullmatch(sentence.strip()):
             values = zip(readers.items(), match.groups(), strict=True)
             return kind(**{name: read(text) for (name, read), text in values})
@@ -537,8 +537,8 @@ class Edits:
     def delivery(self, requested: Delivery = Delivery()) -> Delivery:  # noqa: B008 # a frozen value
         """Return how the motion is delivered; a requested value that is not the default wins over these edits."""
         delivery = replace(requested, **self._settings(requested, Delivery()))
-        keys = in_time([*delivery.moods, *(step.key for step in self.steps if isinstance(step, MoodStep))])
-        return replace(delivery, mood=text_of(keys)) if keys != delivery.moods else delivery
+        keys = sort_moods([*delivery.moods, *(step.key for step in self.steps if isinstance(step, MoodStep))])
+        return replace(delivery, mood=format_moods(keys)) if keys != delivery.moods else delivery
 
     def staging(self, requested: Staging = Staging()) -> Staging:  # noqa: B008 # a frozen value
         """Return how a drawn face is shown; a requested value that is not the default wins over these edits."""

@@ -19,7 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES
-from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, measure_restfulness, weigh_visemes
 from lipmotion.pipeline.analysis.language import weigh_words
 from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
@@ -51,8 +51,8 @@ from lipmotion.types import (
 )
 from lipmotion.types.generation import SURE_CONFIDENCE
 from lipmotion.types.languages import ENGLISH
-from lipmotion.units import SILENCE, words_in_time
-from lipmotion.units.mood_tags import moods_in_time
+from lipmotion.units import SILENCE, group_words
+from lipmotion.units.mood_tags import time_moods
 
 ModelT = TypeVar("ModelT")
 TRANSCRIPT = "the words that are spoken (--transcript)"
@@ -96,7 +96,7 @@ def generate_motion(
     fits = fit.of_frames(len(speech.features.values)) if fit else 1.0
     return replace(
         generation,
-        moods=moods_in_time(analysis.tags, speech.units),
+        moods=time_moods(analysis.tags, speech.units),
         events=analysis.events,
         about=model.about,
         knowledge=SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits),
@@ -134,12 +134,12 @@ def find_person(model: Model, request: Request) -> SpeakerMap | None:
                 "the name out"
             )
         return person
-    from lipmotion.motion.transfer_map import composed
+    from lipmotion.motion.transfer_map import compose_maps
 
     onto = load_provided("map_onto")(
         model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request
     )
-    return composed(person, onto)
+    return compose_maps(person, onto)
 
 
 def generate_for(
@@ -175,7 +175,7 @@ def _generate_one(
     """Return the motion of one passage."""
     if person is None:
         return engine.generate(learned, speech, constraints)
-    restful = restfulness(speech.units, len(speech.features.values))
+    restful = measure_restfulness(speech.units, len(speech.features.values))
     pins = constraints.pins if constraints is not None else ()
 
     def to_mean_person(pin: Pin) -> Pin:
@@ -189,7 +189,7 @@ def _generate_one(
 
     mean = engine.generate(learned, speech, Constraints(tuple(map(to_mean_person, pins))))
     fitted = person.ordered(mean.motion.channels)
-    visemes = viseme_weights(speech.units, len(restful))
+    visemes = weigh_visemes(speech.units, len(restful))
     values = np.empty_like(mean.motion.values)
     for start in range(0, len(values), BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
@@ -220,8 +220,8 @@ def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech:
     channels = tuple(channel for channel in person.channels if channel.name in explanation.motion)
     fitted = person.ordered(channels)
     poses = np.array([[explanation.motion[channel.name].value for channel in channels]])
-    shift = fitted.shift(poses, viseme_weights(speech.units, frames)[frame])
-    added = fitted.to_person(shift, restfulness(speech.units, frames)[frame])[0]
+    shift = fitted.shift(poses, weigh_visemes(speech.units, frames)[frame])
+    added = fitted.to_person(shift, measure_restfulness(speech.units, frames)[frame])[0]
     numbers = {channel.name: number for number, channel in enumerate(channels)}
 
     def map_values(values: Mapping[str, ChannelValue]) -> dict[str, ChannelValue]:
@@ -254,7 +254,7 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     if words == "transcript" and request.language != ENGLISH:
         known = MAPPED_CONFIDENCE
     elif words == "transcript":
-        lexicon, labels = read_lexicon(request), [span.label for span in words_in_time(speech.units) if span.label]
+        lexicon, labels = read_lexicon(request), [span.label for span in group_words(speech.units) if span.label]
         known = sum(map(lexicon.known, labels)) / len(labels) if is_other_language(labels, lexicon) else 1.0
     if known < 1:
         words, share = "mapped transcript", share * known

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
-from lipmotion.motion.articulation import ARTICULATORS, measured_articulators
-from lipmotion.motion.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
+from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays
+from lipmotion.motion.articulation import ARTICULATORS, measure_articulators
+from lipmotion.motion.eigenlips import Eigenlips, eigenlips_from_arrays, eigenlips_to_arrays
 from lipmotion.motion.network_steps import STEP
-from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speaker_arrays, speakers_from_arrays
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speakers_from_arrays, speakers_to_arrays
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
@@ -81,11 +81,11 @@ def save_model(model: Model, path: str | Path) -> None:
     'trajectory'
     """
     parts: dict[str, Mapping[str, NDArray[Any]]] = {
-        "phones": hmm_arrays(model.phones),
+        "phones": hmm_to_arrays(model.phones),
         "engine": model.engine.to_arrays(model.learned),
         "adaptation": adaptation_arrays(model.adaptation) if model.adaptation is not None else {},
-        "eigenlips": eigenlips_arrays(model.eigenlips) if model.eigenlips is not None else {},
-        "speakers": speaker_arrays(model.speakers) if model.speakers is not None else {},
+        "eigenlips": eigenlips_to_arrays(model.eigenlips) if model.eigenlips is not None else {},
+        "speakers": speakers_to_arrays(model.speakers) if model.speakers is not None else {},
         "prior": model.prior.engine.to_arrays(model.prior.learned) if model.prior is not None else {},
     }
     config = model.phones.config.as_mapping()
@@ -248,7 +248,7 @@ def with_prior(prior: Model | None, speech: Speech) -> Speech:
         speech = replace(speech, parts=parts)
     speech_arrays = speech.with_arrays()
     motion = prior.engine.without_closures().generate(prior.learned, speech_arrays).motion
-    measured = measured_articulators(motion.values, motion.names)
+    measured = measure_articulators(motion.values, motion.names)
     chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]
     steps = len(motion.values[::STEP])
     nothing = np.zeros((steps, 0), np.float32), np.zeros(steps)

@@ -33,13 +33,12 @@ from lipmotion.kernels.compiler import numba_works
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.language import resolve_language
-from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
 from lipmotion.pipeline.analysis.speech_analysis import (
     SpeechAnalysis,
     align_between,
     analyse_speech,
     prepare_search,
-    read_recording,
     with_units,
 )
 from lipmotion.pipeline.edits import (
@@ -82,7 +81,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
-from lipmotion.units import Pronunciation, words_in_time, words_of
+from lipmotion.units import Pronunciation, group_words, split_words
 
 ResultT = TypeVar("ResultT")
 
@@ -278,7 +277,7 @@ class Session:
             start_s, end_s, text = step.start_s, min(step.end_s, units[-1].end_s), step.words
             where = f"{start_s:.2f} to {end_s:.2f} s"
         else:
-            words = [span for span in words_in_time(units) if span.label]
+            words = [span for span in group_words(units) if span.label]
             if not 1 <= step.number <= len(words):
                 required = f"1 to {len(words)}" if words else "words: give a transcript, or edit phones"
                 raise InputError(f"{str(step)!r}: there is no word {step.number}, required {required}")
@@ -447,4 +446,4 @@ class Session:
 def read_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
     given = step.pronunciation_of if isinstance(step, WordSaid | WordsSaidSo) else {}
-    return {word: (phones,) for text, phones in given.items() for word in words_of(text)}
+    return {word: (phones,) for text, phones in given.items() for word in split_words(text)}

@@ -80,10 +80,11 @@ class Workers:
 
         def results() -> Iterator[tuple[int, ResultT]]:
             while busy:
+                end: Any
                 for end in pipes.wait(list(busy)):
                     number = busy.pop(end)
                     try:
-                        succeeded, result = end.recv()  # type: ignore[union-attr] # a pipe
+                        succeeded, result = end.recv()
                     except (EOFError, OSError) as error:
                         raise CorpusError(DIED) from error
                     send_next(end)

@@ -408,8 +408,8 @@ def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
 
 def name_mesh_targets(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the morph targets of a mesh; some of its primitives may have none."""
-    named = [name_targets(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
-    return tuple(max(named, key=len, default=[]))
+    named = [tuple(name_targets(document, mesh, primitive)) for primitive in mesh.get("primitives", [])]
+    return max(named, key=len, default=())
 
 
 def _build_expression_shapes(

@@ -20,10 +20,10 @@ from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
-from lipmotion.units.ipa_phones import token_phones
-from lipmotion.units.languages_told import is_english, language_of_text
-from lipmotion.units.mood_tags import tagged_text
-from lipmotion.units.text_normalisation import written_words
+from lipmotion.units.ipa_phones import read_tokens
+from lipmotion.units.languages_told import detect_language, is_english
+from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.text_normalisation import split_written_words
 
 LOG = logging.getLogger("lipmotion")
 MIN_CONFIDENCE = 0.4
@@ -46,14 +46,16 @@ def resolve_language(request: Request) -> Request:
         return request
     transcript = cast("str | TimedTranscript | None", request.transcript)
     if isinstance(transcript, str):
-        plain, tags = tagged_text(transcript, lambda part: written_words(part) if part.strip() else ())
-        transcript = TimedTranscript((TranscriptLine(tuple(map(TimedWord, written_words(plain)))),), tags)
+        plain, tags = parse_tagged_text(transcript, lambda part: split_written_words(part) if part.strip() else ())
+        transcript = TimedTranscript((TranscriptLine(tuple(map(TimedWord, split_written_words(plain)))),), tags)
     language = request.language if request.language != AUTO else _detect_language(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)
     lexicon = LanguageLexicon(read_lexicon(request).user, language)
     if transcript is not None and request.units is None:
-        transcript = transcript.with_words(lambda word: written_words(word) if any(map(str.isalnum, word)) else ())
+        transcript = transcript.with_words(
+            lambda word: split_written_words(word) if any(map(str.isalnum, word)) else ()
+        )
         lexicon = lexicon.with_words(transcript.words)
     return replace(request, language=language, transcript=transcript, lexicon=lexicon)
 
@@ -65,7 +67,7 @@ def _detect_language(request: Request, transcript: TimedTranscript | None) -> st
     Raises InputError: that of a transcript is not known.
     """
     if transcript is not None and request.units is None:
-        language = language_of_text(transcript.words)
+        language = detect_language(transcript.words)
         if not language:
             raise InputError(f"the language of the transcript is not known; give it, one of: {', '.join(LANGUAGES)}")
         LOG.warning("the transcript is taken for %s; --language says otherwise", LANGUAGES[language].name)
@@ -97,7 +99,7 @@ def detect_english(audio: Audio) -> bool | None:
         for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
     ]
     words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
-    return is_english(tuple(phone for phone, _ in token_phones(word)) for word in words)
+    return is_english(tuple(phone for phone, _ in read_tokens(word)) for word in words)
 
 
 def weigh_words(found: Recognition) -> float:

@@ -75,9 +75,9 @@ from lipmotion.types import (
 )
 from lipmotion.types.languages import ENGLISH
 from lipmotion.types.moods import MoodTag
-from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, is_silent, without_gaps
-from lipmotion.units.mood_tags import tagged_text
-from lipmotion.units.text_normalisation import checked_tokens
+from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
+from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.text_normalisation import require_tokens
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -228,7 +228,7 @@ def align_between(
     Raises AlignmentError: the words do not fit in there.
     """
     first, stop = (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s))
-    lexicon, words = read_lexicon(request), checked_tokens(text)
+    lexicon, words = read_lexicon(request), require_tokens(text)
     warn_of_guesses(words, lexicon)
     if stop > len(audio.samples) // HOP:
         raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
@@ -429,8 +429,8 @@ def _read_words(text: str | TimedTranscript | None, duration_s: float) -> tuple[
     if "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
-    plain, tags = tagged_text(text)
-    words = checked_tokens(plain)
+    plain, tags = parse_tagged_text(text)
+    words = require_tokens(plain)
     return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
 
 
@@ -465,7 +465,7 @@ def _follow_units(
         LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
     if guessed:
         LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
-    units = without_gaps(Timeline(tuple(spans)), audio.duration_s)
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
     if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
     name = network_of(kind) if request.language == ENGLISH else None
@@ -482,7 +482,7 @@ def _follow_units(
     ]
     warn_of_label_misfit(fit, filled=bool(filling))
     spans = sorted([*spans, *filling], key=lambda span: span.start_s)
-    units = without_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
     return units, replace(fit, missing=(*fit.missing, *guessed))
 
 

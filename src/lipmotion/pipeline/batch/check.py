@@ -21,11 +21,11 @@ from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
 from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
-from lipmotion.types.audio import sixteen_bits
+from lipmotion.types.audio import to_sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, script_of
-from lipmotion.units.languages_told import COMMON_WORDS, language_of_text
-from lipmotion.units.mood_tags import tagged_text
-from lipmotion.units.text_normalisation import words_in, written_words
+from lipmotion.units.languages_told import COMMON_WORDS, detect_language
+from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.text_normalisation import find_words, split_written_words
 
 SILENT_DB = -60.0
 """A recording that is nowhere louder, in dB of full scale, is silent."""
@@ -83,7 +83,7 @@ def check_line(work: LineToCheck) -> CheckedLine:
     spoken_s = sum(end_s - start_s for start_s, end_s in spoken_spans(levels))
     if spoken_s < MIN_SPOKEN_S:
         return CheckedLine(line.name, "silent", "no sound longer than a click")
-    detected = language_of_text(words) if len(words) >= FEWEST_TOLD_WORDS else ""
+    detected = detect_language(words) if len(words) >= FEWEST_TOLD_WORDS else ""
     required, reason = work.request.language if work.request.language != AUTO else detected, ""
     if detected and required in COMMON_WORDS and detected != required:
         reason = f"the words are in {detected}, required {required}"
@@ -91,7 +91,7 @@ def check_line(work: LineToCheck) -> CheckedLine:
         english = detect_english(audio)
         if english is not None and english != (required == ENGLISH):
             reason = f"the speech is {'' if english else 'not '}English, required {required}"
-    digest = hashlib.sha256(sixteen_bits(audio.samples).tobytes()).hexdigest()
+    digest = hashlib.sha256(to_sixteen_bits(audio.samples).tobytes()).hexdigest()
     return CheckedLine(line.name, "", reason, digest, spoken_s, count_letters(words), words)
 
 
@@ -110,10 +110,10 @@ def _read_words(work: LineToCheck) -> tuple[str, ...]:
     transcript = work.line.transcript or read_request(request, words_beside=True).transcript
     if transcript is None or isinstance(transcript, TimedTranscript):
         return transcript.words if transcript else ()
-    text = tagged_text(str(transcript)).text
+    text = parse_tagged_text(str(transcript)).text
     if request.language == ENGLISH:
-        return words_in(text)
-    return written_words(text) if text.strip() else ()
+        return find_words(text)
+    return split_written_words(text) if text.strip() else ()
 
 
 STAGE = "checking"

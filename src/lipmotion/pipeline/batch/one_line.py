@@ -20,8 +20,8 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import describe_failed_extension, load_provided
 from lipmotion.formats.base import motion_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
-from lipmotion.motion.closure import OPENING, closable_ranges
-from lipmotion.motion.rest import speech_intervals
+from lipmotion.motion.closure import OPENING, find_closable_ranges
+from lipmotion.motion.rest import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.batch.ledger import (
@@ -177,7 +177,7 @@ def _describe_motion(generation: Generation) -> Record:
             "advice": list(outlook.advice),
         }
     spoken = np.zeros(len(motion.values), bool)
-    for start_s, end_s in speech_intervals(generation.units):
+    for start_s, end_s in list_speech_intervals(generation.units):
         spoken[round(start_s * motion.rate_hz) : round(end_s * motion.rate_hz)] = True
     if confidence is not None and spoken.any():
         record["motion"] = round(float(confidence[spoken].mean()), 3)
@@ -189,7 +189,7 @@ def _describe_motion(generation: Generation) -> Record:
     if OPENING in motion.names and len(motion.values):
         opening = motion[OPENING]
         closed = CLOSED_SHARE * float(np.percentile(opening, 95))
-        ranges = closable_ranges(generation.units, len(opening))
+        ranges = find_closable_ranges(generation.units, len(opening))
         record |= {
             "widest": round(float(opening.max()), 4),
             "closures_heard": len(ranges),

@@ -69,12 +69,7 @@ def write_reports(
             record |= {"doubt": rate_doubt(record), "outputs": outputs, "mark": mark.kind if mark else None}
             values = [record.get(name) for name in COLUMNS]
             rows.writerow([_field(value) for value in values])
-            links = [quote(as_text(name)) for name in outputs]
-            sound = _address(record["recording"], out) if "recording" in record else None
-            row = [*map(_visible, values), links, sound, mark.when if mark else None]
-            text = json.dumps(row, ensure_ascii=True, separators=(",", ":"))
-            text = text.replace("<", "\\u003c")  # nothing that a name says ends the script
-            page_file.write(f"{',' if place else ''}\n{text}")
+            page_file.write(f"{',' if place else ''}\n{_for_page(record, values, out, mark)}")
         page_file.write(after)
     return table, page
 
@@ -105,6 +100,15 @@ def _field(value: Any) -> str:
     if not isinstance(value, list | str):
         return str(value)
     return as_field(BETWEEN.join(value) if isinstance(value, list) else value)
+
+
+def _for_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | None) -> str:
+    """Return a row of the page: its values, the addresses of outputs and recording, and when it was marked."""
+    links = [quote(as_text(name)) for name in record["outputs"]]
+    sound = _address(record["recording"], out) if "recording" in record else None
+    row = [*map(_visible, values), links, sound, mark.when if mark else None]
+    text = json.dumps(row, ensure_ascii=True, separators=(",", ":"))
+    return text.replace("<", "\\u003c")  # nothing that a name says ends the script
 
 
 def _address(recording: str, out: Path) -> str | None:

@@ -120,8 +120,9 @@ def batch(
             with pool as each, closing(_finish_lines(each, waiting)) as records:
                 for record in records:
                     mark = chosen.get(record["name"])
-                    is_redone = mark is not None and mark.kind == REDO and record["outcome"] == DONE
-                    ledger.append(record | {"redone": mark.when} if is_redone else record)  # so it is redone once
+                    if mark is not None and mark.kind == REDO and record["outcome"] == DONE:
+                        record["redone"] = mark.when  # so that it is redone once
+                    ledger.append(record)
                     place.receipt(record["name"]).unlink(missing_ok=True)
                     counter.count(record["name"], record["outcome"], record.get("error", ""))
         csv, html = write_reports(lines, ledger, Path(place.out), chosen)

@@ -62,7 +62,7 @@ def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str
             )
         gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
         lines[control] = gain, round(float(wanted.mean() - gain * before.mean()), DIGITS)
-    calibrate_rows, seen = [], set[str]()
+    calibrated, seen = [], set[str]()
     for row in rows:
         if row.control in lines:
             gain, offset = lines[row.control]

@@ -135,11 +135,11 @@ def _make_set(
         mouth = solve_shape_weights(motion, units, arkit_mouth())
         return join_channels(mouth, compute_living_curves(motion, units, staging, prosody))
     if name == VOWELS:  # with how far the lips are pressed together, and VRM's expressions of moods
-        mouth, moods = spoken_mouth(motion, units), expression_weights(read_moods(motion))
-        curves = {CLOSED: mouth.closing if CLOSED not in motion.names else motion[CLOSED]}
+        lips, moods = spoken_mouth(motion, units), expression_weights(read_moods(motion))
+        curves = {CLOSED: lips.closing if CLOSED not in motion.names else motion[CLOSED]}
         curves |= {
-            mood: curve * mouth.free for mood, curve in moods.items()
-        }  # only the model knows which part the lips
+            mood: curve * lips.free for mood, curve in moods.items()
+        }  # only the model knows which parts the lips
         channels = tuple(Channel(curve, WEIGHT) for curve in curves)
         pressed = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
         vowels = join_channels(solve_shape_weights(motion, units, vowel_mouth()), pressed)

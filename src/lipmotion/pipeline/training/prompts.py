@@ -16,7 +16,7 @@ from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_plain_text
-from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, words_of
+from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, split_words
 
 SHIPPED = "english.txt"
 PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
@@ -144,7 +144,7 @@ def pronounce_sentences(text: str | Path | None, lexicon: Lexicon) -> tuple[dict
     lines = (" ".join(line.split()) for line in read_plain_text(path).splitlines())
     for line in dict.fromkeys(filter(None, lines)):
         try:
-            words = words_of(line)
+            words = split_words(line)
         except InputError:  # a line of dashes
             continue
         unknown = next((word for word in words if not lexicon.known(word)), None)

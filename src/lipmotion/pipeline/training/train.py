@@ -20,8 +20,8 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.resample import model_motion
-from lipmotion.motion.speaker_maps import mean_person_examples, with_habits
+from lipmotion.motion.resample import resample_track
+from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses
 from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
 from lipmotion.pipeline.training.channels import (
@@ -178,7 +178,7 @@ def train(  # noqa: PLR0913
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
         people, speakers = [speaker_of[example.name] for example in examples], None
         if len(set(filter(None, people))) > 1:
-            examples, speakers = mean_person_examples(examples, people)
+            examples, speakers = map_to_mean_person(examples, people)
         sound = {utterance.name: utterance.audio for utterance in utterances}
         examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
@@ -197,7 +197,7 @@ def train(  # noqa: PLR0913
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
     if speakers is not None:
         generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
-        speakers = with_habits(speakers, examples, people, generated)
+        speakers = add_habits(speakers, examples, people, generated)
         about["speakers"] = list(speakers.names)
     return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers), TrainReport(
         used, skipped, fit.figures
@@ -229,7 +229,7 @@ def phones_and_examples(
             skipped[utterance.name] = units
             continue
         labelled.append((utterance, units))
-        motion, valid = model_motion(utterance.track, len(utterance.features.values))
+        motion, valid = resample_track(utterance.track, len(utterance.features.values))
         spectrum = analysed(utterance.audio).spectrum
         speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum)
         examples.append(Example(utterance.name, speech, motion, valid))
@@ -277,8 +277,8 @@ def _train_phone_models(
     each: ParallelMap,
 ) -> UnitHmm:
     """Return phone models of all transcribed or labelled utterances, or those of the shipped model."""
-    transcribed: list[tuple[Audio, Sequence[str]]] = []
-    labelled: list[tuple[Audio, Sequence[str]]] = []
+    transcribed: list[tuple[Audio, tuple[str, ...]]] = []
+    labelled: list[tuple[Audio, tuple[str, ...]]] = []
     pronunciations: dict[str, tuple[tuple[str, ...], ...]] = {}
     for utterance in utterances:
         if utterance.phones is not None:  # the phones between two silences are a word with one pronunciation
