@@ -123,6 +123,10 @@ class UnitHmm:
     bigram: Bigram
     typical_fit: float = 0.0
 
+    def __repr__(self) -> str:
+        densities, components, features = self.mixtures.size
+        return f"UnitHmm({densities} densities of {components} components, {features} features)"
+
     def stay(self, unit: str, state: int) -> float:
         """Return log P(stay in this state)."""
         return float(self.log_stay[self.table.density(unit, state)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -53,14 +53,18 @@ class Model:
     ('trajectory', 'geometry', True)
     """
 
-    phones: UnitHmm = field(repr=False)
+    phones: UnitHmm
     engine: Engine[Any]
-    learned: Any = field(repr=False)
+    learned: Any
     about: Mapping[str, Any]
-    adaptation: Adaptation | None = field(default=None, repr=False)
-    eigenlips: Eigenlips | None = field(default=None, repr=False)
-    prior: Model | None = field(default=None, repr=False)
-    speakers: SpeakerMaps | None = field(default=None, repr=False)
+    adaptation: Adaptation | None = None
+    eigenlips: Eigenlips | None = None
+    prior: Model | None = None
+    speakers: SpeakerMaps | None = None
+
+    def __repr__(self) -> str:
+        size = f"{self.about.get('utterances', '?')} utterances, {self.about.get('minutes', '?')} minutes"
+        return f"Model({self.engine.name}, {self.visual}, {size}, format version {VERSION})"
 
     @property
     def visual(self) -> str:

@@ -23,19 +23,68 @@ if TYPE_CHECKING:
 def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
     """Run a job for each of several recordings, or for all of a folder, or where the output is a folder.
 
-    Each recording is reported; at the end the paths that were written are printed.
+    Each recording is reported; at the end the paths that were written are printed. The words and phones in files beside
+    the recordings are used, as a corpus and a batch use them. Faces and characters are opened once.
     Returns False, and does nothing, where there is one recording and its outputs are files.
     Raises ExportError: outputs that are not for several recordings, or that clash.
     Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
+    from lipmotion.errors import LipMotionError
     from lipmotion.pipeline.analysis.recordings import is_for_several, list_recordings
+    from lipmotion.pipeline.job import run
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.types.progress import Item, sub_monitor
 
     if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
     _check_named(given)
-    _animate_each(*_one_by_one(job, list_recordings(given)), options, report)
-    return True
+    jobs, face = _plan_jobs(job, list_recordings(given))
+    model = load_model(job.request.model)
+    written: list[str] = []
+    failures: list[tuple[int, str, Exception]] = []
+    for number, each in enumerate(jobs):
+        name = str(each.request.recording)
+        part = sub_monitor(report.receive, number / len(jobs), (number + 1) / len(jobs))
+        try:
+            run(each, face=face, model=model, words_beside=True, workers=worker_count(options), monitor=part)
+            written += each.outputs.files
+            report.receive(Item(name, "animated"))
+        except Exception as error:
+            known = outcome(error)
+            if known is None:
+                raise
+            failures.append((known[0], name, error))
+            report.receive(Item(name, "skipped", known[1]))
+    if not failures:
+        report.finish("\n".join(map(printable, written)), files=written)
+        return True
+    if written and not options.machine_readable:
+        print_lines("\n".join(map(printable, written)))
+    _, speech, worst = max(failures, key=lambda failure: failure[0])
+    kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
+    raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst
+
+
+def _plan_jobs(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownFace]:
+    """Return the job of each recording, and their face; make the folders, but none where something is refused."""
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.analysis.recordings import plan_outputs
+    from lipmotion.pipeline.job import check_outputs, open_face
+    from lipmotion.storage.files import create_folders
+
+    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
+    alone["posteriors"] = job.outputs.posteriors
+    for name, value in alone.items():
+        if value is not None and len(recordings) > 1:
+            raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
+    planned = plan_outputs(recordings, job.outputs.files, job.outputs.kinds)
+    face = open_face(job.outputs)
+    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
+    with create_folders({Path(file).parent for files in planned for file in files}):
+        for each, recording in zip(jobs, recordings, strict=True):
+            check_outputs(each, face, recording)
+    return jobs, face
 
 
 @contextmanager
@@ -69,60 +118,3 @@ def _check_named(recordings: Sequence[Path]) -> None:
                 f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
                 "the name of a file: -o FILE.json"
             )
-
-
-def _one_by_one(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownFace]:
-    """Return the job of each recording, its outputs instead of folders and templates, and their face; make the folders.
-
-    Faces and characters are opened once, for all recordings. What cannot be leaves no new folders.
-    """
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.analysis.recordings import plan_outputs
-    from lipmotion.pipeline.job import check_outputs, open_face
-    from lipmotion.storage.files import create_folders
-
-    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
-    alone["posteriors"] = job.outputs.posteriors
-    for name, value in alone.items():
-        if value is not None and len(recordings) > 1:
-            raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
-    planned = plan_outputs(recordings, job.outputs.files, job.outputs.kinds)
-    face = open_face(job.outputs)
-    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
-    with create_folders({Path(file).parent for files in planned for file in files}):
-        for each, recording in zip(jobs, recordings, strict=True):
-            check_outputs(each, face, recording)
-    return jobs, face
-
-
-def _animate_each(jobs: Sequence[Job], face: ShownFace, options: argparse.Namespace, report: Report) -> None:
-    """Run the jobs, with the words and phones in files beside the recordings, as a corpus and a batch use them."""
-    from lipmotion.errors import LipMotionError
-    from lipmotion.pipeline.job import run
-    from lipmotion.pipeline.model import load_model
-    from lipmotion.types.progress import Item, sub_monitor
-
-    model = load_model(jobs[0].request.model)
-    written: list[str] = []
-    failures: list[tuple[int, str, Exception]] = []
-    for number, each in enumerate(jobs):
-        name = str(each.request.recording)
-        part = sub_monitor(report.receive, number / len(jobs), (number + 1) / len(jobs))
-        try:
-            run(each, face=face, model=model, words_beside=True, workers=worker_count(options), monitor=part)
-            written += each.outputs.files
-            report.receive(Item(name, "animated"))
-        except Exception as error:
-            known = outcome(error)
-            if known is None:
-                raise
-            failures.append((known[0], name, error))
-            report.receive(Item(name, "skipped", known[1]))
-    if not failures:
-        report.finish("\n".join(map(printable, written)), files=written)
-        return
-    if written and not options.machine_readable:
-        print_lines("\n".join(map(printable, written)))
-    _, speech, worst = max(failures, key=lambda failure: failure[0])
-    kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
-    raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst

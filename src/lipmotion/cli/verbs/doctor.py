@@ -26,9 +26,9 @@ def run(options: argparse.Namespace) -> None:
     with report_progress(options) as report:
         for each in doctor():
             if options.machine_readable:
-                report.receive(Item(each.name, each.state, each.told))
+                report.receive(Item(each.name, each.state, each.text))
             else:
-                print_line(f"{each.state:7} {each.name:20} {each.told}")
+                print_line(f"{each.state:7} {each.name:20} {each.text}")
             broken += [each.name] if each.state == "broken" else []
         if broken:
             raise LipMotionError(f"broken: {', '.join(broken)}; what to do is said above")

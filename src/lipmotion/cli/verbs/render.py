@@ -41,31 +41,41 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Read the motion and call ``lipmotion.write``; print the paths that were written."""
+    """Read the motion and call ``lipmotion.write``; print the paths that were written.
+
+    The motion of a file of edits is generated again, and its outputs are written as ``animate`` does.
+    """
     from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.edit_files import is_edit_file, read_edits
 
     with report_progress(options) as report:
         with write_pipe(options) as (files, pipe):
-            job = part_of(options, Job()).of(options.sound or _sound_named_by(options.motion), files)
-            _render(job, options.motion, options.motion_rate, report.receive)
+            path = options.motion
+            if is_edit_file(path):
+                job, edits = part_of(options, Job()).of(options.sound, files), read_edits(path)
+                if job.request.recording or job.request.units:
+                    raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
+                if edits.named.recording is None:
+                    raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
+                run_job(replace(job, request=replace(edits.named, edits=path)), monitor=report.receive)
+            else:
+                job = part_of(options, Job()).of(options.sound or _find_sound(path), files)
+                _render(job, path, options.motion_rate, report.receive)
         written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
 
 
-def _render(job: Job, motion: Path, rate_hz: float | None, monitor: Monitor) -> None:
+def _render(job: Job, path: Path, rate_hz: float | None, monitor: Monitor) -> None:
     import numpy as np
 
-    from lipmotion.pipeline.edit_files import is_edit_file
     from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion.types import Audio
 
-    if is_edit_file(motion):
-        _replay(job, motion, monitor)
-        return
     sound, face = job.request.recording, open_face(job.outputs)
     planned = check_outputs(job, face, sound)
-    generation = read_generation(motion, job.request.units, rate_hz)
+    generation = read_generation(path, job.request.units, rate_hz)
     if isinstance(sound, Path):
         generation = match_duration(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
     elif any(output.draws for output in planned):
@@ -74,7 +84,7 @@ def _render(job: Job, motion: Path, rate_hz: float | None, monitor: Monitor) -> 
     write_outputs(job, face, generation, sound, monitor=monitor)
 
 
-def _sound_named_by(motion: Path) -> Path | None:
+def _find_sound(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
     from lipmotion.meshes.files.gltf_writer import find_named_sound
     from lipmotion.storage.sources import is_file
@@ -88,19 +98,6 @@ def _sound_named_by(motion: Path) -> Path | None:
     why = "is not there" if not start_s else f"begins at {start_s:g} s of the motion"
     LOG.warning("%s: its sound %s %s; give a sound: --sound FILE", motion, sound, why)
     return None
-
-
-def _replay(job: Job, path: Path, monitor: Monitor) -> None:
-    """Make the motion of the recording that a file of edits names, and write the outputs as ``animate`` does."""
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.edit_files import read_edits
-
-    edits = read_edits(path)
-    if job.request.recording or job.request.units:
-        raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
-    if edits.named.recording is None:
-        raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
-    run_job(replace(job, request=replace(edits.named, edits=path)), monitor=monitor)
 
 
 SILENT_HZ = 16_000

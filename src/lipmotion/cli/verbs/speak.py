@@ -45,10 +45,16 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.cli.terminal.progress import report_progress
 
     with report_progress(options) as report:
-        if options.voices:
-            _list_voices(report)
-        else:
+        if not options.voices:
             _speak(options, report)
+            return
+        from lipmotion.speech.voices.installed import all_voices
+
+        voices = all_voices()
+        report.finish(
+            "\n".join(f"{voice.full_name:28} {voice.language}" for voice in voices) or "no voice is installed",
+            voices=[{"name": voice.full_name, "language": voice.language} for voice in voices],
+        )
 
 
 def _speak(options: argparse.Namespace, report: Report) -> None:
@@ -60,31 +66,19 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     job = part_of(options, Job())
     face = open_face(job.outputs)
     check_outputs(job, face)
-    asked, text = job.request, read_text(options.text) if options.text else options.words
-    lexicon = read_lexicon(asked) if asked.lexicon else None
-    model, corpus = load_model(asked.model), Corpus.open(options.corpus) if options.corpus else None
+    request, text = job.request, read_text(options.text) if options.text else options.words
+    model, corpus = load_model(request.model), Corpus.open(options.corpus) if options.corpus else None
     sound, result = speak(
         text,
         voice=options.voice,
         corpus=corpus,
         model=model,
-        lexicon=lexicon,
-        speaker=asked.speaker,
-        onto=asked.onto or face.other_person(model, asked.speaker),
-        onto_speaker=asked.onto_speaker,
-        pauses=asked.pauses,
-        asymmetry=asked.asymmetry,
+        lexicon=read_lexicon(request) if request.lexicon else None,
+        speaker=request.speaker,
+        onto=request.onto or face.other_person(model, request.speaker),
+        onto_speaker=request.onto_speaker,
+        pauses=request.pauses,
+        asymmetry=request.asymmetry,
     )
     write_outputs(job, face, result, sound, model=model, monitor=report.receive)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))
-
-
-def _list_voices(report: Report) -> None:
-    """Report the installed voices, one a line, with their languages."""
-    from lipmotion.speech.voices.installed import all_voices
-
-    voices = all_voices()
-    report.finish(
-        "\n".join(f"{voice.full_name:28} {voice.language}" for voice in voices) or "no voice is installed",
-        voices=[{"name": voice.full_name, "language": voice.language} for voice in voices],
-    )

@@ -64,6 +64,9 @@ class SelectionModel:
     guide: Guide | None
     phone_recogniser: OwnPhoneRecogniser | None
 
+    def __repr__(self) -> str:
+        return f"SelectionModel({len(self.inventory.names)} recordings, {len(self.inventory.usable)} recorded phones)"
+
     def costs(self, config: SelectionConfig) -> Costs:
         """Return the costs of units, for a configuration; those of the last one are kept."""
         if config not in self._costs:

@@ -65,6 +65,10 @@ class TrajectoryModel:
     network_share: float = NETWORK_SHARE
     modulation: ModulationFilter | None = None
 
+    def __repr__(self) -> str:
+        states = f"{len(self.emission.means)} tied states"
+        return f"TrajectoryModel({self.units.name} units, {states}, {self.space.dimensions} dimensions)"
+
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of plausible motion."""
