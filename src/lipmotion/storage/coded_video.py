@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -193,22 +192,20 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
     for n, frame in enumerate(frames):
         if context is None:
             shape = frame.shape
-            _check_picture(frame)
+            if frame.ndim != 3 or shape[2] != 3 or not frame.size:
+                raise InputError(f"a picture of shape {shape}, required (H, W, 3)")
+            if shape[0] * shape[1] > MAX_PIXELS:
+                raise InputError(f"a picture of shape {shape}, required at most {MAX_PIXELS} pixels; scale the video")
             context = _encoder(shape, crf, group, pixel_format)
         if frame.shape != shape or frame.dtype != np.uint8:
             raise InputError(f"frame {n} is {frame.dtype} {frame.shape}, required uint8 {shape} as the first")
-        picture = av.VideoFrame.from_ndarray(_padded(frame, context.height, context.width), format="rgb24")
+        rest = (context.height - shape[0], context.width - shape[1])
+        padded = np.pad(frame, ((0, rest[0]), (0, rest[1]), (0, 0)), mode="edge") if any(rest) else frame
+        picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(padded), format="rgb24")
         picture = picture.reformat(format=pixel_format, dst_colorspace=_BT601, dst_color_range=_LIMITED_RANGE)
         picture.pts = n
         yield from map(bytes, context.encode(picture))
     yield from map(bytes, context.encode(None))
-
-
-def _check_picture(frame: Pictures) -> None:
-    if frame.ndim != 3 or frame.shape[2] != 3 or not frame.size:
-        raise InputError(f"a picture of shape {frame.shape}, required (H, W, 3)")
-    if frame.shape[0] * frame.shape[1] > MAX_PIXELS:
-        raise InputError(f"a picture of shape {frame.shape}, required at most {MAX_PIXELS} pixels; scale the video")
 
 
 def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) -> Any:
@@ -227,14 +224,6 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
         + x264_instructions(),
     }
     return context
-
-
-def _padded(frame: Pictures, height: int, width: int) -> Pictures:
-    """Return a picture of some size; its outermost row and column are repeated."""
-    rest = (height - frame.shape[0], width - frame.shape[1])
-    if any(rest):
-        frame = np.pad(frame, ((0, rest[0]), (0, rest[1]), (0, 0)), mode="edge")
-    return np.ascontiguousarray(frame)
 
 
 def _layout(data: Stream) -> tuple[list[int], list[int]]:
@@ -263,20 +252,10 @@ def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -
     context: Any = av.CodecContext.create("h264", "r")
     context.options = {"max_pixels": str(MAX_PIXELS), "err_detect": "explode"}
     context.thread_count = 1
-    with _decoding_errors():
-        for start, stop in pairwise(begins):
-            for picture in context.decode(av.Packet(data[start:stop].tobytes())):
-                yield _as_rgb(picture, size)
-        for picture in context.decode(None):
-            yield _as_rgb(picture, size)
-
-
-@contextmanager
-def _decoding_errors() -> Iterator[None]:
-    import av
-
     try:
-        yield
+        for packet in chain((av.Packet(data[start:stop].tobytes()) for start, stop in pairwise(begins)), [None]):
+            for picture in context.decode(packet):
+                yield _as_rgb(picture, size)
     except (av.FFmpegError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ModelFormatError(f"the stored pictures are damaged ({reason}); {_REMEDY}") from error

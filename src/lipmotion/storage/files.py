@@ -344,21 +344,19 @@ def _sweep(target: Path) -> None:
     prefix = _prefix(target)
     with suppress(OSError):  # a folder that may be written to, but not listed
         for left in target.parent.glob(f"{prefix}*"):
-            if not _is_alive(left.name[len(prefix) :].split("-")[0]):
+            process = left.name[len(prefix) :].split("-")[0]
+            if sys.platform == "win32" or not process.isdigit():
+                is_left = sys.platform == "win32"  # which deletes no file that is open
+            else:
+                is_left = False
+                try:
+                    os.kill(int(process), 0)
+                except ProcessLookupError:
+                    is_left = True
+                except OSError:  # a process of another user
+                    continue
+            if is_left:
                 remove(left)
-
-
-def _is_alive(process: str) -> bool:
-    """Return whether a process may still be running; on Windows False, as it deletes no file that is open."""
-    if sys.platform == "win32" or not process.isdigit():
-        return sys.platform != "win32"
-    try:
-        os.kill(int(process), 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True  # a process of another user
-    return True
 
 
 def _place(target: Path) -> Path:
@@ -440,9 +438,7 @@ def create_folders(folders: Iterable[Path]) -> Iterator[None]:
 
 
 def _refused(target: Path, error: OSError) -> ExportError:
-    full = (
-        error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or error.errno is None
-    )  # None: NumPy, on a short write
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, None)  # None: NumPy, on a short write
     reason = error.strerror or ("No space left on device" if full else str(error))
     return ExportError(f"{target}: cannot be written: {reason}{'; make room, then run it again' if full else ''}")
 
@@ -459,21 +455,17 @@ def lock_folder(folder: Path) -> Iterator[None]:
     try:
         try:
             with confine(folder):
-                file = _lock_in(folder)
+                make_folder(folder)
+                try:
+                    file = _open_lock(folder / LOCK)
+                except OSError as error:
+                    raise _refused(folder, error) from error
                 yield
         finally:
             _release(path, file)
     except BaseException:  # an interrupt may have come during the release; a second one does not follow at once
         _release(path, file)
         raise
-
-
-def _lock_in(folder: Path) -> IO[bytes]:
-    make_folder(folder)
-    try:
-        return _open_lock(folder / LOCK)
-    except OSError as error:
-        raise _refused(folder, error) from error
 
 
 def _release(path: Path, file: IO[bytes] | None) -> None:
