@@ -9,7 +9,6 @@ from pathlib import Path
 from zipfile import is_zipfile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
@@ -24,7 +23,7 @@ from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.storage.files import check_source
-from lipmotion.types import Audio, Example, Motion, Speech, Track
+from lipmotion.types import Audio, Example, Track
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
@@ -66,11 +65,11 @@ def map_onto(
     if isinstance(onto, SpeakerMap):
         return onto
     person = speaker_map(model.speakers, speaker)
-    opened, where = _opened(onto)
+    opened, where = _open(onto)
     source, target = [], []
-    for name, request, measured in _takes(opened, where, onto_speaker, speech):
+    for name, request, measured in _list_takes(opened, where, onto_speaker, speech):
         recognised = replace(request, recogniser=recogniser)
-        pair = measured_pair(model, person, name, recognised, measured, where, onto_speaker)
+        pair = measure_pair(model, person, name, recognised, measured, where, onto_speaker)
         source.append(pair[0])
         target.append(pair[1])
     spoken_s = measured_speech_s(target)
@@ -82,7 +81,7 @@ def map_onto(
     return transfer_map(source, target)
 
 
-def measured_pair(
+def measure_pair(
     model: Model,
     person: SpeakerMap | None,
     name: str,
@@ -101,9 +100,18 @@ def measured_pair(
     speaker  : of the model in ``measured``
     Raises InputError: the person's motion has other channels.
     """
-    speech = _understood(model, request)
+    try:
+        speech = understand(model, request)
+    except AlignmentError:  # its transcript cannot be aligned
+        speech = understand(model, replace(request, transcript=None))
     generated = generate_for(person, model.engine, model.learned, speech).motion
-    motion, valid = _measured(measured, request, speech, speaker)
+    if isinstance(measured, Track):
+        motion, valid = model_motion(measured, len(speech.features.values))
+    else:
+        same = understand(measured, Request(audio_of(request), units=speech.units))
+        of_speaker = speaker_map(measured.speakers, speaker)
+        motion = generate_for(of_speaker, measured.engine, measured.learned, same).motion
+        valid = np.ones(len(motion.values), bool)
     motion = with_channels(motion, generated.channels, where)
     return Example(name, speech, generated, valid), Example(name, speech, motion, valid)
 
@@ -111,7 +119,7 @@ def measured_pair(
 _Opened = Corpus | Model | FilmedFace | Path
 
 
-def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]:
+def _open(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]:
     """Return the corpus, the model, or the path of the video; and its name for messages."""
     if isinstance(onto, Corpus):
         return onto, str(onto.path)
@@ -128,7 +136,7 @@ def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, st
     return (load_model(path) if is_zipfile(path) else path), str(path)
 
 
-def _takes(
+def _list_takes(
     opened: _Opened, where: str, speaker: str, speech: Request | None
 ) -> Iterator[tuple[str, Request, Track | Model]]:
     """Yield recordings of a person: name, request, and the tracked motion, or the model that generates it.
@@ -143,7 +151,7 @@ def _takes(
         for number, take in enumerate(opened.takes):
             yield f"take {number + 1}", Request(take.sound), Track(take.motion, take.seen)
     elif isinstance(opened, Corpus):
-        names = _names(opened, where, speaker)
+        names = _choose_names(opened, where, speaker)
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
         for index in evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
             utterance = opened.utterance(names[index])
@@ -157,7 +165,7 @@ def _takes(
         yield where, Request(first), track(opened, crops=False, span=VideoSpan(0.0, MOST_FOOTAGE_S))
 
 
-def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
+def _choose_names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
     """Return the utterances of one person: those of the training list if there are any.
 
     Raises InputError: there are several people, no such person, or no utterances.
@@ -171,24 +179,3 @@ def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
     if not names:
         raise InputError(f"{where}: the corpus is empty; prepare recordings of the person")
     return names
-
-
-def _understood(model: Model, request: Request) -> Speech:
-    """Return the speech of a recording; without its transcript where that cannot be aligned."""
-    try:
-        return understand(model, request)
-    except AlignmentError:
-        return understand(model, replace(request, transcript=None))
-
-
-def _measured(
-    measured: Track | Model, request: Request, speech: Speech, speaker: str
-) -> tuple[Motion, NDArray[np.bool_]]:
-    """Return the motion of a person in speech at 100 Hz, and the frames in which it is valid [shape=(T,)]."""
-    if isinstance(measured, Track):
-        return model_motion(measured, len(speech.features.values))
-    same = Request(audio_of(request), units=speech.units)
-    other = generate_for(
-        speaker_map(measured.speakers, speaker), measured.engine, measured.learned, understand(measured, same)
-    )
-    return other.motion, np.ones(len(other.motion.values), bool)

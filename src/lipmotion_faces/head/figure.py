@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.model.surface import normals_of
 from lipmotion.meshes.model.textures import linear
+from lipmotion_faces.base import rotate_head
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
 from lipmotion_faces.head.forms import EYE
@@ -20,7 +21,6 @@ from lipmotion_faces.head.part import Part, grid_triangles, part, tube
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import AT_CORNER, REST, Skin, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
-from lipmotion_faces.turning import turned
 
 Real = NDArray[np.float64]
 
@@ -227,7 +227,7 @@ class Figure:
         for name in ("brow", "right brow"):
             places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)
             places[self.rows[name], 1] += pose.brows
-        look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
+        look, half = rotate_head(*pose.gaze), rotate_head(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
         lid = places[self.skin.lid_rows(0)[1][:LASHES]]
         for side, name in _EYES:
             flip = np.array([side, 1.0, 1.0])
@@ -243,7 +243,7 @@ class Figure:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
         places, normals = self.place(pose)
         colours, arrives = self._shade(pose, places)
-        turn, moving, neck = turned(*pose.turn).T, self.head, self.rows["neck"]
+        turn, moving, neck = rotate_head(*pose.turn).T, self.head, self.rows["neck"]
         held, still = self._held[neck], (places[neck].copy(), normals[neck].copy())
         strands = self._strands.copy()
         places[moving] = (places[moving] - PIVOT) @ turn + PIVOT

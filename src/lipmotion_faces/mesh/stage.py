@@ -10,9 +10,9 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.meshes.model.single_sided import single_sided
 from lipmotion.meshes.model.surface import mesh_surface, normals_of
+from lipmotion_faces.base import rotate_head
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat
-from lipmotion_faces.turning import turned
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -101,13 +101,13 @@ class MeshStage:
             normals[rows] = normals_of(self._of_places(places)[self._bent], self._bent_triangles)[inside]
             moved[rows] = True
         if any(gaze):
-            look = turned(*gaze).T
+            look = rotate_head(*gaze).T
             for rows, share, centre in self._eyes:
                 places[rows] += share * ((places[rows] - centre) @ look + centre - places[rows])
                 normals[rows] += share * (normals[rows] @ look - normals[rows])
                 moved[rows] = True
         if any(turn):
-            rotation, share = turned(*turn).T, self._share[:, None]
+            rotation, share = rotate_head(*turn).T, self._share[:, None]
             places += share * ((places - self._pivot) @ rotation + self._pivot - places)
             normals += share * (normals @ rotation - normals)
             moved |= self._share > 0

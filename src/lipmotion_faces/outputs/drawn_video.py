@@ -44,10 +44,8 @@ class VideoOutput(Output):
         settings = self.settings
         fps = settings.outputs.fps
         if fps is not None and fps > FASTEST_HZ:
-            raise ExportError(
-                f"{self.path}: {fps:g} pictures a second, required {FASTEST_HZ:g} or fewer in a video; the "
-                "rate of motion files alone is --rate"
-            )
+            required = f"required {FASTEST_HZ:g} or fewer in a video; the rate of motion files alone is --rate"
+            raise ExportError(f"{self.path}: {fps:g} pictures a second, {required}")
         if settings.delivery.offset_ms and self.has_sound:
             raise ExportError(
                 f"{self.path}: a video has its own sound, which begins with it; an offset is for files that are put "
@@ -97,18 +95,15 @@ def is_picture_sequence(path: Path) -> bool:
 def check_background(path: Path, staging: Staging) -> None:
     """Raise ExportError if a face is to be transparent in a file that cannot be."""
     if staging.background == TRANSPARENT and path.suffix.lower() == OPAQUE_SUFFIX:
-        raise ExportError(
-            f"{path}: {OPAQUE_SUFFIX} cannot be transparent; write .webm, .mov or %05d.png, or give a colour"
-        )
+        others = "write .webm, .mov or %05d.png, or give a colour"
+        raise ExportError(f"{path}: {OPAQUE_SUFFIX} cannot be transparent; {others}")
 
 
 def check_drawable(path: Path, motion: Motion) -> None:
     """Raise ExportError if motion has no channel from which a face can be drawn."""
     if "opening" not in motion.names and not is_of_blendshapes(motion):
-        raise ExportError(
-            f"{path}: the motion has no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'; write "
-            "motion files"
-        )
+        missing = "no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'"
+        raise ExportError(f"{path}: the motion has {missing}; write motion files")
 
 
 def write_drawn_face(  # noqa: PLR0913

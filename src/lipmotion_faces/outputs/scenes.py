@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from lipmotion.articulation.contact import in_pictures
 from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
-from lipmotion.articulation.mouth import SpokenMouth, frame_times, mouth_at_rest, spoken_mouth
+from lipmotion.articulation.mouth import frame_times, mouth_at_rest, spoken_mouth
 from lipmotion.articulation.rest import beside_rest
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
@@ -31,7 +32,7 @@ from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_dra
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import recorded_prosody
 from lipmotion.storage.files import sound_reference
-from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT
 from lipmotion_faces.base import Staging, alive
 from lipmotion_faces.outputs.drawn_video import check_drawable
@@ -91,27 +92,15 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     Raises ExportError: the file cannot be written.
     """
     with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))
-    if _keeps_original(path, with_sound):
-        return
+    original, weights = scene.original, scene.weights
     if path.suffix.lower() == USD:
         write_usda(path, with_sound)
-    else:
-        write_gltf_scene(path, with_sound)
-
-
-def _keeps_original(path: Path, scene: Scene) -> bool:
-    """Write the user's file with its animation, and return whether that was possible."""
-    if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
-        return False
-    return scene.weights is not None and write_animated_gltf(
-        path,
-        scene.original,
-        scene.weights,
-        scene.sound,
-        sound_s=scene.sound_s,
-        stepped=scene.stepped,
-        thinning=scene.thinning,
-    )
+        return
+    if path.suffix.lower() == GLTF and original is not None and original.suffix.lower() in KEPT and weights is not None:
+        write = partial(write_animated_gltf, sound_s=scene.sound_s, stepped=scene.stepped, thinning=scene.thinning)
+        if write(path, original, weights, with_sound.sound):
+            return
+    write_gltf_scene(path, with_sound)
 
 
 def head_scene(
@@ -137,15 +126,18 @@ def head_scene(
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
     around, kept = _around(frames, MARGIN)
-    mouth = spoken_mouth(motion, units, hertz) if frames is None else _mouth_in(motion, units, around)
+    if frames is None:
+        mouth = spoken_mouth(motion, units, hertz)
+    else:  # made of the frames around those that are wanted
+        wider, inner = _around(around, MOUTH_MARGIN)
+        part = replace(motion, values=motion.values[wider])
+        there = units.between(wider.start / motion.rate_hz, (wider.start + len(part.values)) / motion.rate_hz)
+        mouth = spoken_mouth(part, there, at_rest=mouth_at_rest(motion, units)).within(inner)
     moved = alive(times_s[around], motion, units, staging, prosody)
     poses = pose_head(mouth, moved)
-    character, mesh = (
-        figure(),
-        mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
-    )
-    curves = mouth_weights(character, mesh, poses)
-    curves |= eye_and_brow_weights(moved)
+    has_mood = any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)
+    character, mesh = figure(), mesh_of_figure(moods=has_mood)
+    curves = mouth_weights(character, mesh, poses) | eye_and_brow_weights(moved)
     names = [name for name in mesh.shape_names if name in curves]
     table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
@@ -163,14 +155,6 @@ def _around(frames: slice | None, margin: int) -> tuple[slice, slice]:
         return slice(None), slice(None)
     first = max(frames.start - margin, 0)
     return slice(first, frames.stop + margin), slice(frames.start - first, frames.stop - first)
-
-
-def _mouth_in(motion: Motion, units: Timeline[Unit], frames: slice) -> SpokenMouth:
-    """Return the mouth in some frames of a motion, made of those around them."""
-    around, kept = _around(frames, MOUTH_MARGIN)
-    part, rate_hz = replace(motion, values=motion.values[around]), motion.rate_hz
-    there = units.between(around.start / rate_hz, (around.start + len(part.values)) / rate_hz)
-    return spoken_mouth(part, there, at_rest=mouth_at_rest(motion, units)).within(kept)
 
 
 def character_scene(
@@ -200,9 +184,8 @@ def character_scene(
     weights = edited_weights(replace(solved, values=table), units, generation.curve_edits, known)
     living = living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
-    beside = {
-        name: curve for name, curve in character.beside(others, len(living.values)).items() if name not in weights.names
-    }
+    beside = character.beside(others, len(living.values))
+    beside = {name: curve for name, curve in beside.items() if name not in weights.names}
     beside |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
     rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in beside.values())], axis=1)
     channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
