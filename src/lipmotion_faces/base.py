@@ -89,7 +89,7 @@ class DrawnMotion(Generic[PoseT]):
 class DrawsSingly(Protocol):
     """A face that can draw single pictures; a face has this ability if it has the method."""
 
-    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[Any]:
+    def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[Any]:
         """Return the pictures of ``Face.render``, each of which can be drawn alone. Raises as ``render``.
 
         A face that is asked again, for other motion, does not paint again what does not move.
@@ -100,7 +100,7 @@ class DrawsSingly(Protocol):
 class Stageable(Protocol):
     """A face that can be staged; a face has this ability if it has the method."""
 
-    def staged(self, staging: Staging, prosody: Prosody | None = None) -> Face:
+    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> Face:
         """Return the same face with other settings.
 
         prosody : of the speech that will be rendered, for movements of brows and head; None: not known

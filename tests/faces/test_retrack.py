@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import Staging, staged_face
+from lipmotion_faces import Staging, stage_face
 
 pytestmark = pytest.mark.video
 mediapipe = pytest.importorskip("mediapipe")
@@ -42,7 +42,7 @@ def tracked(frames: list[np.ndarray]) -> np.ndarray:
 def drawn_and_tracked() -> tuple[np.ndarray, np.ndarray]:
     motion, units = syllables()
     return motion.resampled(25.0).values, tracked(
-        list(staged_face("woman", Staging(size=480)).render(motion, units, fps=25.0))
+        list(stage_face("woman", Staging(size=480)).render(motion, units, fps=25.0))
     )
 
 

@@ -10,7 +10,7 @@ from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion_faces.tracking.mediapipe import FaceMesh, quiet_stderr
 from lipmotion_faces.tracking.packages import import_face_mesh, import_opencv
-from lipmotion_faces.tracking.trackers import tracker_named
+from lipmotion_faces.tracking.trackers import make_tracker
 
 
 def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
@@ -33,7 +33,7 @@ def test_versions_need_the_packages(monkeypatch):
 
     monkeypatch.setattr(metadata, "version", missing)
     with pytest.raises(MissingDependencyError, match="mediapipe"):
-        tracker_named().versions()
+        make_tracker().versions()
 
 
 def test_native_messages_are_dropped_only_inside(capfd):

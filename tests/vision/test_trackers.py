@@ -14,7 +14,7 @@ from lipmotion.errors import InputError
 from lipmotion.extensions import GROUPS
 from lipmotion_faces.tracking.mediapipe import FaceFinder, MediaPipe
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, TRACKERS, LandmarkTracker, tracker_named
+from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, TRACKERS, LandmarkTracker, make_tracker
 from vision.scripted import NoFinder
 
 
@@ -54,14 +54,14 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_a_tracker_is_chosen_by_name() -> None:
-    assert isinstance(tracker_named(), MediaPipe)
-    assert isinstance(tracker_named().boxes(), FaceFinder)
-    assert type(tracker_named("brightest")).__name__ == "Brightest"
+    assert isinstance(make_tracker(), MediaPipe)
+    assert isinstance(make_tracker().boxes(), FaceFinder)
+    assert type(make_tracker("brightest")).__name__ == "Brightest"
     assert TRACKERS.group in GROUPS
     with pytest.raises(InputError, match="no tracker 'other'; there are: mediapipe, brightest, wrong"):
-        tracker_named("other")
+        make_tracker("other")
     with pytest.raises(InputError, match="required a class of LandmarkTracker"):
-        tracker_named("wrong")
+        make_tracker("wrong")
 
 
 @pytest.mark.usefixtures("installed")

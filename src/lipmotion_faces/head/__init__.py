@@ -33,7 +33,7 @@ class Head(Face):
     def __init__(self, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
         self.staging, self.prosody = staging or Staging(), prosody
 
-    def staged(self, staging: Staging, prosody: Prosody | None = None) -> Head:
+    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> Head:
         """Return the same character with other settings; pictures are 16 to 9.
 
         prosody : of the speech that will be rendered, for accents of brows and head; None: not known
@@ -41,9 +41,9 @@ class Head(Face):
         return Head(staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return iter(self.drawn(motion, units, fps=fps))
+        return iter(self.draw(motion, units, fps=fps))
 
-    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[CharacterPose]:  # noqa: D102
+    def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[CharacterPose]:  # noqa: D102
         poses = head_poses(motion, units, fps, self.staging, self.prosody)
         return DrawnMotion(poses, lambda: self._painter, FRAMES_AHEAD)
 

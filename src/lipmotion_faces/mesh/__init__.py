@@ -61,7 +61,7 @@ class MeshFace(Face):
         """The character that is shown."""
         return self._character
 
-    def staged(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
+    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
         """Return the same character with other settings.
 
         prosody : of the speech that will be rendered, for accents of brows and head; None: not known
@@ -69,9 +69,9 @@ class MeshFace(Face):
         return MeshFace(self._character, *self._size, staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return iter(self.drawn(motion, units, fps=fps))
+        return iter(self.draw(motion, units, fps=fps))
 
-    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[MeshPose]:  # noqa: D102
+    def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[MeshPose]:  # noqa: D102
         if not 0 < fps < np.inf:
             raise InputError(f"the frame rate is {fps}, required more than 0")
         time_s = frame_times(len(motion.values), motion.rate_hz, fps)

@@ -20,7 +20,7 @@ from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody
 from lipmotion.types.progress import with_reports
 from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion_faces.film.filmed_video import RENDERING
-from lipmotion_faces.registry import staged_face
+from lipmotion_faces.registry import stage_face
 
 OPAQUE_SUFFIX = ".mp4"
 VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
@@ -122,7 +122,7 @@ def write_drawn_face(  # noqa: PLR0913
     monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
-    staged, drawn = staged_face(face, staging, prosody or prosody_of_speech(sound)), None
+    staged, drawn = stage_face(face, staging, prosody or prosody_of_speech(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:
@@ -152,6 +152,6 @@ def load_drawing(face: Face) -> None:
     """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
     if isinstance(face, DrawsPlanes) and numba_works():
         closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
-        smallest = staged_face(face, Staging(size=SMALLEST_PX))
+        smallest = stage_face(face, Staging(size=SMALLEST_PX))
         if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
             list(frames)

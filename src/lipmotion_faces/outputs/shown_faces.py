@@ -44,7 +44,7 @@ from lipmotion_faces.outputs.drawn_video import (
     write_frames,
 )
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
-from lipmotion_faces.registry import FACES, face_named, is_drawings, staged_face
+from lipmotion_faces.registry import FACES, is_drawings, make_face, stage_face
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
@@ -75,7 +75,7 @@ class ShownDrawing(_WithHead):
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
         refuse_film(settings.outputs)
-        staged_face(self.face, settings.staging)
+        stage_face(self.face, settings.staging)
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
         check_background(path, settings.staging)
@@ -217,7 +217,7 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
         sibling = Path(f"{face}{SUFFIX}")
         if str(face) not in FACES.names and is_file(sibling):
             raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {sibling}")
-        opened = face_named(str(face))
+        opened = make_face(str(face))
     if isinstance(opened, CutOut):
         return ShownCutOut(opened)
     if isinstance(opened, FilmedFace):

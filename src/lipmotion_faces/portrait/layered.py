@@ -170,7 +170,7 @@ class LayeredFace(Face):
         if "rest" not in self.mouths:
             raise InputError(f"{path}: no layer {MOUTH}rest; name the group of the closed mouth so")
 
-    def staged(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
+    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
         """Return the same drawing with other settings; ``prosody`` is of the speech that will be rendered."""
         other = copy(self)
         other.__dict__.pop("_painter", None)
@@ -178,9 +178,9 @@ class LayeredFace(Face):
         return other
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return iter(self.drawn(motion, units, fps=fps))
+        return iter(self.draw(motion, units, fps=fps))
 
-    def drawn(  # noqa: D102
+    def draw(  # noqa: D102
         self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
     ) -> DrawnMotion[tuple[FacePose, str]]:
         poses = face_poses(motion, units, fps, self.staging, self.prosody)

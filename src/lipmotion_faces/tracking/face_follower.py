@@ -19,7 +19,7 @@ from lipmotion_faces.tracking.trackers import (
     FaceBox,
     LandmarkTracker,
     PointFinder,
-    tracker_named,
+    make_tracker,
 )
 
 Image = NDArray[np.uint8]
@@ -131,7 +131,7 @@ class FaceFollower:
 
     def __init__(self, person: Sequence[Array] = (), tracker: str = MEDIAPIPE) -> None:
         self._wanted = list(person)
-        self._tracker = tracker_named(tracker)
+        self._tracker = make_tracker(tracker)
         self._finder = self._tracker.boxes()
         self._scenes = [_Scene(self._wanted, self._finder, self._tracker)]
         self._picture: Array | None = None

@@ -8,7 +8,7 @@ import pytest
 from faces.head.motions import NOTHING_SAID, opening
 from lipmotion import Staging
 from lipmotion.errors import InputError
-from lipmotion_faces import face_named
+from lipmotion_faces import make_face
 from lipmotion_faces.head import Head, render
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.stage import Stage, camera_for
@@ -35,7 +35,7 @@ def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
 
 
 def test_the_head_is_a_face_like_all_others():
-    check_face(face_named("head"))
+    check_face(make_face("head"))
 
 
 def test_an_unusable_size_is_refused_at_once():
@@ -104,5 +104,5 @@ def test_what_is_switched_off_does_not_move():
     still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
     frames = list(Head(still).render(moved, NOTHING_SAID))
     assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])
-    lively = list(Head().staged(Staging(size=64)).render(moved, NOTHING_SAID))
+    lively = list(Head().with_staging(Staging(size=64)).render(moved, NOTHING_SAID))
     assert not np.array_equal(lively[0], lively[30])
