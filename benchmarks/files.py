@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.formats.blender import write_addon
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
@@ -54,7 +54,7 @@ def main() -> None:
         print(json.dumps(fit(result)), flush=True)
         makers = {"head": lambda: head_scene(result, prosody=prosody)}
         for path in options.characters:
-            makers[path.stem] = lambda path=path: character_scene(result, driven_character(path), prosody=prosody)
+            makers[path.stem] = lambda path=path: character_scene(result, load_character(path), prosody=prosody)
         for name, make in makers.items():
             started = time.process_time()
             scene = make()

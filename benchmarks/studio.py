@@ -41,7 +41,7 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 
 from lipmotion.formats.sound import write_sound  # noqa: E402
 from lipmotion.kernels.compiler import numba_works  # noqa: E402
-from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
+from lipmotion.meshes.fitting.driven import load_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import step_of  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
@@ -137,7 +137,7 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
 def own_character(path: Path) -> ShownFace:
     """Return a head with 16 blendshapes, as a character of a user's own."""
     write_glb(path, head())
-    return shown_face(MeshFace(driven_character(path)))
+    return shown_face(MeshFace(load_character(path)))
 
 
 def lasting(sound: Path, seconds: float) -> tuple[Path, float]:

@@ -14,7 +14,7 @@ from experiments.copies import copied, renamed
 from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.closures import closings
+from lipmotion.measures.closures import find_closings
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab.evaluation.evaluate import BILABIAL
@@ -76,7 +76,7 @@ def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand:
 @pytest.mark.long
 def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
-    pairs = [(closings(c.generated[:, 0], under), closings(c.original[:, 0], under)) for c in by_hand]
+    pairs = [(find_closings(c.generated[:, 0], under), find_closings(c.original[:, 0], under)) for c in by_hand]
     hits = [any(abs(int(g) - int(o)) <= 2 for g in made) for made, recorded_ones in pairs for o in recorded_ones]
     good = [any(abs(int(g) - int(o)) <= 2 for o in recorded_ones) for made, recorded_ones in pairs for g in made]
     assert (row["closings"], row["generated_closings"]) == (len(hits), len(good))
@@ -99,7 +99,7 @@ def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[Comp
             wanted += bool((clip.original[near, 0] < under).any())
             hit += bool((clip.original[near, 0] < under).any() and (clip.generated[near, 0] < under).any())
         for side, curve in enumerate((clip.generated[:, 0], clip.original[:, 0])):
-            elsewhere[side] += int((~inside[closings(curve, under)]).sum())
+            elsewhere[side] += int((~inside[find_closings(curve, under)]).sum())
     assert wanted > 10
     assert (row["p_b_m"], row["recall_p_b_m"]) == (wanted, pytest.approx(100 * hit / wanted))
     assert row["false_per_minute"] == pytest.approx(elsewhere[0] / speech_s * 60)

@@ -10,18 +10,17 @@ import numpy as np
 import pytest
 
 from lipmotion import Delivery
-from lipmotion.articulation.delivery import closed_times
+from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_container import read_gltf_document
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Pin, StateTrace, Timeline
-from lipmotion.types.moods import moods_of
+from lipmotion.types.moods import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
@@ -57,7 +56,7 @@ def own_head(generation: Generation) -> Scene:
 def character(generation: Generation, tmp_path_factory: pytest.TempPathFactory) -> Scene:
     path = tmp_path_factory.mktemp("character") / "head.glb"
     write_glb(path, head())
-    return character_scene(generation, driven_character(path))
+    return character_scene(generation, load_character(path))
 
 
 @pytest.fixture(scope="module", params=["own_head", "character"])
@@ -103,7 +102,7 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
 
 @pytest.mark.long
 def test_shapes_of_moods_are_in_the_head_where_a_mood_is(generation: Generation, own_head: Scene) -> None:
-    moody = replace(generation, motion=with_moods(generation.motion, moods_of("angry:0.8, surprised at 1.0")))
+    moody = replace(generation, motion=with_moods(generation.motion, parse_moods("angry:0.8, surprised at 1.0")))
     scene = head_scene(moody, staging=Staging(brows=False))
     added = {*scene.mesh.shape_names} - {*own_head.mesh.shape_names}
     assert "browDownLeft" in added
@@ -129,7 +128,7 @@ def test_some_frames_are_those_of_the_whole(generation: Generation, mood: str, o
     values, spans, each_s = np.tile(generation.motion.values, (3, 1)), list(generation.units), 2.01
     units = [replace(s, start_s=s.start_s + n * each_s, end_s=s.end_s + n * each_s) for n in range(3) for s in spans]
     moved = replace(generation.motion, values=values)
-    moved = with_moods(moved, moods_of(mood)) if mood else moved
+    moved = with_moods(moved, parse_moods(mood)) if mood else moved
     pin = Pin(2.7, "jawOpen", 0.4)
     long = replace(
         generation, motion=moved, units=Timeline(tuple(units)), spread=np.zeros(moved.values.shape), curve_edits=(pin,)
@@ -137,7 +136,7 @@ def test_some_frames_are_those_of_the_whole(generation: Generation, mood: str, o
     scene = head_scene
     if own:
         write_glb(tmp_path / "own.glb", head())
-        scene = partial(character_scene, character=driven_character(tmp_path / "own.glb"))
+        scene = partial(character_scene, character=load_character(tmp_path / "own.glb"))
     whole = scene(long)
     assert whole.weights is not None
     for frames in (slice(0, 30), slice(250, 310), slice(len(values) - 20, len(values))):
@@ -152,7 +151,7 @@ def test_some_frames_are_those_of_the_whole(generation: Generation, mood: str, o
 def test_closures_between_two_keys_are_kept(generation: Generation, character: Scene, tmp_path: Path) -> None:
     path = tmp_path / "head.glb"
     write_glb(path, head())
-    slow = character_scene(generation, driven_character(path), 12.0)
+    slow = character_scene(generation, load_character(path), 12.0)
     assert slow.weights is not None
     assert character.weights is not None
     parted = slow.weights["jawOpen"] - slow.weights["mouthClose"]
@@ -223,7 +222,7 @@ def test_keys_that_others_give_are_left_out(generation: Generation, tmp_path: Pa
     settings = OutputSettings(shown_face("head"), delivery=Delivery(key_tolerance=0.02))
     scene = delivered_scene(Performance(generation, settings))
     assert scene.weights is not None
-    assert scene.thinning == Thinning(0.02, tuple(closed_times(generation)))
+    assert scene.thinning == Thinning(0.02, tuple(find_closed_times(generation)))
     write_scene(tmp_path / "a.glb", scene)
     stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.table())
     weights, turned = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]

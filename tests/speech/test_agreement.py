@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, load_model
-from lipmotion.corpora.layouts import words_of_name
+from lipmotion.corpora.layouts import spell_name
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import (
     DOUBTFUL_SCORE,
@@ -25,7 +25,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentence
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon, split_words
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[::4]
     phones, whole, half = Recogniser(load_model().phones, "auto"), 0, 0
     for name in names:
-        audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), words_of_name(name)
+        audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), spell_name(name)
         assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
             units = phones.align(audio, analysed(audio).mfcc(), said, Lexicon())
@@ -139,7 +139,7 @@ def test_real_recordings(recordings: Path) -> None:
         audio = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv")
         features = analysed(audio).mfcc()
         for clip, found in ((name, right), (other, wrong)):
-            words = words_of_name(clip)
+            words = spell_name(clip)
             assert words is not None
             found.append(agreement_score(audio, phones.align(audio, features, words, Lexicon())))
     assert min(right) > DOUBTFUL_SCORE
@@ -155,7 +155,7 @@ def test_synthetic_voices_are_believed() -> None:
     for voice in installed_voices()[::2]:
         audio, _ = speak_sentence(texts[0], voice)
         right, wrong = (
-            agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), words_of(text), Lexicon()))
+            agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), split_words(text), Lexicon()))
             for text in texts
         )
         assert right > DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4

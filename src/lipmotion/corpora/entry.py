@@ -30,7 +30,7 @@ from lipmotion.types import (
     Utterance,
     check_curves,
     from_sixteen_bits,
-    sixteen_bits,
+    to_sixteen_bits,
 )
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, truth, whole
 
@@ -63,7 +63,7 @@ def quantise(audio: Audio) -> Audio:
     samples = np.empty(len(audio.samples), np.float32)
     for start in range(0, len(samples), BLOCK):
         block = slice(start, start + BLOCK)
-        samples[block] = from_sixteen_bits(sixteen_bits(audio.samples[block]))
+        samples[block] = from_sixteen_bits(to_sixteen_bits(audio.samples[block]))
     return Audio(samples, audio.rate_hz)
 
 
@@ -152,7 +152,7 @@ def read_utterance(folder: Path) -> Utterance:
 
 def _arrays(utterance: Utterance) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {
-        "audio": sixteen_bits(utterance.audio.samples),
+        "audio": to_sixteen_bits(utterance.audio.samples),
         "features": utterance.features.values.astype(np.float32),
         "motion": utterance.track.motion.values.astype(np.float32),
         "seen": utterance.track.seen.astype(np.bool_),

@@ -28,18 +28,18 @@ from lipmotion.formats.label_tiers import (
     WORDS,
     LabelTier,
     TimedLabel,
+    add_pauses,
     check_count,
-    in_seconds,
+    find_tier,
     ipa_labels,
-    named_tier,
+    parse_seconds,
     unit_of_times,
-    with_pauses,
 )
 from lipmotion.types import values
-from lipmotion.types.values import clock_seconds, number_of, require
+from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
-from lipmotion.units.spoken_text import check_word_count, spoken_text
-from lipmotion.units.text_normalisation import words_in
+from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
+from lipmotion.units.text_normalisation import find_words
 
 LOG = logging.getLogger("lipmotion")
 _TEXT = values.text(1 << 20)
@@ -195,10 +195,10 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
             break
     else:
         tiers = _listed_tiers(objects, where) if len(objects) == len(numbered) else None
-    return tiers and [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
+    return tiers and [replace(t, labels=add_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
 
 
-def described(text: str, where: str) -> str:
+def describe_json(text: str, where: str) -> str:
     """Return what JSON is that holds no words in time, for a message."""
     value = next(_documents(text, where), (1, None))[1]
     first = value[0] if isinstance(value, list) and value else value
@@ -251,14 +251,14 @@ def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     if not isinstance(value, str):
         missing = value in (None, -1)  # some services write -1 where they have none
         return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
-    found, clock_s = DIGITS.fullmatch(value.strip()), clock_seconds(value)
+    found, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
     if found is None and not math.isnan(clock_s):
         return clock_s, 1
     if found is not None:
         value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
     if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
         return math.nan, per_s
-    return number_of(value, f"{where}: a time is", "a number of seconds"), per_s
+    return parse_number(value, f"{where}: a time is", "a number of seconds"), per_s
 
 
 def _seconds(value: Any, where: str, per_s: float = 1) -> float:
@@ -420,7 +420,7 @@ def _said_tiers(rows: list[Row], where: str) -> list[LabelTier]:
         rows = rows[half:]  # Google's last result has the words of all again, with their speakers
     if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
         rows = [part for row in rows for part in row.parts or (row,)]
-    counts = [len(words_in(spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
+    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
     check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
     single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
     role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
@@ -515,7 +515,7 @@ def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
         first, last = characters[owner_of[match.start()]], characters[owner_of[match.end() - 1]]
         found[WORDS].append(replace(first, end_s=last.end_s, text=match[0]))
     tiers = _word_and_phone_tiers(found[WORDS], found[PHONE_LABELS], where)
-    return in_seconds(tiers, where) if any(found.values()) else None
+    return parse_seconds(tiers, where) if any(found.values()) else None
 
 
 def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
@@ -580,5 +580,5 @@ def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
             labels.append(TimedLabel(times_s[0], times_s[-1], require(_TEXT, text, f"{where}: {place}"), place))
         if len(tier["entries"][0] if tier["entries"] else ()) == 3:
-            tiers.append(named_tier(name, labels))
+            tiers.append(find_tier(name, labels))
     return tiers

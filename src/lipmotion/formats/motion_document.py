@@ -27,7 +27,7 @@ from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
 from lipmotion.storage.json_text import as_json, json_errors
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import items, members, number, require, text, truth
-from lipmotion.units import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
+from lipmotion.units import RECOGNISED, RecognisedPhone, list_recognised_phones, restore_confidences
 
 FORMAT = "lipmotion.motion"
 VERSION = 1
@@ -46,18 +46,18 @@ def _document(
     channels = [{"name": channel.name, "unit": channel.unit} for channel in motion.channels]
     checked = require(items(members(_CHANNEL)), channels, "channels")
     outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
-    after = {**unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
+    after = {**list_unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
     return {"format": FORMAT, "version": VERSION, "rate_hz": float(motion.rate_hz), "channels": checked}, after
 
 
-def unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
+def list_unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
     """Return the members ``units`` and ``recognised`` (if phones were), for ``parse_units``."""
     rows = []
     for span in units:
         label = span.label
         row = {"start_s": span.start_s, "end_s": span.end_s, "phone": label.phone, "unit": label.unit}
         rows.append(row | ({"word": label.word} if label.word else {}) | ({"again": True} if label.again else {}))
-    recognised = recognised_phones(units)
+    recognised = list_recognised_phones(units)
     return {"units": rows} | ({RECOGNISED: recognised} if recognised else {})
 
 
@@ -96,7 +96,7 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
             RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
             for start_s, end_s, name, confidence in _ROWS(recognised or [])
         ]
-        return with_confidences(Timeline(tuple(map(_span, _UNITS(rows)))), confidences)
+        return restore_confidences(Timeline(tuple(map(_span, _UNITS(rows)))), confidences)
 
 
 def _span(row: Any) -> Span[Unit]:

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, named_tier, required_time
+from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, find_tier, require_time
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Timeline, Unit
-from lipmotion.units import RECOGNISED, recognised_phones, words_in_time
+from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
 
 TOKEN = re.compile(
     r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
@@ -62,10 +62,10 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
                 raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
             labels = []
             for position in (f"{place}, interval {i + 1}" for i in range(count)):
-                start_s = required_time(_take(tokens, "number"), position, where)
-                end_s = required_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
+                start_s = require_time(_take(tokens, "number"), position, where)
+                end_s = require_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
                 labels.append(TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), position))
-            tiers += [named_tier(name, labels)] if kind == INTERVALS else []
+            tiers += [find_tier(name, labels)] if kind == INTERVALS else []
         place = "what follows the last tier"
         if next(tokens, None) is not None:
             raise _DamagedError("more is there than the counts say")
@@ -108,17 +108,17 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     """Write phones in time to a TextGrid in long text form, with the tiers ``phones`` and ``words``.
 
     units : the phones; where a label has no phone, the name of its unit is written
-    Words are those of ``units.words_in_time``. If phones were recognised, a third tier, ``recognised``, holds these
+    Words are those of ``units.group_words``. If phones were recognised, a third tier, ``recognised``, holds these
     with their confidence (``p 0.37``), so that a reader can tell them from corrected ones (``units.recognised``).
     Times are as exact as floats are. After a failure there is no partial file.
     Raises ExportError: the file cannot be written.
     Source: Praat manual, "TextGrid file formats".
     """
     phones = [(float(span.start_s), float(span.end_s), span.label.phone or span.label.unit) for span in units]
-    words = [(float(span.start_s), float(span.end_s), span.label) for span in words_in_time(units)]
+    words = [(float(span.start_s), float(span.end_s), span.label) for span in group_words(units)]
     tiers = [("phones", phones), ("words", words)]
     recognised = [
-        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in recognised_phones(units)
+        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in list_recognised_phones(units)
     ]
     if recognised:
         tiers.append((RECOGNISED, recognised))

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.modulation_spectrum import modulation_spectrum
+from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
 from lipmotion.stats.rounding import varies
 
 HIGHEST_HZ = 12.5
@@ -25,8 +25,8 @@ def modulation_distance_db(generated: Clips, original: Clips, rate_hz: float) ->
     The mean is over frequencies up to ``HIGHEST_HZ``. NaN where the original is constant but for rounding.
     Source: Takamichi et al. 2016, who show the spectra; the distance is ours.
     """
-    frequencies, reference = modulation_spectrum(original, rate_hz)
-    _, made = modulation_spectrum(generated, rate_hz)
+    frequencies, reference = measure_modulation_spectrum(original, rate_hz)
+    _, made = measure_modulation_spectrum(generated, rate_hz)
     least = np.where(varies(np.concatenate(original)), FLOOR * reference.max(axis=0), np.nan)
     difference = 10 * np.log10(np.maximum(made, least) / np.maximum(reference, least))
     return np.sqrt(np.square(difference[frequencies <= HIGHEST_HZ]).mean(axis=0))
@@ -49,7 +49,7 @@ def correlation(generated: Array, original: Array) -> Array:
     return (a * b).sum(axis=0) / np.where(moves, scale, np.inf)
 
 
-def moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
+def select_moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
     """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit.
 
     units : of the channels

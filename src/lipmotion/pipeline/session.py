@@ -19,13 +19,13 @@ from typing import Any, TypeVar
 
 from lipmotion.articulation.curve_edits import (
     MotionStretch,
+    apply_curve_edits,
+    apply_gain,
+    apply_stretch,
     check_drawn,
-    locked_stretch,
-    pinned_frame,
-    with_edited_curves,
-    with_gain,
-    with_held,
-    with_stretch,
+    cut_locked_stretch,
+    find_pinned_frame,
+    hold_mouth,
 )
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import AlignmentError, InputError, shortened
@@ -82,7 +82,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
-from lipmotion.units import Pronunciation, words_in_time, words_of
+from lipmotion.units import Pronunciation, group_words, split_words
 
 ResultT = TypeVar("ResultT")
 
@@ -287,7 +287,7 @@ class Session:
             start_s, end_s, said = step.start_s, min(step.end_s, units[-1].end_s), step.words
             where = f"{start_s:.2f} to {end_s:.2f} s"
         else:
-            words = [span for span in words_in_time(units) if span.label]
+            words = [span for span in group_words(units) if span.label]
             if not 1 <= step.number <= len(words):
                 found = f"1 to {len(words)}" if words else "words: give a transcript, or edit phones"
                 raise InputError(f"{str(step)!r}: there is no word {step.number}, required {found}")
@@ -333,7 +333,7 @@ class Session:
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            generation = with_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
+            generation = apply_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
         return generation
 
     def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
@@ -342,7 +342,7 @@ class Session:
         def stretch() -> MotionStretch:
             generation = self._after(before)
             motion = with_gestures(generation.motion, generation.units, names)
-            return locked_stretch(generation.with_motion(motion), lock.start_s, lock.end_s)
+            return cut_locked_stretch(generation.with_motion(motion), lock.start_s, lock.end_s)
 
         return self._cache.cached("locked", (before, lock, names, self.is_sketching), stretch)
 
@@ -356,16 +356,16 @@ class Session:
         generation = self._with_pins(self._phone_steps(steps), modelled)
         for edit in edits:
             if isinstance(edit, Gain) and not edit.channel:
-                generation = with_gain(generation, edit)
+                generation = apply_gain(generation, edit)
             elif isinstance(edit, Hold):
-                generation = with_held(generation, edit)
+                generation = hold_mouth(generation, edit)
         curves = [edit for edit in edits if not isinstance(edit, Hold) and edit.channel and edit not in modelled]
         if any(not edit.channel for edit in edits):
             curves = [*modelled, *curves]  # a gain or a held pose has moved their values
         asked = [edit.channel for edit in curves if edit.channel in GESTURES]
         if asked:
             generation = generation.with_motion(with_gestures(generation.motion, generation.units, asked))
-        motion = with_edited_curves(generation.motion, generation.units, curves)
+        motion = apply_curve_edits(generation.motion, generation.units, curves)
         others = tuple(edit for edit in curves if edit.channel not in motion.names)
         for edit in edits:
             self._check_edit(edit, motion)
@@ -390,7 +390,7 @@ class Session:
             )
         last_s = (len(motion.values) - 1) / motion.rate_hz
         if isinstance(edit, Pin):
-            pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
+            find_pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
         elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
             kind = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
             raise InputError(f"{kind} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
@@ -461,4 +461,4 @@ class Session:
 def own_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
     own = step.own if isinstance(step, WordSaid | WordsSaidSo) else {}
-    return {word: (phones,) for given, phones in own.items() for word in words_of(given)}
+    return {word: (phones,) for given, phones in own.items() for word in split_words(given)}

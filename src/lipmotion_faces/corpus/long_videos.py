@@ -18,12 +18,12 @@ from lipmotion.corpora.layouts import LRS
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import labels_beside
+from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
-from lipmotion.units.written_forms import readings
+from lipmotion.units.written_forms import list_readings
 from lipmotion_faces.corpus.supplied import align_sound, separate_sound
 from lipmotion_faces.tracking.video_scan import VideoScan, scan_video
 
@@ -194,10 +194,10 @@ def transcript_beside(video: Path) -> TimedTranscript | None:
 
     Raises InputError: a file of labels cannot be read.
     """
-    transcript = labels_beside(video).transcript
+    transcript = find_labels(video).transcript
     if transcript is None or transcript.has_times:
         return transcript
-    other = labels_beside(video, ignored=frozenset({video.with_suffix(".txt")})).transcript
+    other = find_labels(video, ignored=frozenset({video.with_suffix(".txt")})).transcript
     return other if other is not None and other.has_times else transcript
 
 
@@ -211,7 +211,7 @@ def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
     parts: list[SpokenPart] = []
     for n, line in enumerate(transcript.lines):
         words = [
-            SpokenPart(word.start_s, word.end_s, readings(word.word)[0])
+            SpokenPart(word.start_s, word.end_s, list_readings(word.word)[0])
             for word in line.words
             if word.start_s is not None and word.end_s is not None and word.end_s > word.start_s
         ]
@@ -221,7 +221,7 @@ def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
             following_s = next((start_s for start_s in starts_s[n + 1 :] if start_s is not None), None)
             end_s = following_s if line.end_s is None else line.end_s
             if line.start_s is not None and end_s is not None and end_s > line.start_s and line.words:
-                text = tuple(spoken for word in line.words for spoken in readings(word.word)[0])
+                text = tuple(spoken for word in line.words for spoken in list_readings(word.word)[0])
                 parts.append(SpokenPart(line.start_s, end_s, text))
     return parts
 
@@ -241,7 +241,7 @@ class VideoPart:
 
 def single_video(path: Path) -> RecordingFolder:
     """Return the folder of recordings that one video is. Raises InputError: labels beside it cannot be read."""
-    return RecordingFolder(VIDEO, (SourceRecording(path.stem, path, labels_beside(path).words),))
+    return RecordingFolder(VIDEO, (SourceRecording(path.stem, path, find_labels(path).words),))
 
 
 def divide_long_videos(

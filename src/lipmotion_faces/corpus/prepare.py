@@ -15,7 +15,7 @@ from typing import Any
 
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantise, read_entry, write_utterance
-from lipmotion.corpora.separate_sounds import with_separate_sounds
+from lipmotion.corpora.separate_sounds import add_separate_sounds
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
@@ -152,7 +152,7 @@ def prepare(
     else:
         folder, place = discover(directory), directory
     offset_s = None if offset_ms is None else offset_ms / 1000
-    folder = with_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
+    folder = add_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
     chosen = make_tracker(tracker)
     packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.surface import normals_of
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.surface import compute_normals
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.base import rotate_head
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
@@ -106,7 +106,7 @@ CORNER_FADE_SHARE = 0.4
 
 
 def skin_colours(skin: Skin) -> Real:
-    """Return the diffuse reflection of all vertices of the skin, linear [shape=(V, 3)]."""
+    """Return the diffuse reflection of all vertices of the skin, decode_srgb [shape=(V, 3)]."""
     x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
     colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
 
@@ -138,7 +138,7 @@ def skin_colours(skin: Skin) -> Real:
         for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
             upper = lids[ring, LID_SIDE > 0]
             colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
-    return linear(colour)
+    return decode_srgb(colour)
 
 
 PIVOT = np.array([0.0, -0.75, -0.9])
@@ -171,7 +171,7 @@ class Figure:
 
     triangles : of all parts [shape=(F, 3)]
     head      : the rows of the vertices that move; those of the body, behind them, never do
-    colours   : diffuse reflection of the vertices, linear [shape=(V, 3)]
+    colours   : diffuse reflection of the vertices, decode_srgb [shape=(V, 3)]
     parts, rows : the parts, and the rows of the vertices of each by its name
     """
 
@@ -222,7 +222,7 @@ class Figure:
         places, normals = self._places.copy(), self._normals.copy()
         places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.pose(pose)
         places[self.rows["tongue"]] = tongue(pose)
-        normals[self.rows["tongue"]] = normals_of(places[self.rows["tongue"]], tongue_triangles())
+        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], tongue_triangles())
         places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], lower_drop(pose))
         for name in ("brow", "right brow"):
             places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)

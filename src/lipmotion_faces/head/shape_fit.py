@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
-from lipmotion.meshes.fitting.shape_weights import with_gap
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.head.figure import Figure
@@ -66,7 +65,7 @@ class _MouthFit:
         targets, gap = (np.concatenate(column) for column in zip(*parts, strict=True))
         for name, curve in fixed.items():
             targets -= np.outer(curve, self._fixed[name])
-        weights = bounded_curves(self._triangle.T, targets, COSTS)
+        weights = fit_bounded_curves(self._triangle.T, targets, COSTS)
         jaw, close = names.index("jawOpen"), names.index("mouthClose")
         weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
         kept = [name for name in names if not name.startswith(PARTING)]

@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lipmotion.articulation.cue_sheets import shown_shapes
+from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
@@ -132,7 +132,7 @@ class ShownCutOut(_WithHead):
         settings, generation, fps = performance.settings, performance.generation, _frame_rate(performance.settings)
         sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
         count = frame_count(generation, fps)
-        shown = shown_shapes(sheet)[:count]
+        shown = list_frame_shapes(sheet)[:count]
         frames = self.face.frames([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
         sound = performance.cached(sound_track)
         write_frames(path, with_reports(frames, count, RENDERING, performance.monitor), fps, sound)

@@ -180,7 +180,7 @@ def choose_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], t
     if set(names) >= set(DISTANCES):
         return (*DISTANCES, *eigenlips), ()
     originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
-    moves = curves.moving(originals, [channel.unit for channel in channels])
+    moves = curves.select_moving(originals, [channel.unit for channel in channels])
     moves |= np.array([channel.unit == GREY for channel in channels])
     if not moves.any():
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")

@@ -10,7 +10,7 @@ from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.errors import InputError, shortened
 from lipmotion.pipeline.request import Outputs
-from lipmotion.types.values import number_of
+from lipmotion.types.values import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -87,12 +87,12 @@ def _write_blank_table(character: Path) -> None:
     """Write the table of a character whose mouth was not found, to be filled in; where there is none yet."""
     from lipmotion.meshes.files.character_files import read_character
     from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
-    from lipmotion.meshes.fitting.own_curves import rows_found
+    from lipmotion.meshes.fitting.driven import list_rows
     from lipmotion.storage.sources import is_file
 
     path = table_path(character)
     if not is_file(path):
-        write_rig_table(path, rows_found(read_character(character), None, {}))
+        write_rig_table(path, list_rows(read_character(character), None, {}))
         print_line(path)
 
 
@@ -126,7 +126,7 @@ def _stated(options: argparse.Namespace) -> dict[str, dict[str, float]]:
     for pose in CALIBRATION:
         for part in filter(None, getattr(options, pose).split(",")):
             name, _, text = part.rpartition("=")
-            value = number_of(text, f"--{pose}: the value in {shortened(part)!r} is", "NAME=X, as A=0.8")
+            value = parse_number(text, f"--{pose}: the value in {shortened(part)!r} is", "NAME=X, as A=0.8")
             if not name.strip():
                 raise InputError(f"--{pose}: {shortened(part)!r} names no control, required NAME=X, as A=0.8")
             stated.setdefault(pose, {})[name.strip()] = value

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.articulation.contact import gap_of
-from lipmotion.meshes.fitting.facial_animation import MOUTH_TO_NOSE, STEPS, fap_motion
+from lipmotion.articulation.contact import opening_to_gap
+from lipmotion.formats.fap import MOUTH_TO_NOSE, STEPS, move_faps
 from meshes.speech import motion, units
 
 
 @pytest.fixture(scope="module")
 def parameters():
-    return fap_motion(motion(), units())
+    return move_faps(motion(), units())
 
 
 def test_rest_is_0(parameters):
@@ -34,7 +34,9 @@ def test_the_directions_are_those_of_the_standard(parameters):
 
 def test_a_gap_is_its_share_of_the_unit(parameters):
     apart = -(parameters["fap4_lower_t_midlip"][75] + parameters["fap5_raise_b_midlip"][75])
-    assert apart / STEPS * MOUTH_TO_NOSE == pytest.approx(float(gap_of(motion()["opening"][75:76])[0]), abs=0.002)
+    assert apart / STEPS * MOUTH_TO_NOSE == pytest.approx(
+        float(opening_to_gap(motion()["opening"][75:76].astype(float))[0]), abs=0.002
+    )
 
 
 def test_values_are_whole(parameters):
