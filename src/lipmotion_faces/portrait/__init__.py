@@ -46,10 +46,7 @@ class DrawnFace(Face):
         """The character."""
 
     def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> DrawnFace:
-        """Return the same character with other settings.
-
-        prosody : of the speech that will be rendered, for brows and head; None: not known
-        """
+        """Return the same character with other settings; ``prosody`` is of the speech that will be rendered."""
         return type(self)(staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102

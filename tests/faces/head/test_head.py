@@ -9,26 +9,23 @@ from faces.head.motions import NOTHING_SAID, opening
 from lipmotion import Staging
 from lipmotion.errors import InputError
 from lipmotion_faces import make_face
-from lipmotion_faces.head import Head, render
+from lipmotion_faces.head import Head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.stage import Stage, camera_for
 from lipmotion_faces.rendering.rasteriser import Camera
 from lipmotion_faces.testing import check_face
 
-SMALL: dict[str, Any] = {"width": 160, "height": 120}
-
 
 def test_the_number_of_frames_follows_the_frame_rate():
     moved = opening(*np.zeros(21), rate_hz=100.0)
-    assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30)] == [6, 7]
+    assert [sum(1 for _ in Head(size=(160, 120)).render(moved, NOTHING_SAID, fps=fps)) for fps in (25, 30)] == [6, 7]
 
 
 @pytest.mark.long
 def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
     moved = opening(*np.linspace(0, 0.2, 8))
     first, second, other = (
-        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), width=64, height=64)))
-        for seed in (1, 1, 2)
+        np.array(list(Head(Staging(seed=seed), size=(64, 64)).render(moved, NOTHING_SAID))) for seed in (1, 1, 2)
     )
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
@@ -39,9 +36,9 @@ def test_the_head_is_a_face_like_all_others():
 
 
 def test_an_unusable_size_is_refused_at_once():
-    for size in ({"width": 63}, {"height": 0}, {"width": 129}):
+    for size in ((63, 120), (160, 0), (129, 120)):
         with pytest.raises(InputError, match="even number of at least 64"):
-            render(opening(0), NOTHING_SAID, **{**SMALL, **size})
+            Head(size=size).render(opening(0), NOTHING_SAID)
 
 
 @pytest.fixture(scope="module")
