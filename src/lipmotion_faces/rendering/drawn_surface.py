@@ -18,8 +18,8 @@ from lipmotion_faces.kernels.textured import (
     TexturedTriangles,
     draw_textured,
 )
-from lipmotion_faces.rendering.lighting import LEVELS, Finish, Lighting, tone_table
-from lipmotion_faces.rendering.rasteriser import Camera, Canvas, Colours, flat
+from lipmotion_faces.rendering.lighting import Finish, Lighting, tone_table
+from lipmotion_faces.rendering.rasteriser import Camera, Canvas, Colours, add_alpha, flat
 
 Real = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -64,10 +64,7 @@ class TexturedCanvas:
         area = self.camera.box(points)
         if area is not None:
             draw_textured(points, light, shine, self.surface, area, self._black, self._tone, picture, opacity)
-        partly = (opacity > 0) & (opacity < 255)
-        level = np.searchsorted(self._tone, picture[partly]) / (opacity[partly, None] / 255)
-        picture[partly] = self._tone[np.minimum(level, LEVELS - 1).astype(int)]
-        return np.concatenate([picture, opacity[..., None]], axis=2)
+        return add_alpha(picture, opacity, self._tone)
 
 
 Array = NDArray[np.float64]

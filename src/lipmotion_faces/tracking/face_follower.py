@@ -261,11 +261,6 @@ class _Scene:
         self._last, self.missing_frames = face, 0
         return face
 
-    def _keep_thumbnail(self, thumbnail: Array) -> None:
-        is_early = len(self.thumbnails) < MOST_THUMBNAILS
-        if is_early or _best_correlation([thumbnail], self.thumbnails) < NEW_LOOK_CORRELATION:
-            self.thumbnails.append(thumbnail)
-
     def is_near(self, before: _Scene) -> bool:
         """Return whether this scene's face begins where the one before ended."""
         return self._first is not None and before._last is not None and before._could_be(self._first, before._last)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faces.head.motions import NOTHING_SAID, opening
+from faces.head.motions import NOTHING_SAID, opening, parts_seen
 from lipmotion import Staging
 from lipmotion.errors import InputError
 from lipmotion_faces import make_face
@@ -47,7 +47,7 @@ def front() -> Stage:
 
 
 def areas(stage: Stage, **pose: Any) -> dict[str, int]:
-    return {name: int(mask.sum()) for name, mask in stage.parts_seen(CharacterPose(**pose)).items()}
+    return {name: int(mask.sum()) for name, mask in parts_seen(stage, CharacterPose(**pose)).items()}
 
 
 def test_closed_lips_show_nothing_of_the_mouth(front):
