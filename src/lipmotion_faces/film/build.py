@@ -72,12 +72,13 @@ class Take:
 
 
 def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
-    """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly.
+    """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened first.
 
     source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
                  training list
     recordings : of a corpus, the folder of the videos that it was prepared from
     speaker    : whose, where there are several people
+    A take that cannot be read may be among them: where it is tracked, the reason is reported.
     Raises InputError: no such file, several people, no such person, no videos, or a corpus without ``recordings``.
     """
     if not source.exists():
@@ -94,14 +95,6 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
         takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
     if not takes:
         raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
-    return _select_evenly(takes)
-
-
-def _select_evenly(takes: Sequence[Take]) -> list[Take]:
-    """Return takes of about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened before any is left out.
-
-    A take that cannot be read may be among them: where it is tracked, the reason is reported.
-    """
     durations_s = [_duration_s(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
     longest_s = left_s = MOST_FOOTAGE_S
     for number, duration_s in enumerate(sorted(durations_s)):

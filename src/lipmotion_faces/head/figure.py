@@ -176,12 +176,12 @@ class Figure:
     """
 
     def __init__(self) -> None:
-        self.skin = Skin()
+        self.skin = skin = Skin()
         self._eye, self._light = eyeball(), catchlights()
         left_brow, left_ear, ring, tongue_at_rest = brow(), ear(), earring(), tongue(REST)
         lash = np.zeros((3 * LASHES, 3))
         parts = [
-            self.skin.as_part(skin_colours(self.skin)),
+            Part("skin", skin.rest, skin.triangles, skin_colours(skin), palette.SKIN_FINISH, skin.normals),
             part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
             lower_teeth(), upper_teeth(),
             self._eye, self._eye.mirror("right eye"), self._light, replace(self._light, name="right catchlights"),

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from lipmotion.meshes.model.surface import compute_normals
-from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion_faces.head.lips import (
@@ -23,7 +22,6 @@ from lipmotion_faces.head.lips import (
     lip_surface,
     section_points,
 )
-from lipmotion_faces.head.part import Part
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.rendering.lighting import unit
 
@@ -150,10 +148,6 @@ class Skin:
         first = self._first_lid + eye * LID_RINGS * LID_COLUMNS
         inner = first + np.arange(LID_RINGS * LID_COLUMNS).reshape(LID_RINGS, LID_COLUMNS)
         return np.concatenate([inner, outer[None]])
-
-    def as_part(self, colours: Real) -> Part:
-        """Return the skin at rest with the diffuse reflection of its vertices, linear [shape=(V, 3)]."""
-        return Part("skin", self.rest, self.triangles, colours, palette.SKIN_FINISH, self.normals)
 
     def pose(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""

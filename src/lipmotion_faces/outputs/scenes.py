@@ -52,8 +52,9 @@ class SceneOutput(Output):
         return SCENE_SUFFIXES
 
     def check(self) -> None:  # noqa: D102
-        if self.settings.recording is not None:
-            check_sound_name(self.path, self.settings.recording)
+        sound = self.settings.recording
+        if sound is not None and self.path.suffix.lower() == USD:
+            asset(sound_reference(sound, self.path))  # refuses names that such a file cannot hold
 
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         check_drawable(self.path, performance.generation.motion)
@@ -189,9 +190,3 @@ def character_scene(
     hertz = rate if frames is not None else rate_hz or rate
     shown = sample_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
     return Scene(character.mesh, Motion(shown[kept], hertz, channels), original=character.file)
-
-
-def check_sound_name(path: Path, sound: Path) -> None:
-    """Raise ExportError if a scene cannot refer to a sound: its name holds what ``.usda`` cannot."""
-    if path.suffix.lower() == USD:
-        asset(sound_reference(sound, path))
