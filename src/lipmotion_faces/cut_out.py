@@ -68,9 +68,9 @@ def read_cut_out(folder: Path) -> CutOut:
     Raises InputError: a shape from A to F is missing or drawn twice, a picture cannot be read, or their sizes differ.
     """
     files = picture_files(folder)
-    named = {path: found[1].lower() for path in files if (found := _NAME.search(path.stem))}
+    named = {path: match[1].lower() for path in files if (match := _NAME.search(path.stem))}
     readings = (_shapes(named, names) for names in (LETTERS, BLAIR))
-    chosen = max(readings, key=lambda found: len(found.keys() & set(REQUIRED)))
+    chosen = max(readings, key=lambda reading: len(reading.keys() & set(REQUIRED)))
     missing = [name for name in REQUIRED if name not in chosen]
     if missing:
         names = " ".join(f"{name}.png" for name in missing)
@@ -94,16 +94,16 @@ def read_cut_out(folder: Path) -> CutOut:
 
 def _shapes(named: Mapping[Path, str], names: Mapping[str, str]) -> dict[str, Path]:
     """Return the pictures by the letters of their shapes. Raises InputError: two of one shape."""
-    found: dict[str, Path] = {}
+    shapes: dict[str, Path] = {}
     for path, name in named.items():
         shape = names.get(name)
-        if shape is None or (name == "wq" and shape in found):
+        if shape is None or (name == "wq" and shape in shapes):
             continue
-        if shape in found and named[found[shape]] != "wq":
-            other = found[shape].name
+        if shape in shapes and named[shapes[shape]] != "wq":
+            other = shapes[shape].name
             raise InputError(f"{path}: a second picture of the mouth shape {shape}, beside {other}; keep one")
-        found[shape] = path
-    return found
+        shapes[shape] = path
+    return shapes
 
 
 def _read(path: Path) -> Picture:

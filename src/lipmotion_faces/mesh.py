@@ -264,6 +264,6 @@ class MeshStage:
         rows, kinds = self._drawn.rows[chosen], self._drawn.kinds[chosen]
         facing, colours = normals[rows] * self._drawn.sides[chosen, None], self._drawn.colours[chosen]
         at, viewer, lighting = places[rows], self._canvas.camera.place, self._drawn.lighting
-        whole = lighting.light(at, facing, colours, kinds, viewer)
+        light = lighting.light(at, facing, colours, kinds, viewer)
         shine = lighting.light(at, facing, np.zeros_like(colours), kinds, viewer)
-        return whole - shine, shine
+        return light - shine, shine

@@ -172,8 +172,8 @@ def _choose_names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
     """
     known = [name for name in corpus.speakers if name]
     if (speaker and speaker not in known) or (not speaker and len(corpus.speakers) > 1):
-        found = f"no speaker {speaker!r}" if speaker else f"{len(corpus.speakers)} speakers"
-        raise InputError(f"{where}: {found}, required one of: {', '.join(known)}; name it (--onto-speaker)")
+        problem = f"no speaker {speaker!r}" if speaker else f"{len(corpus.speakers)} speakers"
+        raise InputError(f"{where}: {problem}, required one of: {', '.join(known)}; name it (--onto-speaker)")
     speakers = [speaker] if speaker else []
     names = corpus.names("train", speakers) or corpus.names(None, speakers)
     if not names:

@@ -110,11 +110,11 @@ class Refiner:
     options: RefinementOptions = STEADY
 
     def __post_init__(self) -> None:
-        wanted, found = (len(self.eigenlips.channels), self.eigenlips.size), self.candidates
-        if (found.coefficients.shape[1], found.size) != wanted:
+        wanted, candidates = (len(self.eigenlips.channels), self.eigenlips.size), self.candidates
+        if (candidates.coefficients.shape[1], candidates.size) != wanted:
+            counts = f"{candidates.coefficients.shape[1]} coefficients and {candidates.size} px"
             raise InputError(
-                f"candidates of {found.coefficients.shape[1]} coefficients and {found.size} px, required {wanted[0]} "
-                f"and {wanted[1]} px; make them with the same eigenlips"
+                f"candidates of {counts}, required {wanted[0]} and {wanted[1]} px; make them with the same eigenlips"
             )
 
     def refine(self, coefficients: Values) -> Pictures:

@@ -85,8 +85,8 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
         raise InputError(f"{source}: no such file or folder; give a video of the person, or a folder of videos")
     if source.is_file():
         check_source(source, "video")
-        whole = SourceRecording(source.stem, source, None, speaker=speaker)
-        return [_make_take(whole, source.parent, seconds=MOST_FOOTAGE_S)]
+        recording = SourceRecording(source.stem, source, None, speaker=speaker)
+        return [_make_take(recording, source.parent, seconds=MOST_FOOTAGE_S)]
     if (source / MANIFEST).is_file():
         takes = _list_corpus(Corpus.open(source), recordings, speaker)
     else:
@@ -116,9 +116,9 @@ def _select_person(items: Sequence[SourceRecording], speaker: str, where: str) -
     """Return the recordings of one person. Raises InputError: there are several people, or no such person."""
     people = sorted({item.speaker for item in items})
     if (speaker and speaker not in people) or (not speaker and len(people) > 1):
-        found = f"no speaker {speaker!r}" if speaker else f"{len(people)} speakers"
+        problem = f"no speaker {speaker!r}" if speaker else f"{len(people)} speakers"
         known = ", ".join(name or "one without a name" for name in people)
-        raise InputError(f"{where}: {found}, a face is that of one person; name it (--speaker): {known}")
+        raise InputError(f"{where}: {problem}, a face is that of one person; name it (--speaker): {known}")
     return [item for item in items if not speaker or item.speaker == speaker]
 
 

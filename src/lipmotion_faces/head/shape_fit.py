@@ -68,8 +68,8 @@ class _MouthFit:
         weights = fit_bounded_curves(self._triangle.T, targets, COSTS)
         jaw, close = names.index("jawOpen"), names.index("mouthClose")
         weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
-        kept = [name for name in names if not name.startswith(PARTING)]
-        weights = with_gap(with_gap(weights, self._shapes, gap, kept), self._shapes, gap)
+        others = [name for name in names if not name.startswith(PARTING)]
+        weights = with_gap(with_gap(weights, self._shapes, gap, others), self._shapes, gap)
         return dict(zip(names, weights.T, strict=True)) | fixed
 
     def _wanted(self, poses: Sequence[CharacterPose]) -> tuple[Real, Real]:

@@ -77,8 +77,8 @@ def delivered_scene(performance: Performance, frames: slice | None = None) -> Sc
     if weights is None or not delivery.hold_ms:
         return scene
     states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
-    whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
-    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
+    held = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
+    steps = held_mouth(held, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
     return replace(scene, weights=steps.motion, stepped=steps.stepped)
 
 
@@ -123,7 +123,7 @@ def head_scene(
 
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
-    around, kept = _around(frames, MARGIN)
+    around, wanted = _around(frames, MARGIN)
     if frames is None:
         mouth = spoken_mouth(motion, units, hertz)
     else:  # made of the frames around those that are wanted
@@ -140,10 +140,10 @@ def head_scene(
     table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
     weights = edited_weights(Motion(table, hertz, channels), units, generation.curve_edits)
-    weights = replace(weights, values=weights.values[around][kept])
+    weights = replace(weights, values=weights.values[around][wanted])
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
-    turns = head_quaternions(np.stack([pose.turn for pose in poses]))[kept]
+    turns = head_quaternions(np.stack([pose.turn for pose in poses]))[wanted]
     return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
 
 
@@ -172,21 +172,21 @@ def character_scene(
     Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
     """
     motion, units, rate = generation.motion, generation.units, generation.motion.rate_hz
-    around, kept = _around(frames, MOUTH_MARGIN)
+    around, wanted = _around(frames, MOUTH_MARGIN)
     is_part = frames is not None and (around.start > 0 or around.stop < len(motion.values))
-    part, said, there = add_rest(motion, units, around) if is_part else (motion, units, slice(None))
-    solved, mouth = character.weights(part, said), spoken_mouth(with_mouth(part), said)
+    part, phones, there = add_rest(motion, units, around) if is_part else (motion, units, slice(None))
+    solved, mouth = character.weights(part, phones), spoken_mouth(with_mouth(part), phones)
     table = np.zeros((len(motion.values), len(solved.names)))
     table[around] = solved.values[there]
     known = known_names(character.mesh)
     weights = edited_weights(replace(solved, values=table), units, generation.curve_edits, known)
     living = compute_living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
-    beside = character.weigh_others(others, len(living.values))
-    beside = {name: curve for name, curve in beside.items() if name not in weights.names}
-    beside |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
-    rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in beside.values())], axis=1)
-    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
+    extra = character.weigh_others(others, len(living.values))
+    extra = {name: curve for name, curve in extra.items() if name not in weights.names}
+    extra |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
+    rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in extra.values())], axis=1)
+    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in extra)
     hertz = rate if frames is not None else rate_hz or rate
     shown = sample_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
-    return Scene(character.mesh, Motion(shown[kept], hertz, channels), original=character.file)
+    return Scene(character.mesh, Motion(shown[wanted], hertz, channels), original=character.file)

@@ -48,10 +48,10 @@ class SessionPictures:
         staging, delivery = edits.staging(), edits.delivery()
 
         def make_drawing() -> DrawsSingly:
-            found = stage_face(face, staging, moved_prosody(self._prosody, delivery))
-            if not isinstance(found, DrawsSingly):
+            drawing = stage_face(face, staging, moved_prosody(self._prosody, delivery))
+            if not isinstance(drawing, DrawsSingly):
                 raise InputError(f"the face {face!r} draws no single pictures; write a video")
-            return found
+            return drawing
 
         def draw() -> DrawnMotion[Any]:
             seen = shown(self._session.generated(edits), delivery, fps)

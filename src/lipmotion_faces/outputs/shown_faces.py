@@ -168,9 +168,9 @@ class ShownPerson(_WithHead):
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
         """Log a warning where tags in the words ask for a mood; ``make_film`` names the channels that are needed."""
-        asked = [key.label for key in generation.moods if key.mood in MOODS]
-        if asked:
-            LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
+        moods = [key.label for key in generation.moods if key.mood in MOODS]
+        if moods:
+            LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(moods))
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings = performance.settings

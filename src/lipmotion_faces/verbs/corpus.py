@@ -101,8 +101,8 @@ def run_offset(options: argparse.Namespace) -> None:
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion.speech.sound.sound_offset import sound_offset
 
-    found = sound_offset(read_audio(options.camera), read_audio(options.recorder))
-    print_line(f"--offset-ms {found.late_s * 1000:.1f}  (by {found.how}; levels correlate by {found.alike:.2f})")
+    offset = sound_offset(read_audio(options.camera), read_audio(options.recorder))
+    print_line(f"--offset-ms {offset.late_s * 1000:.1f}  (by {offset.how}; levels correlate by {offset.alike:.2f})")
 
 
 def run_prompts(options: argparse.Namespace) -> None:
@@ -133,13 +133,13 @@ def run_coverage(options: argparse.Namespace) -> None:
     from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines
 
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    found = coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)
+    result = coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)
     if options.json:
-        print_json(coverage_document(found))
+        print_json(coverage_document(result))
     else:
-        for line in coverage_lines(found, max(options.count, 0)):
+        for line in coverage_lines(result, max(options.count, 0)):
             print_line(line)
-    if found.left_out and not options.json:
-        print_error(f"warning: left out {len(found.left_out)} sentences for their words (--json has them)")
-    if found.unknown and not options.json:
-        print_error(f"warning: {found.unknown} utterances without known words or phones were not counted")
+    if result.left_out and not options.json:
+        print_error(f"warning: left out {len(result.left_out)} sentences for their words (--json has them)")
+    if result.unknown and not options.json:
+        print_error(f"warning: {result.unknown} utterances without known words or phones were not counted")

@@ -98,5 +98,5 @@ def _encode(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction
             picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if has_alpha else "rgb24")
             return picture.reformat(format=pixels, dst_colorspace="itu709")
 
-        parts = (part for given in chain(sound_parts(audio), [None]) for part in resampler.resample(given))
+        parts = (part for sound_part in chain(sound_parts(audio), [None]) for part in resampler.resample(sound_part))
         mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, parts)
