@@ -139,10 +139,7 @@ def _open(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]
 def _list_takes(
     opened: _Opened, where: str, speaker: str, speech: Request | None
 ) -> Iterator[tuple[str, Request, Track | Model]]:
-    """Yield recordings of a person: name, request, and the tracked motion, or the model that generates it.
-
-    Raises InputError: several people, or no such speaker; no speech for a model.
-    """
+    """Yield recordings of a person: name, request, and the tracked motion, or the model that generates it."""
     if isinstance(opened, Model):
         if speech is None:
             raise InputError("the person of a model is measured in some speech; give a request (speech=...)")
@@ -166,10 +163,7 @@ def _list_takes(
 
 
 def _choose_names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
-    """Return the utterances of one person: those of the training list if there are any.
-
-    Raises InputError: there are several people, no such person, or no utterances.
-    """
+    """Return the utterances of one person: those of the training list if there are any."""
     known = [name for name in corpus.speakers if name]
     if (speaker and speaker not in known) or (not speaker and len(corpus.speakers) > 1):
         problem = f"no speaker {speaker!r}" if speaker else f"{len(corpus.speakers)} speakers"

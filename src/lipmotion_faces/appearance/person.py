@@ -208,9 +208,7 @@ class Appearance:
         return FaceCodes(mouth, values[:, count:-1], values[:, -1])
 
     def _mix_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
-        """Return mixtures of recorded mouths [shape=(T, 90)] that look as predicted and are as open and as wide as the
-        motion, as far as this person has been; in closures, recorded mouths that are closed.
-        """
+        """Return recorded mouths, mixed to look as predicted and be as open and wide as the motion [shape=(T, 90)]."""
         measured = self.mouth_distances
         if measured is None:
             return draw_to_recorded(predicted, self.mouth_codes)

@@ -303,10 +303,7 @@ def cloning_system(mask: Mask) -> CloningSystem:
 
 
 def _solve_response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
-    """Return the membrane at the nodes for a difference of 1 at each pixel of the edge [shape=(K, B)].
-
-    Of all functions that the grids can interpolate, it is the one of the least energy (Galerkin's method).
-    """
+    """Return the membrane at the nodes for 1 at each pixel of the edge [shape=(K, B)], by Galerkin's method."""
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import splu
 

@@ -167,10 +167,7 @@ class Refiner:
         return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
 
     def _nearest(self, wanted: Costs) -> tuple[Index, Costs]:
-        """Return the nearest candidates of each frame, nearest first, and their costs [each shape=(C, T, n)].
-
-        C is 1 if all colours have one candidate, otherwise 3; n is the number of neighbours.
-        """
+        """Return the nearest candidates of each frame, in order, and their costs [shape=(1 or 3, T, n), both]."""
         count = min(self.options.neighbours, len(self.candidates))
         frames = wanted.shape[1]
         rows = 1 if self.options.together else len(COLOURS)

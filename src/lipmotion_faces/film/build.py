@@ -152,10 +152,7 @@ def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[
 
 
 def _find_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
-    """Return the file from which an utterance was prepared, of those of its name; None: it is not among them.
-
-    People of a corpus may share names of files: size and, of several files, content tell which one is meant.
-    """
+    """Return the file of an utterance, of those of its name: people of a corpus may share names of files."""
     size = stated.get("bytes")
     same = [file for file in files if size is None or str(file.stat().st_size) == str(size)]
     if len(same) > 1 and "sha256" in stated:

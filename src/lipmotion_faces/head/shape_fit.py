@@ -101,11 +101,7 @@ def _edges(moved: Real) -> tuple[Real, Real]:
 
 
 def _rows(lips: Real, around: Real) -> Real:
-    """Return displacements of the skin as rows of a least squares problem: places around the mouth, and gaps.
-
-    lips   : of the rings [shape=(..., RINGS, COLUMNS, 3)]
-    around : of vertices around the mouth [shape=(..., N, 3)]
-    """
+    """Return displacements of lips and of the skin around them as rows of a least squares problem, with gaps."""
     upper, lower = _edges(lips)
     shape = (*lips.shape[:-3], -1)
     visible = lips[..., :VISIBLE_RINGS, :, :].reshape(shape)

@@ -168,10 +168,7 @@ class Skin:
         return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
 
     def _bind(self, fill: Real) -> Binding:
-        """Return how every vertex of the face is bound to the columns of the lips, and to the jaw.
-
-        fill : the last of them, between mouth, eyes and the back of the head
-        """
+        """Return how vertices of the face, of which ``fill`` are the last, are bound to columns of the lips and jaw."""
         contour, face = self._contour, self.face
         away = face[:, None, :2] - contour[None, :, :2]
         nearest, across = cKDTree(contour[:, :2]).query(face[:, :2])[0], np.linalg.norm(away, axis=2)
