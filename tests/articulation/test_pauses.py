@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.articulation.pauses import (
+from lipmotion.articulation.rest import (
     BREATH_GAP,
     INHALING_GAP,
     LAUGH_GAP,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from lipmotion.articulation.symmetry import make_symmetrical
+from lipmotion.articulation.lip_points import make_symmetrical
 from meshes.speech import motion
 
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lipmotion.articulation.contact import gap_to_opening
-from lipmotion.articulation.crossfade import crossfade_phones
 from lipmotion.articulation.cue_sheets import CueSheet
 from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.phone_targets import crossfade_phones
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import papagayo, rhubarb, spine
 from lipmotion.printable import is_line
