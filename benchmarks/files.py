@@ -30,7 +30,7 @@ from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
 from lipmotion.types import Generation
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
-from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.shape_fit import mouth_weights
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, head_scene, write_scene

@@ -17,8 +17,8 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import find_closings
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
-from lipmotion_lab.evaluation.figures import BILABIAL
-from lipmotion_lab.evaluation.held_out import ComparedClip, compared_clips, held_out_recordings
+from lipmotion_lab.evaluation.evaluate import BILABIAL
+from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
 from lipmotion_lab.folds import folds, table
 from lipmotion_lab.runner import ExperimentSettings
 
@@ -30,7 +30,6 @@ OPENING_ROW = (
     *("score", "precision", "timing_ms", "closings", "generated_closings", "recall_p_b_m", "p_b_m"),
     *("acc", "nrmse", "global_variance"),
 )
-LIPS = {"false_per_minute": 1.0, "original_per_minute": 2.0}
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +47,8 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
         model = train(
             toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=PHONE_MODELS
         )[0]
-        found = held_out_recordings(
-            toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out))
-        )
-        made += compared_clips(found, "with transcript", model.engine, model.learned)
+        found = load_held_out(toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out)))
+        made += generate_clips(found, "with transcript", model.engine, model.learned)
     return made
 
 
@@ -141,14 +138,14 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
         return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1, utterances=[]))
 
     monkeypatch.setattr(module, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", lambda clips, *_: {"clips": clips, "closures_p_b_m": LIPS})
-    monkeypatch.setattr(module, "opening_row", lambda figures: {"clips": sorted(figures["clips"])})
+    monkeypatch.setattr(module, "figures_of", lambda clips, *_: sorted(clips))
+    monkeypatch.setattr(module, "opening_row_with_rates", lambda figures: {"clips": figures})
     figures = folds(toy_corpus, count=3)
     assert sorted(name for held_out in cut for name in held_out) == sorted(toy_corpus.names("train"))
     assert [len(held_out) for held_out in cut] == [3, 3, 2]
     assert (figures["trained_on"], figures["closed_under"]) == ([5, 5, 6], 0.1)
     wanted = [f"{name} audio only" for name in sorted(toy_corpus.names("train"))]
-    assert figures["conditions"] == {"audio only": {"clips": wanted} | LIPS}
+    assert figures["conditions"] == {"audio only": {"clips": wanted}}
     first = cut[:]
     cut.clear()
     folds(toy_corpus, count=3, settings=ExperimentSettings(seed=1))
@@ -172,13 +169,12 @@ def test_finished_parts_are_not_generated_again(
     def run(work: Path | None) -> dict[str, Any]:
         return folds(toy_corpus, count=2, by_speaker=False, work=work)
 
-    def told(clips: Sequence[ComparedClip], *_: object) -> dict[str, Any]:
-        parts = [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
-        return {"clips": parts, "closures_p_b_m": LIPS}
+    def as_lists(clips: Sequence[ComparedClip], *_: object) -> list[Any]:
+        return [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
 
     monkeypatch.setattr(module, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", told)
-    monkeypatch.setattr(module, "opening_row", lambda figures: {"clips": figures["clips"]})
+    monkeypatch.setattr(module, "figures_of", as_lists)
+    monkeypatch.setattr(module, "opening_row_with_rates", lambda figures: {"clips": figures})
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path)
     again = run(tmp_path)
@@ -208,8 +204,9 @@ def test_by_speaker_everybody_is_a_stranger_once(
         return SimpleNamespace(used=names, clips={CONDITIONS[0]: clips}, recordings=recordings)
 
     monkeypatch.setattr(module, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", lambda *_: {"closures_p_b_m": LIPS})
-    monkeypatch.setattr(module, "opening_row", lambda _: dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6]})
+    row = dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6], "false_per_minute": 1.0, "original_per_minute": 2.0}
+    monkeypatch.setattr(module, "figures_of", lambda *_: {})
+    monkeypatch.setattr(module, "opening_row_with_rates", lambda _: row)
     figures = folds(corpus, by_speaker=True)
     assert sorted(map(sorted, left_out)) == [[""], ["anna"], ["ben"], ["eve"]]
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(

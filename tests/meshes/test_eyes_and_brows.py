@@ -15,7 +15,7 @@ from lipmotion.types import WEIGHT, Channel, Motion, Timeline
 from lipmotion.types.moods import moods_of
 from lipmotion.types.motion import RADIAN
 from lipmotion_faces.base import stage_liveliness
-from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import head_poses
 
 TIME_S = np.arange(60) / 30
 TALK = Motion(0.1 * np.sin(9 * TIME_S)[:, None] ** 2, 30.0, (Channel("opening"),))

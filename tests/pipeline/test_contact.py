@@ -26,11 +26,11 @@ from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.moods import MOODS
 from lipmotion.units import closing_phones
-from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.shape_fit import lip_gap
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
-from lipmotion_faces.portrait.drawn_frames import face_poses
+from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units

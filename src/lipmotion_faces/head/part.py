@@ -36,7 +36,7 @@ class Part:
     normals: Real
     strands: Real | None = None
 
-    def mirrored(self, name: str) -> Part:
+    def mirror(self, name: str) -> Part:
         """Return the same part on the other side of the face."""
         flip = np.array([-1.0, 1.0, 1.0])
         strands = None if self.strands is None else self.strands * flip
@@ -54,7 +54,7 @@ def part(
     return Part(name, places, triangles, colours, finish, compute_normals(places, triangles), strands)
 
 
-def joined_parts(name: str, parts: list[Part]) -> Part:
+def join_parts(name: str, parts: list[Part]) -> Part:
     """Return several parts of one finish as one."""
     offsets = np.cumsum([0, *(len(each.places) for each in parts)])
     triangles = [each.triangles + offset for each, offset in zip(parts, offsets, strict=False)]

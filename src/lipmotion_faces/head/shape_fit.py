@@ -13,7 +13,7 @@ from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.head.figure import Figure
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
-from lipmotion_faces.head.pose import CharacterPose, stacked
+from lipmotion_faces.head.pose import CharacterPose, stack_poses
 from lipmotion_faces.head.skin import REST
 
 Real = NDArray[np.float64]
@@ -36,7 +36,7 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     mesh : of this figure, from ``head_mesh``
     The middles of the lips are apart as in the pose.
     """
-    return _mouth_fit(figure, mesh).weights(poses)
+    return _cached_fit(figure, mesh).weights(poses)
 
 
 class _MouthFit:
@@ -47,7 +47,7 @@ class _MouthFit:
         names = [name for name in mesh.shape_names if not name.startswith(_NOT_OF_LIPS)]
         moved = mesh.displacements(np.arange(len(figure.skin.rest)))
         around = np.flatnonzero(figure.skin.lip_weight > 0)[::3]
-        self._around, rings = figure.skin.binding.only(around), figure.skin.lip_rows()
+        self._around, rings = figure.skin.binding.select(around), figure.skin.lip_rows()
         every = _rows(moved[:, rings], moved[:, around])
         rows = {name: every[mesh.shape_names.index(name)] for name in (*names, *FROM_POSE)}
         # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
@@ -76,14 +76,12 @@ class _MouthFit:
         """Return poses as what the shapes span [shape=(T, S)], and by how much they part the lips [shape=(T,)]."""
         lips, around = (
             places - rest
-            for places, rest in zip(self._skin.lips_and_face(stacked(poses), self._around), self._rest, strict=True)
+            for places, rest in zip(self._skin.lips_and_face(stack_poses(poses), self._around), self._rest, strict=True)
         )
         return _rows(lips, around) @ self._spanned, lip_gap(lips)
 
 
-@lru_cache(maxsize=2)
-def _mouth_fit(figure: Figure, mesh: Mesh) -> _MouthFit:
-    return _MouthFit(figure, mesh)
+_cached_fit = lru_cache(maxsize=2)(_MouthFit)
 
 
 def lip_gap(moved: Real) -> Real:

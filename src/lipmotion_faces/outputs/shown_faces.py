@@ -25,7 +25,7 @@ from lipmotion_faces.film.filmed_video import (
     RENDERING,
     Film,
     check_film,
-    film_of,
+    make_film,
     person_shown,
     refuse_film,
     write_film,
@@ -169,7 +169,7 @@ class ShownPerson(_WithHead):
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
-        """Log a warning where tags in the words ask for a mood; ``film_of`` names the channels that the face needs."""
+        """Log a warning where tags in the words ask for a mood; ``make_film`` names the channels that are needed."""
         asked = [key.label for key in generation.moods if key.mood in MOODS]
         if asked:
             LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
@@ -182,7 +182,7 @@ class ShownPerson(_WithHead):
     def film(self, performance: Performance) -> Film:
         """Return the video, which is made while it is read. Raises InputError: the motion lacks channels."""
         settings, seen = performance.settings, performance.cached(_seen)
-        return film_of(
+        return make_film(
             self.face,
             seen.motion,
             speech=settings.recording,
