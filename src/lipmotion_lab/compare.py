@@ -190,7 +190,7 @@ def _channel_figures(
         "jerk": curves.jerk_ratio(generated, reference),
         "modulation_db": modulation_distance_db(generated, reference, rate_hz),
     }
-    moves = curves.moving(reference, [channel.unit for channel in channels])
+    moves = curves.select_moving(reference, [channel.unit for channel in channels])
     rows = {
         channel.name: {
             "unit": channel.unit,

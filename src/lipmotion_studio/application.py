@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from lipmotion.formats.web_page import coloured
+from lipmotion.formats.web_page import colour_code
 from lipmotion_studio.folder import RevisionError
 from lipmotion_studio.project_replies import ProjectReplies
 from lipmotion_studio.recording_replies import RecordingReplies
@@ -56,7 +56,7 @@ def read_page(folder: Traversable, before: str = "") -> Iterator[tuple[str, tupl
         elif kind is not None:
             content = each.read_bytes()
             if each.name.endswith(".css"):
-                content = coloured(content.decode("utf-8")).encode()
+                content = colour_code(content.decode("utf-8")).encode()
             yield f"{before}{each.name}", (content, kind)
 
 

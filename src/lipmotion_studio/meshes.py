@@ -9,7 +9,7 @@ import numpy as np
 
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.errors import InputError, shortened
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
@@ -61,7 +61,7 @@ class Faces:
             if name not in self.names:
                 raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
             path = self._characters.get(name)
-            face = name if path is None else path if self.is_filmed(name) else MeshFace(driven_character(path))
+            face = name if path is None else path if self.is_filmed(name) else MeshFace(load_character(path))
             self._shown[name] = shown_face(face)
         return self._shown[name]
 

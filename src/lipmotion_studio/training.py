@@ -17,7 +17,7 @@ from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.registry import DEFAULT
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.extensions import provided
-from lipmotion.formats.label_files import label_files_beside
+from lipmotion.formats.label_files import find_label_files
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.model import Model, load_model, save_model
@@ -158,7 +158,7 @@ def gather_recordings(order: TrainingOrder) -> Iterator[Path]:
                     with whole_file(place / f"{stem}.txt") as text:
                         text.write_text(recording.transcript, encoding="utf-8")
                     continue
-                for labels in label_files_beside(recording.path):
+                for labels in find_label_files(recording.path):
                     _put(labels, place / f"{stem}{labels.name[len(recording.path.stem) :]}")
             yield place
         finally:

@@ -34,9 +34,8 @@ def test_the_directions_are_those_of_the_standard(parameters):
 
 def test_a_gap_is_its_share_of_the_unit(parameters):
     apart = -(parameters["fap4_lower_t_midlip"][75] + parameters["fap5_raise_b_midlip"][75])
-    assert apart / STEPS * MOUTH_TO_NOSE == pytest.approx(
-        float(opening_to_gap(motion()["opening"][75:76])[0]), abs=0.002
-    )
+    gap = opening_to_gap(motion()["opening"][75:76].astype(np.float64))
+    assert apart / STEPS * MOUTH_TO_NOSE == pytest.approx(float(gap[0]), abs=0.002)
 
 
 def test_values_are_whole(parameters):

@@ -222,7 +222,7 @@ def spoken_mouth(
         gap = _articulate(gap, weights, motion.time_s)
     gap = close_lips(gap, motion, units)
     expressed = _express(mood, weights)
-    oval = weights[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
+    weights[OVAL] = weights[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
     thickness, fullness = _thickness(motion), 1 - 0.4 * np.clip(opening, 0, 0.4)
     if thickness is not None and rest.thickness is not None:
         fullness = np.clip(thickness / rest.thickness, 0.75, 1.25)
@@ -233,11 +233,10 @@ def spoken_mouth(
     mouth = SpokenMouth(
         motion.rate_hz,
         gap,
-        _widen(motion, rest, weights | expressed, oval),
+        _widen(motion, rest, weights | expressed),
         fullness * (1 - TIGHT_FULLNESS * expressed["tight"]),
         jaw * (1 - TUCKED_CHIN_SHARE * weights["lip_tuck"]),
-        *(weights[name] for name in (*GESTURES, "pursed")),
-        oval,
+        *(weights[name] for name in (*GESTURES, "pursed", OVAL)),
         **{name: expressed[name] for name in EXPRESSED},
     )
     return mouth if fps is None else mouth.at(fps)
@@ -311,7 +310,7 @@ def _articulate(gap: Curve, weights: dict[str, Curve], time_s: Curve) -> Curve:
     return np.minimum(gap, np.minimum(after, before))
 
 
-def _widen(motion: Motion, rest: MouthAtRest, weights: dict[str, Curve], oval: Curve) -> Curve:
+def _widen(motion: Motion, rest: MouthAtRest, weights: dict[str, Curve]) -> Curve:
     across = _width(motion)
     if across is None or rest.width is None:
         change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
@@ -320,7 +319,7 @@ def _widen(motion: Motion, rest: MouthAtRest, weights: dict[str, Curve], oval: C
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
     for name, wider in (("smile", SMILE_WIDTH), ("stretched", STRETCH_WIDTH), ("dropped", DROPPED_WIDTH)):
         width = width + wider * weights[name]
-    for weight, limit in ((weights["protrusion"], ROUND_WIDTH), (weights["pursed"], PURSED_WIDTH), (oval, OVAL_WIDTH)):
-        width = width + weight * (np.minimum(width, limit) - width)
+    for name, limit in (("protrusion", ROUND_WIDTH), ("pursed", PURSED_WIDTH), (OVAL, OVAL_WIDTH)):
+        width = width + weights[name] * (np.minimum(width, limit) - width)
     spread = weights["spread"] * (1 - weights["protrusion"])
     return np.asarray(width + spread * (np.maximum(width, SPREAD_WIDTH) - width))

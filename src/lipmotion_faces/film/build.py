@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import read_entry
-from lipmotion.corpora.source_recordings import SourceRecording, video_files
+from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
 from lipmotion.corpora.store import MANIFEST, Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.threads import one_thread
@@ -138,7 +138,7 @@ def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[
     if not recordings.is_dir():
         raise InputError(f"{recordings}: no such folder; give the one of the videos of the corpus")
     files: dict[str, list[Path]] = {}
-    for path in video_files(recordings.rglob("*")):
+    for path in filter_videos(recordings.rglob("*")):
         files.setdefault(path.name, []).append(path)
     items, collections = [], {}
     for name in corpus.names("train") or corpus.names():

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import FULL_DEFICIT_GAP, closed_lips, gap_in, in_pictures, opening_of
+from lipmotion.articulation.contact import FULL_DEFICIT_GAP, close_lips, gap_to_opening, read_gap, sample_pictures
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.eigenlips import Eigenlips
@@ -194,16 +194,16 @@ def face_codes(
 ) -> FaceCodes:
     """Return what the lower face is like in ``count`` frames at the rate of a video.
 
-    units : the phones in time; in every p, b and m the lips touch (``contact.closed_lips``)
+    units : the phones in time; in every p, b and m the lips touch (``contact.close_lips``)
     Raises InputError: motion without the channels that the face needs.
     """
     time_s = np.arange(count) / rate_hz
     values, contact = motion.at(time_s), None
     if "opening" in motion.names and np.isfinite(motion.values).all():
-        gap = closed_lips(gap_in(motion), motion, units)
-        gap = in_pictures(gap, gap == 0, motion.rate_hz, time_s)
+        gap = close_lips(read_gap(motion), motion, units)
+        gap = sample_pictures(gap, gap == 0, motion.rate_hz, time_s)
         column = motion.column("opening")
-        values[:, column] = np.minimum(values[:, column], opening_of(gap))
+        values[:, column] = np.minimum(values[:, column], gap_to_opening(gap))
         contact = 1 - np.clip(gap / FULL_DEFICIT_GAP, 0, 1)  # how near the lips are to touching
     shown = Motion(values, rate_hz, motion.channels)
     if eigenlips is None or not all(channel in shown.channels for channel in eigenlips.channels):

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.surface import normals_of
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.surface import compute_normals
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
 from lipmotion_faces.head.forms import EYE
@@ -138,7 +138,7 @@ def skin_colours(skin: Skin) -> Real:
         for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
             upper = lids[ring, LID_SIDE > 0]
             colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
-    return linear(colour)
+    return decode_srgb(colour)
 
 
 PIVOT = np.array([0.0, -0.75, -0.9])
@@ -222,7 +222,7 @@ class Figure:
         places, normals = self._places.copy(), self._normals.copy()
         places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.pose(pose)
         places[self.rows["tongue"]] = tongue(pose)
-        normals[self.rows["tongue"]] = normals_of(places[self.rows["tongue"]], tongue_triangles())
+        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], tongue_triangles())
         places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], lower_drop(pose))
         for name in ("brow", "right brow"):
             places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)

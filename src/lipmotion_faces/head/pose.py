@@ -11,7 +11,7 @@ from lipmotion.articulation.liveliness import CALM, Liveliness, UpperFace
 from lipmotion.articulation.mouth import SpokenMouth, spoken_mouth, upper_share
 from lipmotion.articulation.phone_targets import TIP_UP
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion_faces.base import Staging, alive
+from lipmotion_faces.base import Staging, stage_liveliness
 
 SPREAD_RISE = 0.52
 """Part of the gap by which the upper lip rises where lips are spread: the upper teeth show more than the lower ones."""
@@ -85,7 +85,7 @@ def head_poses(
     Raises InputError: as ``spoken_mouth``.
     """
     mouth = spoken_mouth(motion, units, fps)
-    return pose_head(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
+    return pose_head(mouth, stage_liveliness(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
 
 
 def pose_head(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:

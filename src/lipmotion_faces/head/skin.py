@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
-from lipmotion.meshes.model.surface import normals_of
+from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
@@ -130,7 +130,7 @@ class Skin:
         self.binding = self._bind(fill)
         self._columns = self.binding.select(np.arange(COLUMNS))
         self.rest = self.places(REST)
-        self._meshed_rest = normals_of(self.rest, self.triangles)
+        self._meshed_rest = compute_normals(self.rest, self.triangles)
         self.normals = self._meshed_rest.copy()
         self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
         self._before_lips = outward(head, contour)
@@ -158,7 +158,7 @@ class Skin:
     def pose(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
         places = self.places(pose)
-        change = normals_of(places, self.triangles) - self._meshed_rest
+        change = compute_normals(places, self.triangles) - self._meshed_rest
         normals = self.normals + self._calm * change
         rows, closed = self.lip_rows(), closed_share(pose)
         normals[rows[VISIBLE_RINGS - 1]] += closed * (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion_faces.base import SCENE, Picture, Staging, alive
+from lipmotion_faces.base import SCENE, Picture, Staging, stage_liveliness
 from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
 from lipmotion_faces.portrait.design import Colour, Design
 from lipmotion_faces.portrait.eyes import EyePainter
@@ -67,7 +67,7 @@ def face_poses(
 ) -> list[FacePose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds. Raises InputError: as ``spoken_mouth``."""
     mouth = spoken_mouth(motion, units, fps)
-    moved = alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody)
+    moved = stage_liveliness(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody)
     gaze = LOOK * moved.gaze
     yaw, pitch, roll = np.clip(moved.turn, -LARGEST_TURN, LARGEST_TURN).T
     heads = np.stack([SWAY_X * yaw, -SWAY_Y * pitch, roll, YAW * yaw, -PITCH * pitch], axis=1)

@@ -20,7 +20,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from lipmotion.errors import InputError
-from lipmotion.formats.web_page import coloured
+from lipmotion.formats.web_page import colour_code
 from lipmotion.types.values import items, members, number, text, whole
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial
@@ -135,7 +135,9 @@ def study_application(
 
     replies = _Replies(study, store)
     folder = files("lipmotion_studio.study") / "page"
-    page = {name: (coloured((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()}
+    page = {
+        name: (colour_code((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()
+    }
 
     async def packaged(request: Request) -> Response:
         content, kind = page[request.url.path.removeprefix("/")]

@@ -23,7 +23,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion.storage.media import has_video, open_media
 from lipmotion.types import Audio
-from lipmotion_faces.tracking.footage import untracked_frames
+from lipmotion_faces.tracking.footage import read_video_frames
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_faces.video.synthetic_mark import LABEL, SOURCE_TYPE, mark_metadata
 from lipmotion_studio.study.answers import ANCHOR, RECORDING
@@ -183,7 +183,7 @@ def encode_shown(source: Path, target: Path, sound: Path, region: Region, late_m
     The mark of a synthetic video stays: raters do not see it, whoever gets the file can.
     Raises InputError: it cannot be read, or the region is too small. Raises ExportError: it cannot be written.
     """
-    frames, rate_hz = untracked_frames(source)
+    frames, rate_hz = read_video_frames(source)
     with open_media(source) as container:
         has_sound, texts = bool(container.streams.audio), list(container.metadata.values())
     played = read_audio(source if has_sound else sound, SOUND_HZ, warn=False)

@@ -409,7 +409,8 @@ def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
 def name_mesh_targets(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the morph targets of a mesh; some of its primitives may have none."""
     named = [name_targets(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
-    return tuple(max(named, key=len, default=[]))
+    longest: list[str] = max(named, key=len, default=[])
+    return tuple(longest)
 
 
 def _build_expression_shapes(
