@@ -43,13 +43,13 @@ def test_what_is_no_json_and_rows_of_other_things_are_refused() -> None:
 
 
 def test_lists_have_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(base, "MOST_ITEMS", 3)
-    monkeypatch.setattr(base, "MOST_ROWS", 3)
+    monkeypatch.setattr(base, "MAX_ITEMS", 3)
+    monkeypatch.setattr(base, "MAX_ROWS", 3)
     assert read_members('{"units": [1, 2, 3], "values": [[1], [2], [3]]}', "values")["units"] == [1, 2, 3]
     with pytest.raises(ValueError, match="a list of more than 3 items"):
         read_members('{"units": [1, 2, 3, 4]}', "values")
-    monkeypatch.setattr(base, "MOST_ROWS", 4)
+    monkeypatch.setattr(base, "MAX_ROWS", 4)
     assert read_members('{"units": [1, 2, 3, 4]}', "values", "units")["units"] == [1, 2, 3, 4]
-    monkeypatch.setattr(base, "MOST_ROWS", 3)
+    monkeypatch.setattr(base, "MAX_ROWS", 3)
     with pytest.raises(ValueError, match="more than 3 rows of values"):
         read_members('{"values": [[1], [2], [3], [4]]}', "values")
