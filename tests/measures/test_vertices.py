@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.measures.vertices import landmark_distance, lip_vertex_error, upper_face_deviation
+from lipmotion.measures.curves import landmark_distance, lip_vertex_error, upper_face_deviation
 
 STILL = np.zeros((4, 3, 3))
 

@@ -18,7 +18,7 @@ from lipmotion.corpora.source_recordings import (
 )
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import RecordingLabels, find_labels
+from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.tables import is_live_link_file
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
@@ -37,14 +37,26 @@ def read_folder(directory: Path) -> RecordingFolder:
     in a sub-folder ``anna`` have the speaker ``anna``, and names as ``anna-take1``.
     """
     by_name: dict[str, list[Path]] = {}
+    kinds = set()
     for path in list_files(directory):
-        if _has_motion(path) or filter_videos([path]):
-            name = "-".join(path.relative_to(directory).with_suffix("").parts)
-            by_name.setdefault(name, []).append(path)
+        has_motion = _is_sound(path) and not is_of_recorder(path) and path.is_file() and find_motion_files(path)
+        if has_motion or filter_videos([path]):
+            by_name.setdefault("-".join(path.relative_to(directory).with_suffix("").parts), []).append(path)
+            kinds.add(SOUNDS if has_motion else VIDEOS)
     lists = frozenset(directory / name for name in LISTS)
-    return gather_recordings(
-        _kind(by_name), by_name, lambda name, path: _recording(name, path, directory, lists), directory
-    )
+
+    def read_recording(name: str, path: Path) -> SourceRecording:
+        labels = find_labels(path, ignored=lists)
+        siblings = find_motion_files(path) if _is_sound(path) else find_captures(path)
+        if len(siblings) > 1:
+            files = ", ".join(map(str, siblings))
+            raise InputError(f"{path}: {len(siblings)} motion files beside it: {files}; keep one")
+        motion_file = MotionFile(siblings[0]) if siblings else None
+        speaker = (*path.relative_to(directory).parts[:-1], "")[0]
+        return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, motion_file=motion_file)
+
+    kind = BOTH if len(kinds) > 1 else next(iter(kinds), VIDEOS)
+    return gather_recordings(kind, by_name, read_recording, directory)
 
 
 def list_files(directory: Path) -> list[Path]:
@@ -56,33 +68,25 @@ def list_files(directory: Path) -> list[Path]:
 def gather_recordings(
     kind: str,
     by_name: Mapping[str, list[Path]],
-    recording_of: Callable[[str, Path], SourceRecording],
+    read_recording: Callable[[str, Path], SourceRecording],
     directory: Path,
 ) -> RecordingFolder:
     """Return the recordings of the files with each name; where it has several, or cannot be read, it is a problem.
 
-    recording_of : returns a recording of its name and its file, or raises InputError
-    directory    : where the lists of the splits may lie
+    read_recording : returns a recording of its name and its file, or raises InputError
+    directory : where the lists of the splits may lie
     """
     recordings, problems = [], {}
     for name, paths in by_name.items():
         try:
-            recordings.append(recording_of(name, _only(paths)))
+            if len(paths) > 1:
+                files = ", ".join(map(str, paths))
+                raise InputError(f"{len(paths)} recordings share this name: {files}; rename all but one")
+            recordings.append(read_recording(name, paths[0]))
         except InputError as error:
             problems[name] = str(error)
     recordings.sort(key=lambda recording: recording.name)
     return assign_splits(RecordingFolder(kind, tuple(recordings), problems), directory)
-
-
-def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> SourceRecording:
-    labels: RecordingLabels = find_labels(path, ignored=lists)
-    beside = find_motion_files(path) if _is_sound(path) else find_captures(path)
-    if len(beside) > 1:
-        raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
-    motion_file = MotionFile(beside[0]) if beside else None
-    folders = path.relative_to(directory).parts[:-1]
-    speaker = folders[0] if folders else ""
-    return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, motion_file=motion_file)
 
 
 def find_motion_files(sound: Path) -> list[Path]:
@@ -98,22 +102,3 @@ def find_captures(video: Path) -> list[Path]:
 
 def _is_sound(path: Path) -> bool:
     return path.suffix.lower() in AUDIO_SUFFIXES
-
-
-def _has_motion(path: Path) -> bool:
-    return _is_sound(path) and not is_of_recorder(path) and path.is_file() and bool(find_motion_files(path))
-
-
-def _only(paths: list[Path]) -> Path:
-    """Return the only path. Raises InputError: there are several."""
-    if len(paths) > 1:
-        raise InputError(f"{len(paths)} recordings share this name: {', '.join(map(str, paths))}; rename all but one")
-    return paths[0]
-
-
-def _kind(by_name: dict[str, list[Path]]) -> str:
-    """Return the kind of folder, in words."""
-    sounds = {_is_sound(path) for paths in by_name.values() for path in paths}
-    if len(sounds) > 1:
-        return BOTH
-    return SOUNDS if True in sounds else VIDEOS

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,7 @@ SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
 LARGEST_LIST_BYTES = 1 << 24
 """Most bytes of a list of names."""
-MOST_MISSING_NAMES = 20_000
+MAX_MISSING_NAMES = 20_000
 """Names without a recording that are reported one by one; more of them mean a list of another folder."""
 
 
@@ -25,37 +24,9 @@ def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
     list become problems, because they are not meant for training; so do names without a recording.
     A list may name files (``take08.mkv``), or have remarks after a name: where no recording has that name, they are
     left out.
-    Raises CorpusError: a name is in two lists, or more than ``MOST_MISSING_NAMES`` names have no recording.
+    Raises CorpusError: a name is in two lists, or more than ``MAX_MISSING_NAMES`` names have no recording.
     """
     known = {recording.name for recording in folder.recordings} | folder.problems.keys()
-    split_of = _read_lists(directory, known)
-    has_list = (directory / "train.txt").is_file()
-    problems = {
-        name: f"listed in {split}.txt, but there is no such recording"
-        for name, split in split_of.items()
-        if name not in known
-    }
-    if len(problems) > MOST_MISSING_NAMES:
-        raise CorpusError(
-            f"{directory}: its lists name {len(problems)} recordings that are not in it, at most {MOST_MISSING_NAMES} "
-            "may be missing; are they those of another folder?"
-        )
-    recordings = []
-    for recording in folder.recordings:
-        split = split_of.get(recording.name, None if has_list else recording.split)
-        if split is None:
-            problems[recording.name] = f"in none of the lists of {directory} ({', '.join(LISTS)}); add it to one"
-        else:
-            recordings.append(replace(recording, split=split))
-    return RecordingFolder(folder.kind, tuple(recordings), folder.problems | problems)
-
-
-def _read_lists(directory: Path, known: Set[str]) -> dict[str, str]:
-    """Return the split of every listed name, without a suffix or remarks if the recording's name has none.
-
-    known : names of the recordings
-    Raises CorpusError: a name is in two lists.
-    """
     split_of: dict[str, str] = {}
     for split in SPLITS:
         path = directory / f"{split}.txt"
@@ -64,7 +35,25 @@ def _read_lists(directory: Path, known: Set[str]) -> dict[str, str]:
             name = listed if listed in known else next((each for each in shorter if each in known), listed)
             if split_of.setdefault(name, split) != split:
                 raise CorpusError(f"{name} is in {split_of[name]}.txt and in {split}.txt of {directory}; keep one")
-    return split_of
+    has_list = (directory / "train.txt").is_file()
+    problems = {
+        name: f"listed in {split}.txt, but there is no such recording"
+        for name, split in split_of.items()
+        if name not in known
+    }
+    if len(problems) > MAX_MISSING_NAMES:
+        raise CorpusError(
+            f"{directory}: its lists name {len(problems)} recordings that are not in it, at most {MAX_MISSING_NAMES} "
+            "may be missing; are they those of another folder?"
+        )
+    recordings = []
+    for recording in folder.recordings:
+        assigned = split_of.get(recording.name, None if has_list else recording.split)
+        if assigned is None:
+            problems[recording.name] = f"in none of the lists of {directory} ({', '.join(LISTS)}); add it to one"
+        else:
+            recordings.append(replace(recording, split=assigned))
+    return RecordingFolder(folder.kind, tuple(recordings), folder.problems | problems)
 
 
 def read_names(path: Path) -> list[str]:
