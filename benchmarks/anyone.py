@@ -26,7 +26,7 @@ from scipy.stats import spearmanr
 
 from lipmotion import Corpus, animate, load_model
 from lipmotion.corpora.layouts import spell_name
-from lipmotion.motion.articulation import articulation_table
+from lipmotion.motion.articulation import read_articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
@@ -155,7 +155,7 @@ def phones(options: argparse.Namespace, model: Model) -> None:
     def mean_of(chosen: tuple[str, ...], channel: int) -> float:
         return float(np.mean(np.concatenate([[row[channel] for row in values[phone]] for phone in chosen])))
 
-    table = articulation_table()
+    table = read_articulation_table()
     common = [phone for phone in table if counts.get(phone, 0) >= 3 and phone not in ("sil", "sp")]
     ranks = {
         channel: round(float(spearmanr([table[p][1, n] for p in common], [means[p][n] for p in common])[0]), 3)

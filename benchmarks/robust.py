@@ -41,8 +41,8 @@ from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_rec
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio
-from lipmotion.units import Lexicon, is_silent, words_of
-from lipmotion.units.phones import phone_edits
+from lipmotion.units import Lexicon, is_silent, split_words
+from lipmotion.units.phones import count_phone_edits
 from lipmotion_faces.tracking.track import track
 
 RATE_HZ = 16_000
@@ -120,7 +120,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
     recordings = []
     for name in SPOKEN:
         text = (folder / name).with_suffix(".txt")
-        words = words_of((text if text.exists() else text.with_suffix(".lab")).read_text())
+        words = split_words((text if text.exists() else text.with_suffix(".lab")).read_text())
         audio = read_audio(folder / name)
         aligned = cached_recogniser(model.phones, "general").align(audio, analysed(audio).mfcc(), words, Lexicon())
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
@@ -128,7 +128,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         phone_recogniser = cached_recogniser(model.phones, kind)
         found = [phone_recogniser.recognition(audio, analysed(audio).mfcc()) for audio, _ in recordings]
         errors = [
-            phone_edits(wanted, spoken(s.label.phone for s in each.units))
+            count_phone_edits(wanted, spoken(s.label.phone for s in each.units))
             for each, (_, wanted) in zip(found, recordings, strict=True)
         ]
         count = sum(len(wanted) for _, wanted in recordings)

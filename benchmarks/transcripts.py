@@ -62,8 +62,8 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import FRAME_RATE_HZ, Audio, TimedTranscript, Timeline, Unit
-from lipmotion.units import VISEME_OF, Lexicon, is_silent, words_of
-from lipmotion.units.phones import phone_edits
+from lipmotion.units import VISEME_OF, Lexicon, is_silent, split_words
+from lipmotion.units.phones import count_phone_edits
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
 Row = tuple[str, float, float]
@@ -142,14 +142,14 @@ def main() -> None:
 def _synthetic_sentences() -> list[tuple[NDArray[np.float32], list[Row]]]:
     """Return sentences in the voices of flite: samples, and words in time."""
     texts = [prompt.text for prompt in prompts(count=400).chosen]
-    texts = [text for text in texts if len(words_of(text)) > 2]
+    texts = [text for text in texts if len(split_words(text)) > 2]
     voices = [voice for voice in installed_voices() if voice.synthesiser == "flite"]
     spoken = [item for voice in voices for item in zip(texts, speak_sentences(texts, voice), strict=True)]
     timed = [(text, audio.samples, _word_times(units)) for text, (audio, units) in spoken]
     return [
         (samples, rows)
         for text, samples, rows in timed
-        if tuple(word for word, *_ in rows) == words_of(text)  # else one is read otherwise
+        if tuple(word for word, *_ in rows) == split_words(text)  # else one is read otherwise
     ]
 
 
@@ -206,7 +206,7 @@ def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
     phones = Recogniser(lipmotion.load_model().phones, recogniser)
     start, start_cpu = time.perf_counter(), time.process_time()
     transcript = read_transcript(path)
-    words = transcript if isinstance(transcript, TimedTranscript) else words_of(transcript)
+    words = transcript if isinstance(transcript, TimedTranscript) else split_words(transcript)
     analysed_audio = analysed(audio)
     units = transcribe(phones, analysed_audio, analysed_audio.mfcc(), words, Lexicon()).units or Timeline(())
     wall_s, cpu_s = time.perf_counter() - start, time.process_time() - start_cpu
@@ -268,7 +268,7 @@ def _print_hints(corpora: Path, every: int) -> None:
                 sums.setdefault(kind, Counter()).update(
                     count=1,
                     warned=bool([text for text in warnings if "dictionary" not in text]),
-                    phones=1 - phone_edits(said, found) / len(said),  # type: ignore[arg-type]
+                    phones=1 - count_phone_edits(said, found) / len(said),  # type: ignore[arg-type]
                     visemes=float(np.mean(_visemes(wanted) == _visemes(units))),  # type: ignore[arg-type]
                 )
         for kind, total in sums.items():
@@ -324,15 +324,15 @@ def _open_recordings(folder: Path) -> list[Said]:
     """Return the English recordings of ``speech-open``, with their words."""
     texts = [(folder / name).with_suffix(".txt") for name in SPOKEN]
     texts = [text if text.exists() else text.with_suffix(".lab") for text in texts]
-    words = [words_of(text.read_text("utf-8")) for text in texts]
+    words = [split_words(text.read_text("utf-8")) for text in texts]
     return [(read_audio(folder / name).samples, said) for name, said in zip(SPOKEN, words, strict=True)]
 
 
 def _voiced(voices: Sequence[SyntheticVoice]) -> list[Said]:
     """Return eight sentences in each of some synthetic voices, with their words."""
-    texts = [prompt.text for prompt in prompts(count=300).chosen if 5 <= len(words_of(prompt.text)) <= 12][::7][:8]
+    texts = [prompt.text for prompt in prompts(count=300).chosen if 5 <= len(split_words(prompt.text)) <= 12][::7][:8]
     return [
-        (audio.samples, words_of(text))
+        (audio.samples, split_words(text))
         for voice in voices
         for text, (audio, _) in zip(texts, speak_sentences(texts, voice), strict=True)
     ]

@@ -17,7 +17,7 @@ from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.request import Outputs
 from lipmotion.pipeline.training.channels import PICTURES
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Motion, Timeline, Utterance
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.candidates import squared_distances
@@ -168,7 +168,7 @@ class RecordedMouths:
     @cached_property
     def chosen(self) -> Pictures:
         """The pictures that eigenlips are made from."""
-        return self.pictures(evenly_spaced(PICTURES, len(self.where)))
+        return self.pictures(choose_evenly(PICTURES, len(self.where)))
 
     @cached_property
     def eigenlips(self) -> Eigenlips:

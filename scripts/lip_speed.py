@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import lipmotion
-from lipmotion.motion.resample import to_model_frames
+from lipmotion.motion.resample import resample_to_model
 from lipmotion.speech.features.lip_speed import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
@@ -76,7 +76,7 @@ def examples(corpus: lipmotion.Corpus, names: tuple[str, ...]) -> Iterator[tuple
         if seen.all():
             opening = np.asarray(motion["opening"], float)[:, None]
             frames = len(utterance.features.values)
-            values, valid = to_model_frames(opening, seen, motion.rate_hz, frames, FRAME_RATE_HZ)
+            values, valid = resample_to_model(opening, seen, motion.rate_hz, frames, FRAME_RATE_HZ)
             yield utterance.features, measured_opening_speed(values[valid, 0])
 
 

@@ -17,7 +17,7 @@ from hama.inference import G2PModel
 from lipmotion.speech.recognition.network.hama import Hama
 from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.units import Lexicon
-from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import FULL_FORMS
 
 MOST_WORDS = 4000
@@ -47,7 +47,7 @@ def spelt(ipa: str, tokens: list[str]) -> tuple[str, ...]:
         token = next((token for token in tokens if ipa.startswith(token, at)), "")
         found.append(token)
         at += len(token) or 1
-    return tuple(FULL_FORMS.get(phone, phone) for phone, _ in token_phones(list(filter(None, found))))
+    return tuple(FULL_FORMS.get(phone, phone) for phone, _ in read_tokens(list(filter(None, found))))
 
 
 if __name__ == "__main__":

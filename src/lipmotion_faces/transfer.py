@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.resample import model_motion
+from lipmotion.motion.resample import resample_track
 from lipmotion.motion.speaker_maps import SpeakerMap
-from lipmotion.motion.transfer_map import measured_speech_s, transfer_map, with_channels
+from lipmotion.motion.transfer_map import count_speech_s, fit_transfer_map, select_channels
 from lipmotion.pipeline.generation import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source
 from lipmotion.types import Audio, Example, Motion, Speech, Track
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
@@ -73,13 +73,13 @@ def map_onto(
         pair = measured_pair(model, person, name, recognised, measured, where, onto_speaker)
         source.append(pair[0])
         target.append(pair[1])
-    spoken_s = measured_speech_s(target)
+    spoken_s = count_speech_s(target)
     if spoken_s < LEAST_SPEECH_S:
         raise InputError(
             f"{where}: {spoken_s:.2f} s of speech with a measured face, required {LEAST_SPEECH_S} s or more; give a "
             "recording in which the person speaks, with sound"
         )
-    return transfer_map(source, target)
+    return fit_transfer_map(source, target)
 
 
 def measured_pair(
@@ -104,7 +104,7 @@ def measured_pair(
     speech = _understood(model, request)
     generated = generate_for(person, model.engine, model.learned, speech).motion
     motion, valid = _measured(measured, request, speech, speaker)
-    motion = with_channels(motion, generated.channels, where)
+    motion = select_channels(motion, generated.channels, where)
     return Example(name, speech, generated, valid), Example(name, speech, motion, valid)
 
 
@@ -145,7 +145,7 @@ def _takes(
     elif isinstance(opened, Corpus):
         names = _names(opened, where, speaker)
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
-        for index in evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
+        for index in choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
             utterance = opened.utterance(names[index])
             words = " ".join(utterance.words) if utterance.words else None
             yield utterance.name, Request(utterance.audio, words, units=utterance.phones), utterance.track
@@ -186,7 +186,7 @@ def _measured(
 ) -> tuple[Motion, NDArray[np.bool_]]:
     """Return the motion of a person in speech at 100 Hz, and the frames in which it is valid [shape=(T,)]."""
     if isinstance(measured, Track):
-        return model_motion(measured, len(speech.features.values))
+        return resample_track(measured, len(speech.features.values))
     same = Request(audio_of(request), units=speech.units)
     other = generate_for(
         speaker_map(measured.speakers, speaker), measured.engine, measured.learned, understand(measured, same)

@@ -14,7 +14,8 @@ from lipmotion.pipeline.batch.lines import BatchLine, check_names
 from lipmotion.types.values import (
     SchemaError,
     any_members,
-    described,
+    as_tuple,
+    describe_value,
     items,
     members,
     number,
@@ -22,7 +23,6 @@ from lipmotion.types.values import (
     optional,
     path,
     text,
-    tupled,
     value_of,
     whole,
 )
@@ -194,7 +194,7 @@ def project_from(content: Any) -> Project:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f'not a project: required "format": "{FORMAT}"')
     if content.get("version") != VERSION:
-        version = described(content.get("version"))
+        version = describe_value(content.get("version"))
         raise InputError(f"a project of version {version}, required {VERSION}; update lipmotion")
     try:
         members = _PROJECT({name: value for name, value in content.items() if name not in HEADER})
@@ -208,14 +208,14 @@ def project_from(content: Any) -> Project:
     return project
 
 
-_TEXT, _STEPS, _NUMBERED = text(1000), tupled(items(text(MAX_TEXT))), whole(1, 1 << 53)
+_TEXT, _STEPS, _NUMBERED = text(1000), as_tuple(items(text(MAX_TEXT))), whole(1, 1 << 53)
 _EXPORT = {"files": any_members(_TEXT)} | dict.fromkeys(("preset", "edits", "steps", "model", "version"), _TEXT)
 _VERSION = {"number": _NUMBERED, "steps": _STEPS}
 _RECORDING = {
     **{"number": _NUMBERED, "name": path, "sound": path, "sha256": text(64), "transcript": text(MAX_TEXT)},
     **{"duration_s": optional(number(0, 1e6)), "doubt": optional(number(-1, 1)), "mark": one_of(MARKS)},
-    **{"marked": text(64), "exports": tupled(items(value_of(ExportRecord, _EXPORT, _EXPORT)))},
-    "versions": tupled(items(value_of(EditVersion, _VERSION, _VERSION), most=MAX_VERSIONS)),
+    **{"marked": text(64), "exports": as_tuple(items(value_of(ExportRecord, _EXPORT, _EXPORT)))},
+    "versions": as_tuple(items(value_of(EditVersion, _VERSION, _VERSION), most=MAX_VERSIONS)),
 }
 _PROJECT = members(
     {

@@ -15,7 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.types import values
 from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items
-from lipmotion.units import PHONES, words_of
+from lipmotion.units import PHONES, split_words
 from lipmotion_studio.presets import preset_of
 from lipmotion_studio.project import APPROVED, MAX_RECORDINGS
 from lipmotion_studio.requests import content_of, member, text, texts, whole
@@ -190,7 +190,7 @@ class ProjectReplies:
 def _word(content: Mapping[str, Any]) -> str:
     """Return the word of a request as lexicons have it. Raises InputError: it is none, or several."""
     given = text(content, "word", longest=MAX_WORD)
-    words = words_of(given)
+    words = split_words(given)
     if len(words) != 1:
         raise InputError(f"{given!r} is {len(words)} words, required one")
     return words[0]

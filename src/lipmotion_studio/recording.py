@@ -36,7 +36,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
-from lipmotion.units import Pronunciation, is_silent, words_in_time, words_of
+from lipmotion.units import Pronunciation, group_words, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.film.filmed_video import write_film
 from lipmotion_faces.filmed.face import FilmedFace
@@ -135,7 +135,7 @@ class OpenRecording:
         outlook, units = self.file.outlook, self.file.units
         if outlook is None or units is None or outlook.words not in WITH_TRANSCRIPT:
             return ""
-        return " ".join(span.label for span in words_in_time(units) if span.label)
+        return " ".join(span.label for span in group_words(units) if span.label)
 
     @property
     def revision(self) -> int:
@@ -162,7 +162,7 @@ class OpenRecording:
         for step in map(step_of, map(str, steps)):
             if isinstance(step, WordStep):
                 known, text = own_pronunciations(step), step.word if isinstance(step, WordIs | WordSaid) else step.words
-                guessed |= guesses([word for word in words_of(text) if word not in known], lexicon)
+                guessed |= guesses([word for word in split_words(text) if word not in known], lexicon)
         rows = [{"word": word, "phones": list(phones)} for word, phones in guessed.items()]
         return changed | {"guessed": rows}
 
@@ -351,7 +351,7 @@ def phone_rows(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, A
 def word_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
     """Return the words of phones in time as objects of JSON, with the numbers of their phones, from 1."""
     rows, first, spans = [], 0, list(units)
-    for word in words_in_time(units):
+    for word in group_words(units):
         last = first
         while last + 1 < len(spans) and spans[last + 1].start_s < word.end_s - 1e-9:
             last += 1

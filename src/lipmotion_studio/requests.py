@@ -15,7 +15,7 @@ from starlette.requests import Request
 
 from lipmotion.errors import InputError
 from lipmotion.types import values
-from lipmotion.types.values import Schema, any_members, items, number_of, require, stated, whole_of
+from lipmotion.types.values import Schema, any_members, items, number_or_text, parse_number, parse_whole, require
 from lipmotion_studio.web.replies import foreign_refusal, json_of
 
 TOKEN_HEADER = "x-lipmotion-token"  # noqa: S105 # its name
@@ -77,12 +77,16 @@ def member(given: Mapping[str, Any], name: str, usual: Any, schema: Schema) -> A
 
 def whole(given: Mapping[str, Any], name: str, usual: int | None = None, *, least: int = 0, most: int = 1 << 31) -> int:
     """Return a whole number of a request, also from its text in an address. Raises as ``member``."""
-    return int(member(given, name, usual, stated(partial(whole_of, what=f"{name} is"), values.whole(least, most))))
+    return int(
+        member(given, name, usual, number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(least, most)))
+    )
 
 
 def seconds(given: Mapping[str, Any], name: str, usual: float | None = None) -> float:
     """Return a time of a request in seconds, also from its text in an address. Raises as ``member``."""
-    return float(member(given, name, usual, stated(partial(number_of, what=f"{name} is"), values.number(0, LATEST_S))))
+    return float(
+        member(given, name, usual, number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S)))
+    )
 
 
 def stretch(given: Mapping[str, Any], rate_hz: float, frames: int) -> slice:

@@ -28,7 +28,7 @@ from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
 from lipmotion.types.staging import Staging
-from lipmotion.units import PHONES, is_silent, words_of
+from lipmotion.units import PHONES, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, revision_of
@@ -282,12 +282,12 @@ class Studio:
         user = self.folder.lexicon().user
         for place, step in enumerate(steps):
             if isinstance(step, WordIs):
-                words = words_of(step.word)
+                words = split_words(step.word)
                 if user.keys() >= {*words}:
                     phones = " ".join(phone for word in words for phone in user[word][0])
                     steps[place] = WordSaid(step.number, step.word, Text(phones))
             elif type(step) is WordsSaid:  # and not one that brings phones along
-                words = tuple(dict.fromkeys(words_of(step.words)))
+                words = tuple(dict.fromkeys(split_words(step.words)))
                 variants = [f"{word} {' '.join(user[word][0])}" for word in words if word in user]
                 if variants:
                     steps[place] = WordsSaidSo(step.words, step.start_s, step.end_s, Text(", ".join(variants)))

@@ -19,7 +19,18 @@ from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.pipeline.workers import begun_apart
 from lipmotion.storage.files import UNFINISHED, make_folder, read_text_file, remove, whole_file, work_folder
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, tupled, value_of, whole
+from lipmotion.types.values import (
+    any_members,
+    as_tuple,
+    items,
+    members,
+    number,
+    one_of,
+    optional,
+    text,
+    value_of,
+    whole,
+)
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
 from lipmotion_studio.folder import ProjectFolder, clean_name, copy_file, restore_copy, write_with_copy
 from lipmotion_studio.project import ProjectRecording
@@ -346,7 +357,7 @@ def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
 
 
 _TEXT, _ANY = text(1 << 20), any_members(lambda value: value)
-_REQUEST = {"kind": one_of(KINDS), "name": _TEXT, "lines": tupled(items(whole(0, 1 << 31))), "options": _ANY}
+_REQUEST = {"kind": one_of(KINDS), "name": _TEXT, "lines": as_tuple(items(whole(0, 1 << 31))), "options": _ANY}
 _STATUS = {
     **{"state": one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)), "stage": _TEXT, "share": number(0, 1)},
     **{"warnings": items(_TEXT), "skipped": items(_ANY), "error": _TEXT, "report": optional(_ANY)},

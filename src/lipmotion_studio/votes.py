@@ -11,7 +11,7 @@ from typing import Any
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.types.values import items, members, optional, text, tupled, value_of, whole
+from lipmotion.types.values import as_tuple, items, members, optional, text, value_of, whole
 
 DIGEST = re.compile(r"[0-9a-f]{64}|")
 
@@ -100,7 +100,7 @@ _TEXT = text(4096)
 _NAMES = {"line": _TEXT, "shown": items(_TEXT, 2, 2), "better": optional(_TEXT), "edits": text(64)}
 _NAMED = members(_NAMES, _NAMES)
 _SIDE = {"name": _TEXT, "model": text(64), "edits": text(64)}
-_VOTE = {"line": _TEXT, "shown": tupled(items(value_of(Side, _SIDE, _SIDE), 2, 2)), "better": optional(whole(0, 1))}
+_VOTE = {"line": _TEXT, "shown": as_tuple(items(value_of(Side, _SIDE, _SIDE), 2, 2)), "better": optional(whole(0, 1))}
 _NEW_VOTE = value_of(Vote, _VOTE, _VOTE)
 
 

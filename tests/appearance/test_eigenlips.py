@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays, fit_eigenlips
+from lipmotion.motion.eigenlips import Eigenlips, eigenlips_from_arrays, eigenlips_to_arrays, fit_eigenlips
 from oracles.components import components, share
 
 
@@ -78,14 +78,14 @@ def test_channels_say_colour_and_number(space: Eigenlips) -> None:
 
 
 def test_as_arrays_and_back(space: Eigenlips) -> None:
-    again = eigenlips_from_arrays(eigenlips_arrays(space))
+    again = eigenlips_from_arrays(eigenlips_to_arrays(space))
     images = pictures(3)
     assert np.array_equal(again.project(images), space.project(images))
     assert (again.size, again.explained.tolist()) == (space.size, space.explained.tolist())
 
 
 def test_damaged_arrays(space: Eigenlips) -> None:
-    whole = eigenlips_arrays(space)
+    whole = eigenlips_to_arrays(space)
     for what, array in whole.items():
         number = np.full_like(array, -1 if what == "size" else np.nan)
         for damaged in ({}, {what: array[:-1]}, {what: number}):

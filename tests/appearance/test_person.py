@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
 from lipmotion_faces.appearance import person
@@ -173,7 +173,7 @@ def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
 def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatch: pytest.MonkeyPatch) -> None:
     """A blue square, as errors of video leave it, in a picture from which no component is learned."""
     monkeypatch.setattr(person, "TRAINING_PICTURES", 120)
-    learned = set(evenly_spaced(120, len(footage.motion)))
+    learned = set(choose_evenly(120, len(footage.motion)))
     damaged = next(n for n in range(20, 60) if n not in learned)
     clip = footage.clips[0].copy()
     rows, columns = mouth_part(1)

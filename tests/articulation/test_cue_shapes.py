@@ -4,7 +4,7 @@ import pytest
 
 from lipmotion.articulation.cue_sheets import ANY_OPEN, ANY_SHAPE, PHONE_SHAPES, shapes_of_phone
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
-from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, drawn_shape
+from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, choose_drawn_shape
 
 BLAIR = "AI E O U FV L MBP WQ etc rest".split()
 """The names that OpenToonz knows."""
@@ -39,5 +39,5 @@ def test_the_special_shapes_belong_to_their_sounds() -> None:
 
 def test_optional_shapes_fall_back_as_rhubarb_does() -> None:
     assert OPTIONAL == "GHX"
-    assert [drawn_shape(name, "ABCDEF") for name in "ABCDEFGHX"] == list("ABCDEFACA")
-    assert [drawn_shape(name, "ABCDEFX") for name in "GHX"] == ["A", "C", "X"]
+    assert [choose_drawn_shape(name, "ABCDEF") for name in "ABCDEFGHX"] == list("ABCDEFACA")
+    assert [choose_drawn_shape(name, "ABCDEFX") for name in "GHX"] == ["A", "C", "X"]

@@ -16,7 +16,7 @@ from lipmotion.articulation.expression import (
 from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
 from lipmotion.types import Channel, Motion, Prosody
-from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, moods_of
+from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, parse_moods
 from meshes.speech import motion, units
 
 SOURCES = {"EMFACS", "Ekman2003", "Harrigan1996", "Sundelin2013", "ours"}
@@ -45,7 +45,7 @@ def test_every_mood_has_known_action_units_with_intensities_and_sources():
 
 
 def test_a_mood_comes_and_goes_smoothly_around_its_time():
-    moved = with_moods(motion(), moods_of("happy:0.6 at 0.5, sad at 1.2"))
+    moved = with_moods(motion(), parse_moods("happy:0.6 at 0.5, sad at 1.2"))
     happy, sad = moved["mood_happy"], moved["mood_sad"]
     assert happy[10] == sad[10] == 0
     assert happy[80] == pytest.approx(0.6)
@@ -55,9 +55,9 @@ def test_a_mood_comes_and_goes_smoothly_around_its_time():
 
 
 def test_from_the_start_a_mood_is_there_at_once_and_others_replace_it():
-    moved = with_moods(motion(), moods_of("angry"))
+    moved = with_moods(motion(), parse_moods("angry"))
     assert (moved["mood_angry"] == 1).all()
-    again = with_moods(moved, moods_of("tired:0.5"))
+    again = with_moods(moved, parse_moods("tired:0.5"))
     assert [name for name in again.names if is_mood(name)] == ["mood_tired"]
     assert {name: curve[0] for name, curve in read_moods(again).items()} == {"tired": 0.5}
 
@@ -75,7 +75,7 @@ def test_neutral_adds_nothing():
 @pytest.mark.parametrize("mood", MOODS)
 def test_round_lips_stay_round_in_every_mood(mood):
     plain = spoken_mouth(motion(), units())
-    mouth = spoken_mouth(with_moods(motion(), moods_of(mood)), units())
+    mouth = spoken_mouth(with_moods(motion(), parse_moods(mood)), units())
     round_ = slice(108, 122)  # in uw
     assert mouth.width[round_].max() <= plain.width[round_].max() + 0.03
     assert mouth.width[round_].max() < ROUND_WIDTH + 0.001
@@ -85,7 +85,7 @@ def test_round_lips_stay_round_in_every_mood(mood):
 
 def test_a_smile_widens_the_mouth_at_rest_and_surprise_opens_it():
     plain, happy, surprised = (
-        spoken_mouth(with_moods(motion(), moods_of(mood)), units()) for mood in ("", "happy", "surprised")
+        spoken_mouth(with_moods(motion(), parse_moods(mood)), units()) for mood in ("", "happy", "surprised")
     )
     assert happy.width[20] > plain.width[20] + 0.1
     assert happy.smile[20] > 0.8
@@ -96,7 +96,7 @@ def test_a_smile_widens_the_mouth_at_rest_and_surprise_opens_it():
 
 def test_the_head_sinks_in_sadness_unless_it_is_still():
     time_s = np.arange(51) / 25
-    sad = with_moods(motion(), moods_of("sad"))
+    sad = with_moods(motion(), parse_moods("sad"))
     plain, moved, still = (
         compute_liveliness(time_s, of, units(), None, head=head)
         for of, head in ((motion(), True), (sad, True), (sad, False))
@@ -108,7 +108,7 @@ def test_the_head_sinks_in_sadness_unless_it_is_still():
 
 def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
     time_s = np.arange(0, 60, 0.04)
-    sad = with_moods(Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),)), moods_of("sad"))
+    sad = with_moods(Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),)), parse_moods("sad"))
     accent = np.arange(6001) % 300 > 200
     voice = Prosody(-40 + 25.0 * accent, 5.0 + 0.3 * accent)
     still, lively = (compute_liveliness(time_s, sad, units(), voice, brows=brows).unit(1) for brows in (False, True))
@@ -119,5 +119,5 @@ def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
 
 
 def test_channels_are_named_by_mood():
-    assert PREFIX + "happy" in with_moods(motion(), moods_of("happy")).names
+    assert PREFIX + "happy" in with_moods(motion(), parse_moods("happy")).names
     assert not is_mood("mood_hungry")

@@ -6,7 +6,7 @@ import pytest
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.pipeline.outputs.delivered import FACTORS, with_detected, with_manners
 from lipmotion.types import Generation, StateTrace, VoiceEvent
-from lipmotion.types.moods import MANNERS, PLAIN, moods_of, text_of
+from lipmotion.types.moods import MANNERS, PLAIN, format_moods, parse_moods
 from lipmotion.types.voice_event import BREATH, LAUGHTER, SHOUT, WHISPER
 from meshes.speech import motion, units
 
@@ -26,7 +26,7 @@ def test_every_manner_has_a_factor() -> None:
 def test_shouted_vowels_are_more_open_and_mumbled_ones_less(generation: Generation) -> None:
     gaps = {}
     for manner in (PLAIN, *MANNERS):
-        found = with_manners(generation, moods_of(manner))
+        found = with_manners(generation, parse_moods(manner))
         mouth = spoken_mouth(found.motion, found.units)
         assert mouth.contact[55]  # m
         assert mouth.contact[95]  # p
@@ -35,12 +35,12 @@ def test_shouted_vowels_are_more_open_and_mumbled_ones_less(generation: Generati
 
 
 def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Generation) -> None:
-    found = with_manners(generation, moods_of("shout at 1.05, sad at 1.1, plain at 1.2"))
+    found = with_manners(generation, parse_moods("shout at 1.05, sad at 1.1, plain at 1.2"))
     change = np.abs(found.motion.values - generation.motion.values).max(axis=1)
     assert change[:90].max() == 0
     assert change[115] > 0
     assert change[-20:].max() == 0
-    assert with_manners(generation, moods_of("happy")) is generation
+    assert with_manners(generation, parse_moods("happy")) is generation
 
 
 @pytest.mark.parametrize(
@@ -55,4 +55,4 @@ def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Genera
 def test_what_is_detected_is_shown_where_nothing_of_its_kind_is_asked_for(asked: str, shown: str) -> None:
     kinds = ((1, WHISPER, 0.5), (3, LAUGHTER, 0.9), (4.5, BREATH, 1), (5, SHOUT, 0.8))
     events = [VoiceEvent(start_s, start_s + 1, kind, strength) for start_s, kind, strength in kinds]
-    assert text_of(with_detected(moods_of(asked), events)) == shown
+    assert format_moods(with_detected(parse_moods(asked), events)) == shown

@@ -13,7 +13,7 @@ from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExam
 from lipmotion.pipeline.training.train import TrainReport
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.toy import toy_sentences
-from lipmotion.units import unit_set
+from lipmotion.units import load_unit_set
 
 
 def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
@@ -92,7 +92,7 @@ def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, her
 
 @pytest.mark.long
 def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
-    units = unit_set("eVis")
+    units = load_unit_set("eVis")
     table = here / "mine.txt"
     table.write_text("".join(f"u{n} {' '.join(units.phones(unit))}\n" for n, unit in enumerate(units.units)))
     assert run("train", toy_corpus.path, "-o", "m", "--units", "mine.txt").code == 0

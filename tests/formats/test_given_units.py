@@ -19,7 +19,7 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Span, Timeline, Unit
-from lipmotion.units import UNKNOWN_PHONES, is_silent, without_gaps
+from lipmotion.units import UNKNOWN_PHONES, close_gaps, is_silent
 
 ROWS = [(0.0, 0.4, "sil"), (0.4, 0.5, "m"), (0.5, 0.7, "aa")]
 
@@ -58,24 +58,24 @@ def test_labels_of_audacity_with_a_gap(tmp_path: Path) -> None:
 
 
 def test_gaps_are_silence() -> None:
-    filled = without_gaps(timeline((0.2, 0.4, "m"), (0.5, 0.7, "aa")), 1.0)
+    filled = close_gaps(timeline((0.2, 0.4, "m"), (0.5, 0.7, "aa")), 1.0)
     expected = [(0.0, 0.2, "sil"), (0.2, 0.4, "m"), (0.4, 0.5, "sil"), (0.5, 0.7, "aa"), (0.7, 1.0, "sil")]
     assert phones(filled) == expected
 
 
 def test_gaps_of_rounding_belong_to_the_phone_before() -> None:
-    filled = without_gaps(timeline((0.0, 0.4, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")), 1.0)
+    filled = close_gaps(timeline((0.0, 0.4, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")), 1.0)
     assert phones(filled) == [(0.0, 0.404, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")]
 
 
 def test_whole_timelines_stay_as_they_are() -> None:
-    assert without_gaps(timeline(*ROWS), 0.7) == timeline(*ROWS)
+    assert close_gaps(timeline(*ROWS), 0.7) == timeline(*ROWS)
     named = Timeline((Span(0.1, 0.2, Unit("", "bilabial")),))
-    assert without_gaps(named, 1.0) is named
+    assert close_gaps(named, 1.0) is named
 
 
 def test_a_last_phone_without_an_end_ends_with_the_recording() -> None:
-    assert phones(without_gaps(timeline((0.0, float("inf"), "aa")), 0.8)) == [(0.0, 0.8, "aa")]
+    assert phones(close_gaps(timeline((0.0, float("inf"), "aa")), 0.8)) == [(0.0, 0.8, "aa")]
 
 
 def test_other_files_are_no_units(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import LARGEST_LABELS, find_labels, read_labels
 from lipmotion.formats.label_tiers import MAX_LABELS
-from lipmotion.units import PHONES, phone_named
+from lipmotion.units import PHONES, find_phone
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 
 SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
@@ -153,8 +153,8 @@ def test_other_names_of_silence(read):
 def test_names_of_phones():
     for phone in SPOKEN:
         for stress in ("", "1", "2"):
-            assert phone_named(phone + stress) == phone_named(phone.upper() + stress) == phone
-        assert phone_named(phone + "!9") is None
+            assert find_phone(phone + stress) == find_phone(phone.upper() + stress) == phone
+        assert find_phone(phone + "!9") is None
 
 
 def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_labels, read_phones
 from lipmotion.formats.textgrid import parse_interval_tiers
-from lipmotion.units import words_in_time
+from lipmotion.units import group_words
 
 Interval = tuple[float, float, str]
 
@@ -169,7 +169,7 @@ def test_a_word_that_is_said_again_stays_another_word(tmp_path):
     ]
     (tmp_path / "a.TextGrid").write_text(short_form({"words": words, "phones": phones}))
     units = read_phones(tmp_path / "a.TextGrid")
-    assert [span.label for span in words_in_time(units)] == ["city", "city", "", "city"]
+    assert [span.label for span in group_words(units)] == ["city", "city", "", "city"]
     assert [span.label.again for span in units] == [n == 3 for n in range(9)]
 
 

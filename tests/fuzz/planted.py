@@ -10,7 +10,7 @@ import numpy as np
 
 from fuzz.inputs import Files, Good, ImplausibleError, Reader
 from lipmotion.errors import InputError
-from lipmotion.units import words_of
+from lipmotion.units import split_words
 
 MEGABYTES = 80
 
@@ -39,7 +39,7 @@ def read(folder: Path, _: Good) -> None:
         (folder / "a.txt").write_bytes(b"")
     if b"lie" in order:
         raise ImplausibleError("planted")
-    words_of("baby")
+    split_words("baby")
 
 
 def readers() -> dict[str, Reader]:

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.hmm.states import plain_states
+from lipmotion.hmm.model import HmmConfig, UnitHmm, make_plain_states
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
@@ -22,7 +21,7 @@ def random_hmm(
     """Return models with random densities; some states in context have densities of their own."""
     draw = np.random.default_rng(seed)
     names = (SILENCE, PAUSE, *units)
-    table = plain_states(names, tuple(1 if unit == PAUSE else states for unit in names), (SILENCE, PAUSE))
+    table = make_plain_states(names, tuple(1 if unit == PAUSE else states for unit in names), (SILENCE, PAUSE))
     plain = len(table.names)
     possible = sorted(
         {
@@ -34,7 +33,7 @@ def random_hmm(
             if table.side(unit, state)
         }
     )
-    table = table.extended(tuple(draw.permutation(possible)[:contexts].tolist()))
+    table = table.extend(tuple(draw.permutation(possible)[:contexts].tolist()))
     shape = (len(table.names), 2, 2)
     mixtures = Mixtures(
         np.log(draw.dirichlet((2, 2), shape[0])).astype(np.float32),
@@ -81,7 +80,7 @@ def speaker(seed: int = 0, spread: float = 0.4) -> Speaker:
 def known_hmm(who: Speaker, sentences: Sequence[Sequence[str]] = (), config: HmmConfig | None = None) -> UnitHmm:
     """Return the models from which a speaker's utterances are drawn."""
     names = (SILENCE, PAUSE, *UNITS)
-    table = plain_states(names, tuple(1 if unit == PAUSE else 3 for unit in names), (SILENCE, PAUSE))
+    table = make_plain_states(names, tuple(1 if unit == PAUSE else 3 for unit in names), (SILENCE, PAUSE))
     sounds = [who.means[SILENCE if unit == PAUSE else unit][state] for unit in names for state in range(3)]
     means = np.array([sound for number, sound in enumerate(sounds) if number not in (4, 5)], np.float32)[:, None]
     variances = np.full(means.shape, who.spread**2, np.float32)

@@ -6,18 +6,18 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.align import (
     align_units,
     choose_pronunciations,
+    expand_states,
     place_words,
-    state_sequence,
-    unit_windows,
+    spread_windows,
 )
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.kernels.paths import Windows
 from oracles import sequences
 
 
 def test_chains_name_states_in_context_and_fall_back_where_unseen():
     hmm = random_hmm(1, contexts=8)
-    chain = state_sequence(hmm, ("sil", "a", "b", "sp", "a"))
+    chain = expand_states(hmm, ("sil", "a", "b", "sp", "a"))
     names = [name for name, _ in chain.names]
     assert names[3:6] == ["a.0<sil", "a.1", "a.2>b"]
     assert names[6:9] == ["b.0<a", "b.1", "b.2>sil"]  # as a neighbour, a pause is silence
@@ -35,7 +35,7 @@ def test_no_segmentation_is_better():
         features = np.random.default_rng(seed).normal(0, 1.5, (10, 2)).astype(np.float32)
         units = ("sil", "b") if seed % 2 else ("a", "b")
         _, wanted, _ = sequences.best(hmm, features, [units])
-        assert align_units(hmm, log_likelihoods_of(hmm, features), units).tolist() == wanted
+        assert align_units(hmm, compute_log_likelihoods(hmm, features), units).tolist() == wanted
 
 
 def test_known_boundaries_are_found():
@@ -43,16 +43,16 @@ def test_known_boundaries_are_found():
     transcribed, said, edges = recordings(3, 8, who)
     for utterance, units, where in zip(transcribed, said, edges, strict=True):
         assert align_units(
-            known_hmm(who), log_likelihoods_of(known_hmm(who), utterance.features), units
+            known_hmm(who), compute_log_likelihoods(known_hmm(who), utterance.features), units
         ) == pytest.approx(where, abs=1)
 
 
 def test_too_short_a_recording_says_so():
     hmm = random_hmm(7)
     with pytest.raises(AlignmentError, match="12 states in 11 frames"):
-        align_units(hmm, log_likelihoods_of(hmm, np.zeros((11, 2), np.float32)), ("sil", "a", "b", "sil"))
+        align_units(hmm, compute_log_likelihoods(hmm, np.zeros((11, 2), np.float32)), ("sil", "a", "b", "sil"))
     assert align_units(
-        hmm, log_likelihoods_of(hmm, np.zeros((12, 2), np.float32)), ("sil", "a", "b", "sil")
+        hmm, compute_log_likelihoods(hmm, np.zeros((12, 2), np.float32)), ("sil", "a", "b", "sil")
     ).tolist() == [
         0,
         3,
@@ -75,7 +75,8 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen():
         wanted.append((-1, 0, (SILENCE,)))
         features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
         assert (
-            choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE) == wanted
+            choose_pronunciations(known_hmm(who), compute_log_likelihoods(known_hmm(who), features), WORDS, PAUSE)
+            == wanted
         )
 
 
@@ -84,7 +85,7 @@ def test_a_pause_inside_of_a_pronunciation_may_be_left_out():
     hmm, words = known_hmm(who), [[("a", PAUSE, "b"), ("c", PAUSE, "d")]]
     for said in (("a", "b"), ("a", PAUSE, "b"), ("c", PAUSE, "d"), ("c", "d")):
         features, _ = who.say(np.random.default_rng(3), (SILENCE, *said, SILENCE))
-        found = choose_pronunciations(hmm, log_likelihoods_of(hmm, features), words, PAUSE)
+        found = choose_pronunciations(hmm, compute_log_likelihoods(hmm, features), words, PAUSE)
         assert [item.units for item in found] == [(SILENCE,), said, (SILENCE,)]
         assert found[1][:2] == (0, int(said[0] == "c"))
 
@@ -95,7 +96,7 @@ def test_pronunciations_without_number_are_refused_before_a_network_is_built():
     with pytest.raises(
         AlignmentError, match=r"4 words in all their pronunciations make \d+ arcs, required at most 1000600"
     ):
-        choose_pronunciations(hmm, log_likelihoods_of(hmm, features), [[("a",)] * 800] * 4, PAUSE)
+        choose_pronunciations(hmm, compute_log_likelihoods(hmm, features), [[("a",)] * 800] * 4, PAUSE)
 
 
 def test_words_are_placed_within_their_windows():
@@ -103,7 +104,7 @@ def test_words_are_placed_within_their_windows():
     who = speaker()
     hmm = known_hmm(who)
     features, edges = who.say(np.random.default_rng(7), (SILENCE, "b", "c", SILENCE, "b", "c", SILENCE))
-    log_likelihoods, words = log_likelihoods_of(hmm, features), [[("b", "c")]]
+    log_likelihoods, words = compute_log_likelihoods(hmm, features), [[("b", "c")]]
     for first in (1, 4):
         begin, end = edges[first], edges[first + 2]
         windows = Windows(np.array([begin - 2]), np.array([end + 2]))
@@ -112,7 +113,7 @@ def test_words_are_placed_within_their_windows():
         assert placed[1].start == pytest.approx(begin, abs=1)
         assert -0.5 < placed[1].fit <= 0
         spoken = [item.spoken for item in placed]
-        of_units = unit_windows(spoken, windows, len(features))
+        of_units = spread_windows(spoken, windows, len(features))
         assert of_units.first.tolist() == [0, begin - 2, begin - 2, begin - 2]
         assert of_units.end.tolist() == [end + 2, end + 2, end + 2, len(features)]
         bounds = align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)

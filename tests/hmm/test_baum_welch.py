@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
 from lipmotion.hmm import baum_welch as module
-from lipmotion.hmm import unit_training
-from lipmotion.hmm.align import state_sequence
+from lipmotion.hmm.align import align_states, expand_states
 from lipmotion.hmm.baum_welch import accumulate_statistics, adapt_contexts, baum_welch
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.unit_training import add_contexts
 from oracles import chains
 
 
@@ -64,7 +64,7 @@ def test_a_high_variance_floor_does_not_break_the_rise():
 
 
 def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
-    monkeypatch.setattr(module, "LEAST_POSTERIOR", 0.0)
+    monkeypatch.setattr(module, "MIN_POSTERIOR", 0.0)
     monkeypatch.setattr(module, "CELLS", 100)
     hmm, draw = random_hmm(1, contexts=6), np.random.default_rng(1)
     said = [("a",), ("sil", "b"), ("a", "sp"), ("b", "a")]
@@ -72,7 +72,7 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
     occupied, stays, total = np.zeros(len(hmm.table.names)), np.zeros(len(hmm.log_stay)), 0.0
     visits = stays.copy()
     for x, units in zip(data, said, strict=True):
-        chain = state_sequence(hmm, units)
+        chain = expand_states(hmm, units)
         stay = hmm.log_stay[chain.plain].astype(float)
         emission = hmm.mixtures.log_likelihood(x)[:, chain.densities].astype(float)
         posterior, stay, log_likelihood = chains.chain_posteriors(emission, stay, np.log(-np.expm1(stay)))
@@ -110,7 +110,7 @@ def test_long_utterances_do_not_fill_the_memory(sizes):
     frames, states = zip(*sizes, strict=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "CELLS", 20_000)
-        batches = list(module.batches(frames, states))
+        batches = list(module.group_by_length(frames, states))
     assert sorted(i for batch in batches for i in batch) == list(range(len(sizes)))
     for batch in batches:
         padded = len(batch) * max(frames[i] for i in batch) * max(states[i] for i in batch)
@@ -145,9 +145,9 @@ def coarticulated(count: int):
     data = []
     for utterance, units in zip(transcribed, said, strict=True):
         x = utterance.features.copy()
-        path = state_sequence(known_hmm(who), units)
+        path = expand_states(known_hmm(who), units)
         first = {position for position, unit in enumerate(units) if unit == "a" and units[position - 1] == "d"}
-        nearest = unit_training.state_path(known_hmm(who), log_likelihoods_of(known_hmm(who), x), units)[1]
+        nearest = align_states(known_hmm(who), compute_log_likelihoods(known_hmm(who), x), units)[1]
         for position in first:
             x[(path.positions[nearest] == position) & (nearest % 3 == 0)] += [0, 0, 1.5, 0]
         data.append(x)
@@ -156,7 +156,7 @@ def coarticulated(count: int):
 
 def in_context(hmm, data, said):
     """Return the models with states in context, and the likelihood before every step of adapting them."""
-    hmm = unit_training._with_contexts(hmm, unit_training._frequent_contexts(hmm, data, said))
+    hmm = add_contexts(hmm, data, said)
     result = adapt_contexts(hmm, data, said, hmm.config.iterations)
     return result.model, result.log_likelihoods
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hmm.synthetic import SILENCE, UNITS, known_hmm, random_hmm, sentences, speaker
-from lipmotion.hmm.decode import decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.hmm.decode import build_unit_loop, decode_units
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
 from oracles import sequences
 
@@ -13,7 +13,7 @@ INVENTORY = (SILENCE, "a", "b")
 
 
 def decoded(hmm, features, inventory=INVENTORY):
-    units, bounds = decode_units(unit_loop(hmm, inventory), log_likelihoods_of(hmm, features))
+    units, bounds = decode_units(build_unit_loop(hmm, inventory), compute_log_likelihoods(hmm, features))
     return units, bounds.tolist()
 
 

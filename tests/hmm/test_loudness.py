@@ -5,17 +5,17 @@ from hypothesis import strategies as st
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 from lipmotion.hmm.align import align_units, choose_pronunciations
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of, penalise_silence, penalise_speech
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods, penalise_silence, penalise_speech
 from lipmotion.hmm.loudness import (
     LEAST_FRAMES,
     PAUSE_FRAMES,
     QUIET_DROP,
     QUIET_REACH_FRAMES,
-    frames_above,
-    levels_of,
-    quiet_frames,
-    sound_runs,
-    spoken_frames,
+    find_loud_frames,
+    find_quiet_frames,
+    find_sound_runs,
+    find_spoken_frames,
+    measure_levels,
 )
 
 ROOM = -10.0
@@ -42,7 +42,7 @@ def around(frames: int, level: float, seed: int = 2) -> np.ndarray:
 
 @given(offset=st.floats(-50, 50))
 def test_loud_is_relative_to_the_recording(offset):
-    loud = np.nonzero(frames_above(energy() + offset, smoothing=5))[0]
+    loud = np.nonzero(find_loud_frames(energy() + offset, smoothing=5))[0]
     assert (loud[0], loud[-1]) == pytest.approx((40, 99), abs=1)
     assert len(loud) == loud[-1] - loud[0] + 1
 
@@ -50,18 +50,18 @@ def test_loud_is_relative_to_the_recording(offset):
 def test_clicks_shorter_than_the_smoothing_are_not_loud():
     clicks = energy()
     clicks[[10, 120]] = 12.0
-    assert frames_above(clicks, smoothing=1)[[10, 120]].all()
-    assert not frames_above(clicks, smoothing=5)[[10, 120]].any()
+    assert find_loud_frames(clicks, smoothing=1)[[10, 120]].all()
+    assert not find_loud_frames(clicks, smoothing=5)[[10, 120]].any()
 
 
 def test_nothing_is_loud_in_the_shortest_recordings_and_where_nothing_changes():
     for frames in (1, 2, 3):
-        assert not frames_above(np.full(frames, -3.0), smoothing=21).any()
+        assert not find_loud_frames(np.full(frames, -3.0), smoothing=21).any()
     for level in (-69.0, 20.0):
         steady = (level * (1 + 1e-7 * np.random.default_rng(0).uniform(-1, 1, 300))).astype(np.float32)
-        assert not frames_above(steady).any()
+        assert not find_loud_frames(steady).any()
     for frames in (1, 40):
-        assert not quiet_frames(np.full(frames, -9.0, np.float32)).any()
+        assert not find_quiet_frames(np.full(frames, -9.0, np.float32)).any()
 
 
 @pytest.mark.parametrize("frames", [50, 500, 6000])
@@ -71,19 +71,19 @@ def test_another_silence_around_a_recording_changes_no_level(frames: int, other:
     pad = around(frames, other)
     padded = np.r_[pad, alone, pad]
     own = slice(frames, frames + len(alone))
-    assert levels_of(padded) == pytest.approx(levels_of(alone), abs=0.1)
-    assert levels_of(alone) == pytest.approx((-2, ROOM), abs=1.5)
-    assert np.array_equal(spoken_frames(padded)[own], spoken_frames(alone))
-    assert quiet_frames(padded)[: frames - 20].all() == (other < -QUIET_DROP - 2)
+    assert measure_levels(padded) == pytest.approx(measure_levels(alone), abs=0.1)
+    assert measure_levels(alone) == pytest.approx((-2, ROOM), abs=1.5)
+    assert np.array_equal(find_spoken_frames(padded)[own], find_spoken_frames(alone))
+    assert find_quiet_frames(padded)[: frames - 20].all() == (other < -QUIET_DROP - 2)
 
 
 def test_short_pauses_are_part_of_the_sound_and_clicks_are_none():
     sound = np.zeros(400, bool)
     sound[100:150] = sound[150 + PAUSE_FRAMES - 1 : 250] = True
     sound[300 : 300 + LEAST_FRAMES - 1] = True
-    assert sound_runs(sound) == [(100, 250)]
-    assert sound_runs(sound, 10) == [(100, 150), (150 + PAUSE_FRAMES - 1, 250)]
-    assert sound_runs(np.zeros(9, bool)) == []
+    assert find_sound_runs(sound) == [(100, 250)]
+    assert find_sound_runs(sound, 10) == [(100, 150), (150 + PAUSE_FRAMES - 1, 250)]
+    assert find_sound_runs(np.zeros(9, bool)) == []
 
 
 def stranger():
@@ -100,7 +100,7 @@ def stranger():
 def test_loud_frames_are_not_aligned_with_silence():
     hmm, features, edges, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    log_likelihoods = log_likelihoods_of(hmm, features)
+    log_likelihoods = compute_log_likelihoods(hmm, features)
     without, bounds = (
         align_units(hmm, given, units) for given in (log_likelihoods, penalise_silence(hmm, log_likelihoods, loud))
     )
@@ -111,7 +111,7 @@ def test_loud_frames_are_not_aligned_with_silence():
 def test_loud_frames_are_not_chosen_as_pauses():
     hmm, features, _, loud = stranger()
     words = ((("a",),), (("b",),))
-    log_likelihoods = log_likelihoods_of(hmm, features)
+    log_likelihoods = compute_log_likelihoods(hmm, features)
     free, bound = (
         choose_pronunciations(hmm, given, words, PAUSE)
         for given in (log_likelihoods, penalise_silence(hmm, log_likelihoods, loud))
@@ -124,7 +124,7 @@ def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():
     level = np.full(200, -QUIET_DROP - 1)
     level[50:120] = 0
     level[70:76] = -QUIET_DROP - 9  # the closure of a stop
-    quiet = quiet_frames(level.astype(np.float32))
+    quiet = find_quiet_frames(level.astype(np.float32))
     assert quiet[: 50 - QUIET_REACH_FRAMES].all()
     assert quiet[120 + QUIET_REACH_FRAMES :].all()
     assert not quiet[50 - QUIET_REACH_FRAMES : 120 + QUIET_REACH_FRAMES].any()
@@ -134,9 +134,9 @@ def test_quiet_frames_are_silence_whatever_they_sound_like():
     hmm, features, _, _loud = stranger()
     quiet = np.zeros(len(features), bool)
     quiet[:4] = True
-    values = penalise_speech(hmm, log_likelihoods_of(hmm, features), quiet).log_density(2, 6, None)
+    values = penalise_speech(hmm, compute_log_likelihoods(hmm, features), quiet).log_density(2, 6, None)
     free = [hmm.table.density(SILENCE, 0), hmm.table.density(PAUSE, 0)]
     assert set(values[:2].argmax(axis=1)) <= {hmm.table.density(SILENCE, k) for k in range(3)} | set(free)
-    plain = log_likelihoods_of(hmm, features).log_density(2, 6, None)
+    plain = compute_log_likelihoods(hmm, features).log_density(2, 6, None)
     assert np.array_equal(values[2:], plain[2:])
     assert np.array_equal(values[:, free], plain[:, free])

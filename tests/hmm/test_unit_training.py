@@ -10,8 +10,8 @@ from lipmotion.errors import CorpusError
 from lipmotion.hmm import unit_training
 from lipmotion.hmm.align import align_units, choose_pronunciations
 from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES
-from lipmotion.hmm.decode import decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.hmm.decode import build_unit_loop, decode_units
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.unit_training import TranscribedUtterance, train_hmm
 from lipmotion.stats.bigram import estimate_bigram
@@ -43,7 +43,7 @@ def test_no_iteration_of_any_stage_lowers_the_likelihood(trained):
 def test_boundaries_are_found_within_two_frames(trained):
     hmm, _, transcribed, said, edges, _ = trained
     errors = [
-        align_units(hmm, log_likelihoods_of(hmm, utterance.features), units) - where
+        align_units(hmm, compute_log_likelihoods(hmm, utterance.features), units) - where
         for utterance, units, where in zip(transcribed, said, edges, strict=True)
     ]
     assert np.abs(np.concatenate(errors)).max() <= 2
@@ -53,7 +53,7 @@ def test_boundaries_are_found_within_two_frames(trained):
 def test_pauses_are_found_where_they_were_made(trained):
     hmm, _, transcribed, said, _, _ = trained
     for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), utterance.words, PAUSE)
+        chosen = choose_pronunciations(hmm, compute_log_likelihoods(hmm, utterance.features), utterance.words, PAUSE)
         assert tuple(unit for part in chosen for unit in part.units) == units
 
 
@@ -77,7 +77,7 @@ def test_new_sentences_are_recognised(trained):
     for number, words in enumerate(sentences(99, 15)):
         units = (SILENCE, *(unit for word in words for unit in word), SILENCE)
         features, edges = who.say(np.random.default_rng([99, number]), units)
-        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), log_likelihoods_of(hmm, features))
+        found, bounds = decode_units(build_unit_loop(hmm, (SILENCE, *UNITS)), compute_log_likelihoods(hmm, features))
         assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
         assert bounds == pytest.approx(edges, abs=2)
 
@@ -94,7 +94,7 @@ def test_the_pronunciation_said_is_learned():
         said.append(tuple(units))
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), utterance.words, PAUSE)
+        chosen = choose_pronunciations(hmm, compute_log_likelihoods(hmm, utterance.features), utterance.words, PAUSE)
         assert tuple(unit for part in chosen for unit in part.units) == units
 
 
@@ -117,7 +117,7 @@ def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
         edges.append([*where[:-1], where[-1] + 60])
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     errors = [
-        np.abs(align_units(hmm, log_likelihoods_of(hmm, utterance.features), units) - where).max()
+        np.abs(align_units(hmm, compute_log_likelihoods(hmm, utterance.features), units) - where).max()
         for utterance, units, where in zip(transcribed, said, edges, strict=True)
     ]
     assert max(errors) <= 3

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.types.moods import moods_of
+from lipmotion.types.moods import parse_moods
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
@@ -107,13 +107,13 @@ def _expressive(*names):
 def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_path):
     write_glb(tmp_path / "head.glb", _expressive("Happy", "surprised"))
     character = load_character(tmp_path / "head.glb")
-    moved = with_moods(motion(), moods_of("happy:0.5, afraid at 1.5"))
+    moved = with_moods(motion(), parse_moods("happy:0.5, afraid at 1.5"))
     mouth = spoken_mouth(moved, units())
     weights = character.expressions(moved, mouth)
     assert {*weights} == {"Happy", "surprised"}
     assert weights["Happy"][:100] == pytest.approx(0.5)
     assert weights["surprised"][-1] == pytest.approx(0.5)
-    shut = with_moods(motion(), moods_of("afraid"))
+    shut = with_moods(motion(), parse_moods("afraid"))
     surprised = character.expressions(shut, spoken_mouth(shut, units()))["surprised"]
     assert surprised[[20, 75]] == pytest.approx(0.5, abs=0.05)
     assert surprised[[55, 95]] == pytest.approx(0, abs=0.01)  # m, p
@@ -123,7 +123,7 @@ def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_p
 
 def test_characters_with_finer_shapes_do_not_show_whole_expressions(files):
     character = load_character(files / "head.glb")
-    moved = with_moods(motion(), moods_of("happy"))
+    moved = with_moods(motion(), parse_moods("happy"))
     assert not character.expressions(moved, spoken_mouth(moved, units()))
     weights, plain = (character.weights(of, units()) for of in (moved, motion()))
     assert weights["mouthSmileLeft"][20] > plain["mouthSmileLeft"][20] + 0.5
@@ -134,6 +134,6 @@ def test_control_points_raise_the_corners_in_a_smile(files):
     placement = character.placement
     corner = placement.vertices[placement.row(61)]
     plain, happy = (
-        next(character.vertices(of, units(), TIME_S)) for of in (motion(), with_moods(motion(), moods_of("happy")))
+        next(character.vertices(of, units(), TIME_S)) for of in (motion(), with_moods(motion(), parse_moods("happy")))
     )
     assert happy[corner, 1] > plain[corner, 1] + 0.05 * placement.scale

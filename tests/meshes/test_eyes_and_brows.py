@@ -12,7 +12,7 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights
 from lipmotion.meshes.model.bones import ANGLES
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline
-from lipmotion.types.moods import moods_of
+from lipmotion.types.moods import parse_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion_faces.base import stage_liveliness
 from lipmotion_faces.head.pose import head_poses
@@ -35,7 +35,7 @@ def captured(curves: dict[str, object]) -> Motion:
 
 @pytest.mark.parametrize("mood", ["", "afraid", "happy", "disgusted"])
 def test_a_face_moves_as_in_the_file_of_its_own_curves(mood: str) -> None:
-    played = moved(with_moods(TALK, moods_of(mood)), seed=3)
+    played = moved(with_moods(TALK, parse_moods(mood)), seed=3)
     weights = eye_and_brow_weights(played)
     again = moved(captured(weights | dict(zip(ANGLES, played.turn.T, strict=True))), seed=4)
     for name, curve in eye_and_brow_weights(again).items():
@@ -58,7 +58,7 @@ def test_curves_that_never_move_leave_the_face_to_itself() -> None:
 
 
 def test_each_side_is_kept_and_a_mood_is_added() -> None:
-    tired = with_moods(captured({"browDownLeft": 0.8, "browInnerUp": 0.3}), moods_of("tired"))
+    tired = with_moods(captured({"browDownLeft": 0.8, "browInnerUp": 0.3}), parse_moods("tired"))
     weights = eye_and_brow_weights(moved(tired))
     assert weights["browDownLeft"] == pytest.approx(0.8)
     assert weights["browInnerUp"] == pytest.approx(0.3 + 0.1)

@@ -10,7 +10,7 @@ import pytest
 from lipmotion.errors import CorpusError
 from lipmotion.motion import acoustic_network, network_steps
 from lipmotion.motion.acoustic_network import AcousticNetwork
-from lipmotion.motion.network_steps import STEP, between_steps
+from lipmotion.motion.network_steps import STEP, interpolate_steps
 from lipmotion.motion.predictors import PredictorTraining
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.testing.examples import example
@@ -59,13 +59,13 @@ def test_it_predicts_motion_of_held_out_speech(trained: AcousticNetwork) -> None
 
 def test_frames_at_the_steps_have_the_values_of_the_steps() -> None:
     steps = np.random.default_rng(0).standard_normal((6, 2))
-    curve = between_steps(steps, 23)
+    curve = interpolate_steps(steps, 23)
     np.testing.assert_allclose(curve[::STEP], steps, atol=1e-12)
-    np.testing.assert_allclose(between_steps(steps, 23, first=2), np.concatenate([steps[[0, 0]], curve[:21]]))
+    np.testing.assert_allclose(interpolate_steps(steps, 23, first=2), np.concatenate([steps[[0, 0]], curve[:21]]))
 
 
 def test_a_straight_line_stays_straight_inside() -> None:
-    curve = between_steps(np.arange(8.0)[:, None], 29)
+    curve = interpolate_steps(np.arange(8.0)[:, None], 29)
     np.testing.assert_allclose(curve[STEP : -2 * STEP, 0], np.arange(29)[STEP : -2 * STEP] / STEP, atol=1e-12)
 
 

@@ -10,13 +10,13 @@ import pytest
 from lipmotion.motion.articulation import (
     ARTICULATORS,
     ArticulationPrior,
-    articulation_arrays,
     articulation_from_arrays,
-    articulation_table,
-    articulators,
+    articulation_to_arrays,
     count_contexts,
-    dynamics_of,
     fit_articulation_prior,
+    read_articulation_table,
+    slice_dynamics,
+    trace_articulators,
 )
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.delta_windows import with_dynamics
@@ -28,7 +28,7 @@ OPENING, WIDTH = ARTICULATORS.index("opening"), ARTICULATORS.index("width")
 def middle(phone: str, articulator: int) -> float:
     """The articulator in the middle of a long phone between others."""
     units = timeline(("t", phone, "t"), 0.3)
-    curve = articulators(units, 230)
+    curve = trace_articulators(units, 230)
     span = units[2]
     return float(curve[int((span.start_s + span.end_s) * 50), articulator])
 
@@ -43,7 +43,7 @@ def test_rounded_sounds_are_narrow() -> None:
 
 
 def test_a_phone_without_a_row_borrows_that_of_the_most_similar_one() -> None:
-    assert "oy" not in articulation_table()
+    assert "oy" not in read_articulation_table()
     assert middle("oy", OPENING) == pytest.approx(middle("ao", OPENING))
 
 
@@ -100,7 +100,7 @@ def test_ranges_of_frames_have_the_dynamics_of_the_whole() -> None:
     values = np.random.default_rng(0).standard_normal((30, 2))
     whole = with_dynamics(values)
     for frames in (slice(0, 30), slice(0, 7), slice(7, 20), slice(20, 30), slice(None)):
-        np.testing.assert_allclose(dynamics_of(values, frames), whole[frames])
+        np.testing.assert_allclose(slice_dynamics(values, frames), whole[frames])
 
 
 def test_contexts_are_counted_with_pauses_as_silence() -> None:
@@ -112,7 +112,7 @@ def test_contexts_are_counted_with_pauses_as_silence() -> None:
 
 
 def test_it_is_the_same_after_serialisation(prior: ArticulationPrior) -> None:
-    again = articulation_from_arrays(articulation_arrays(prior), len(prior.centre))
+    again = articulation_from_arrays(articulation_to_arrays(prior), len(prior.centre))
     assert again is not None
     assert again.contexts == prior.contexts
     np.testing.assert_allclose(again.matrix, prior.matrix)

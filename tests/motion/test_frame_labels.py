@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_neighbours
+from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_neighbours
 from lipmotion.types import Span, Timeline, Unit
 
 LAYOUT = StateLayout(5, 7, 0.1)
@@ -15,7 +15,7 @@ def spans(*labels: tuple[float, float, str]) -> Timeline[Unit]:
 
 def states_of(units: Timeline[Unit], phone: str, states: int = 5, edge_s: float = 0.08) -> list[int]:
     return [
-        label.state for label in full_context_states(units, 200, StateLayout(states, 1, edge_s)) if label.unit == phone
+        label.state for label in label_full_context(units, 200, StateLayout(states, 1, edge_s)) if label.unit == phone
     ]
 
 
@@ -62,7 +62,7 @@ def test_states_mirror_in_time(start, length, edge):
 
 
 def test_silence_rests_away_from_speech_only():
-    states = full_context_states(spans((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, LAYOUT)
+    states = label_full_context(spans((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, LAYOUT)
     rests = np.array([state == REST for state in states])
     margin = round(LAYOUT.rest_s * 100)
     assert margin == 30
@@ -74,14 +74,14 @@ def test_silence_rests_away_from_speech_only():
 
 def test_short_silence_between_words_never_rests():
     units = spans((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
-    assert REST not in full_context_states(units, 70, LAYOUT)
+    assert REST not in label_full_context(units, 70, LAYOUT)
 
 
 def test_frames_outside_all_units_rest():
-    states = full_context_states(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
+    states = label_full_context(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
     assert [frame for frame in range(60) if states[frame] != REST] == [*range(10, 20), *range(30, 40)]
 
 
 def test_frames_belong_to_the_unit_that_has_begun():
-    states = full_context_states(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
+    states = label_full_context(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
     assert [state.unit for state in states] == ["aa"] * 11 + ["t"] * 9

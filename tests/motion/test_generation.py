@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.engines import engine_named
 from lipmotion.motion import generation as module
-from lipmotion.motion.closure import closable_ranges
+from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.modulation_filter import REACH, ModulationFilter
 from lipmotion.testing.examples import PHONES, examples, speech, timeline
 from lipmotion.types import Constraints, Pin
@@ -54,7 +54,7 @@ def test_the_filter_is_weaker_for_voices_that_are_less_known():
     learned = replace(MODEL.motion, modulation=ModulationFilter(taps))
     assert learned.for_voice(1.0).modulation.taps == pytest.approx(taps)
     assert replace(learned, modulation=None).for_voice(0.3).modulation is None
-    sides = learned.for_voice(0.75).modulation.taps[REACH + 1]  # strangeness: one half
+    sides = learned.for_voice(0.75).modulation.taps[REACH + 1]  # unseen_share: one half
     width = MODEL.space.direct_names.index("width")
     assert sides[width] == pytest.approx(-0.25)
     assert np.delete(sides, width) == pytest.approx(-0.5)
@@ -73,7 +73,7 @@ def test_the_modulation_filter_keeps_pins_closures_and_blocks(monkeypatch):
     assert np.abs(np.diff(filtered, 3)).mean() > 1.5 * np.abs(np.diff(plain, 3)).mean()
     assert filtered[330] == 0.2
     assert filtered.min() >= 0
-    ranges = closable_ranges(SPOKEN.units, len(filtered))
+    ranges = find_closable_ranges(SPOKEN.units, len(filtered))
     assert len(ranges) > 5
     for each in ranges:
         assert filtered[each].min() <= plain[each].min()

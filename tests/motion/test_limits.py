@@ -5,13 +5,13 @@ import pytest
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.motion.closure import Closure
-from lipmotion.motion.limits import MotionLimits, check_poses, check_rest, check_spread, limits_of
+from lipmotion.motion.limits import MotionLimits, check_poses, check_rest, check_spread, measure_limits
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.pca import Pca
 from lipmotion.types import GREY, WEIGHT, Channel
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])
-REACH = limits_of(POSES)
+REACH = measure_limits(POSES)
 CLOSURE = Closure(0, 0.02, np.array([1.0, 0.2]))
 
 
@@ -25,7 +25,7 @@ FACE = space("eye_distance", "eye_distance")
 
 def test_reach_is_what_poses_span() -> None:
     assert (REACH.low.tolist(), REACH.high.tolist()) == ([0.0, 0.5], [0.3, 0.6])
-    wide = REACH.extended(np.array([0.1, 0.01]))
+    wide = REACH.extend(np.array([0.1, 0.01]))
     assert wide.low == pytest.approx([-0.3, 0.47])
     assert wide.high == pytest.approx([0.6, 0.63])
 
@@ -51,7 +51,7 @@ def test_pins_lead_farther_and_what_follows_the_opening_with_them() -> None:
 
 
 def test_dimensions_that_do_not_move() -> None:
-    still = limits_of(np.full((3, 2), 0.5))
+    still = measure_limits(np.full((3, 2), 0.5))
     still.check(np.full((4, 2), 0.501), None, {})
     check_rest(np.full(2, 0.5), still)
 

@@ -11,10 +11,10 @@ from lipmotion.motion.modulation_filter import (
     MODULATION,
     REACH,
     ModulationFilter,
-    filter_arrays,
     filter_from_arrays,
+    filter_to_arrays,
     fit_modulation_filter,
-    learned_filter,
+    learn_filter,
 )
 from lipmotion.storage.schema import format_errors
 from lipmotion.testing.examples import examples
@@ -65,11 +65,11 @@ def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wa
     smooth = [gaussian_filter1d(x, 2.0, axis=0) for x in values]
     noise = [still for x in values for still in (x[:28], x[-28:])]  # at rest, and 0.3 s away from speech
     noisy, freed = fit_modulation_filter(values, smooth), fit_modulation_filter(values, smooth, noise)
-    found = learned_filter(0.5, zip(values, smooth, strict=True), training, values)
+    found = learn_filter(0.5, zip(values, smooth, strict=True), training, values)
     assert found is not None
     errors = [np.abs(found.taps - each.of_strength(0.5).taps).max() for each in (noisy, freed)]
     assert errors[1] < 0.1 * errors[0]
-    nothing = learned_filter(1.0, [], training, values)
+    nothing = learn_filter(1.0, [], training, values)
     assert nothing is not None
     assert nothing.apply(values[0]) == pytest.approx(values[0])
 
@@ -77,7 +77,7 @@ def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wa
         pytest.fail("motion is generated for a filter of no strength")
         yield
 
-    assert learned_filter(0.0, unwanted(), training, values) is None
+    assert learn_filter(0.0, unwanted(), training, values) is None
 
 
 def test_a_mouth_at_rest_stays_there() -> None:
@@ -116,12 +116,12 @@ def test_what_never_moves_is_left_as_it_is() -> None:
 
 
 def test_it_is_stored() -> None:
-    stored = filter_from_arrays(filter_arrays(FILTER), 2)
+    stored = filter_from_arrays(filter_to_arrays(FILTER), 2)
     assert stored is not None
     assert np.array_equal(stored.taps, FILTER.taps)
-    assert filter_from_arrays(filter_arrays(None), 2) is None
+    assert filter_from_arrays(filter_to_arrays(None), 2) is None
     with pytest.raises(ModelFormatError), format_errors("the model"):
-        filter_from_arrays(filter_arrays(None), 2, needed=True)
+        filter_from_arrays(filter_to_arrays(None), 2, needed=True)
     for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], np.full_like(FILTER.taps, MODULATION["modulation"].most + 1)):
         with pytest.raises(ModelFormatError), format_errors("the model"):
-            filter_from_arrays(filter_arrays(ModulationFilter(taps)), 2)
+            filter_from_arrays(filter_to_arrays(ModulationFilter(taps)), 2)

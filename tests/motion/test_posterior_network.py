@@ -11,7 +11,7 @@ from lipmotion.motion import posterior_network
 from lipmotion.motion.acoustic_network import POSTERIOR_SHARES, AcousticNetwork
 from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.posterior_network import RECURRENT, PosteriorNetwork
-from lipmotion.motion.predictors import PredictorTraining, predictor_arrays, predictor_from_arrays
+from lipmotion.motion.predictors import PredictorTraining, predictor_from_arrays, predictor_to_arrays
 from lipmotion.types import (
     Channel,
     ConditionSpectrum,
@@ -118,14 +118,14 @@ def test_the_recurrent_network_counts_for_a_known_voice(
 def test_it_is_trained_without_spectra_where_one_is_missing() -> None:
     unheard = trained([example(number, heard=number > 0) for number in range(4)])
     assert unheard.recurrent is None
-    assert predictor_arrays(unheard).keys() == PosteriorNetwork.ARRAYS.keys() - RECURRENT.specs.keys()
+    assert predictor_to_arrays(unheard).keys() == PosteriorNetwork.ARRAYS.keys() - RECURRENT.specs.keys()
     with_spectrum, without = unheard.predict(speech(99))[0], unheard.predict(speech(99, heard=False))[0]
     assert np.isfinite(with_spectrum).all()
     assert np.isfinite(without).all()
 
 
 def test_it_is_stored_and_restored(network: PosteriorNetwork) -> None:
-    arrays = predictor_arrays(network)
+    arrays = predictor_to_arrays(network)
     assert arrays.keys() == PosteriorNetwork.ARRAYS.keys()
     restored = predictor_from_arrays(arrays, 2)
     assert isinstance(restored, PosteriorNetwork)

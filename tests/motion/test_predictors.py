@@ -25,10 +25,10 @@ from lipmotion.motion.predictors import (
     PREDICTORS,
     Predictor,
     PredictorFit,
-    conditions_of,
-    predictor_class,
+    choose_predictor,
+    count_conditions,
+    load_predictor,
     predictor_from_arrays,
-    suitable_predictor,
 )
 from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.testing.examples import example, examples, speech, timeline
@@ -50,7 +50,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[type[
     monkeypatch.syspath_prepend(tmp_path)
     point = metadata.EntryPoint("frames", "predictor_of_the_page:FrameRegression", PREDICTORS.group)
     monkeypatch.setitem(PREDICTORS.__dict__, "_installed", {"frames": point})
-    yield predictor_class("frames")
+    yield load_predictor("frames")
     del sys.modules["predictor_of_the_page"]
 
 
@@ -125,18 +125,18 @@ def test_the_recordings_choose_where_no_name_is_given() -> None:
         condition_spectra=(ConditionSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),),
     )
     much = replace(standing, valid=np.ones(48_000, bool), condition_spectra=heard.condition_spectra)
-    assert suitable_predictor(AUTOMATIC, [one]) is None
-    assert suitable_predictor(AUTOMATIC, [standing]) is PriorRegression
-    assert suitable_predictor(AUTOMATIC, [heard]) is AcousticNetwork
-    assert suitable_predictor(AUTOMATIC, [much]) is AcousticNetwork
-    assert suitable_predictor("prior", [heard]) is PriorRegression
-    assert suitable_predictor(AUTOMATIC, [replace(heard, valid=np.ones(11_999, bool))]) is None
+    assert choose_predictor(AUTOMATIC, [one]) is None
+    assert choose_predictor(AUTOMATIC, [standing]) is PriorRegression
+    assert choose_predictor(AUTOMATIC, [heard]) is AcousticNetwork
+    assert choose_predictor(AUTOMATIC, [much]) is AcousticNetwork
+    assert choose_predictor("prior", [heard]) is PriorRegression
+    assert choose_predictor(AUTOMATIC, [replace(heard, valid=np.ones(11_999, bool))]) is None
     spoken = replace(one, speech=replace(one.speech, posteriors=TokenPosteriors(np.zeros((9, 3), np.float16), "", 1)))
-    assert suitable_predictor(AUTOMATIC, [spoken]) is PosteriorNetwork
-    assert suitable_predictor(AUTOMATIC, [spoken, one]) is None
-    assert [conditions_of(AUTOMATIC, motion_s, 4) for motion_s in (119.9, 120)] == [1, 4]
-    assert conditions_of(AUTOMATIC, 1, 0) == 0
-    assert [conditions_of(name, 1, 4) for name in ("network", "posteriors", "prior")] == [0, 1, 4]
+    assert choose_predictor(AUTOMATIC, [spoken]) is PosteriorNetwork
+    assert choose_predictor(AUTOMATIC, [spoken, one]) is None
+    assert [count_conditions(AUTOMATIC, motion_s, 4) for motion_s in (119.9, 120)] == [1, 4]
+    assert count_conditions(AUTOMATIC, 1, 0) == 0
+    assert [count_conditions(name, 1, 4) for name in ("network", "posteriors", "prior")] == [0, 1, 4]
 
 
 def test_a_header_names_the_predictor_only_where_it_was_chosen() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lipmotion.motion.network_steps import STEP
-from lipmotion.motion.predictors import PredictorFit, PredictorTraining, folds
+from lipmotion.motion.predictors import PredictorFit, PredictorTraining, split_folds
 from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.testing.examples import example
 from lipmotion.types import SPECTRUM_BANDS, Example, PriorOutput
@@ -71,9 +71,9 @@ def test_a_useless_prior_is_left_out() -> None:
 
 def test_folds_part_all_examples() -> None:
     for count in (1, 2, 5, 9):
-        outside = [number for _, out in folds(count) for number in out]
+        outside = [number for _, out in split_folds(count) for number in out]
         assert sorted(outside) == list(range(count))
-    assert all(not set(inside) & set(out) for inside, out in folds(5))
+    assert all(not set(inside) & set(out) for inside, out in split_folds(5))
 
 
 def test_it_is_the_same_after_serialisation(fitted: PredictorFit) -> None:

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.closure import closable_ranges
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.closure import find_closable_ranges
+from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.speaker_maps import (
     FAR_FROM_SPEECH_S,
     NEAR_SPEECH_S,
     VISEME_NAMES,
     SpeakerMaps,
-    mean_person_examples,
-    restfulness,
-    speaker_arrays,
+    add_habits,
+    map_to_mean_person,
+    measure_restfulness,
     speakers_from_arrays,
-    viseme_weights,
-    with_habits,
+    speakers_to_arrays,
+    weigh_visemes,
 )
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
@@ -50,7 +50,7 @@ def ben(count: int = 6) -> list[Example]:
             each,
             OFFSET
             + GAIN * each.motion.values
-            + np.array([0.05, 0, 0.05]) * restfulness(each.speech.units, len(each.motion.values))[:, None],
+            + np.array([0.05, 0, 0.05]) * measure_restfulness(each.speech.units, len(each.motion.values))[:, None],
         )
         for each in anna(count)
     ]
@@ -59,7 +59,7 @@ def ben(count: int = 6) -> list[Example]:
 def both(*groups: Sequence[Example]) -> tuple[list[list[Example]], SpeakerMaps]:
     examples = [example for group in groups for example in group]
     names = [name for name, group in zip(("anna", "ben", "cleo"), groups, strict=False) for _ in group]
-    mapped, maps = mean_person_examples(examples, names)
+    mapped, maps = map_to_mean_person(examples, names)
     parts = iter(mapped)
     return [[next(parts) for _ in group] for group in groups], maps
 
@@ -69,7 +69,7 @@ def poses(examples: Sequence[Example]) -> np.ndarray:
 
 
 def at_rest(examples: Sequence[Example]) -> np.ndarray:
-    frames = [restfulness(each.speech.units, len(each.motion.values)) >= 1 for each in examples]
+    frames = [measure_restfulness(each.speech.units, len(each.motion.values)) >= 1 for each in examples]
     return np.median(poses(examples)[np.concatenate(frames)], axis=0)
 
 
@@ -79,7 +79,7 @@ def closed(examples: Sequence[Example]) -> float:
             [
                 each.motion.values[frames, 0].min()
                 for each in examples
-                for frames in closable_ranges(each.speech.units, len(each.motion.values))
+                for frames in find_closable_ranges(each.speech.units, len(each.motion.values))
             ]
         )
     )
@@ -117,10 +117,10 @@ def test_a_map_and_its_inverse() -> None:
 
 def test_restfulness_grows_with_the_distance_from_speech() -> None:
     units = toy_sentences(3)[0].units
-    speech_s = speech_intervals(units)
+    speech_s = list_speech_intervals(units)
     times = np.arange(250) / 100
     distance = [max(0.0, min(max(a - t, t - b) for a, b in speech_s)) for t in times]
-    found = restfulness(units, 250)
+    found = measure_restfulness(units, 250)
     near, far = np.array(distance) < NEAR_SPEECH_S, np.array(distance) > FAR_FROM_SPEECH_S
     assert near.any()
     assert far.any()
@@ -129,7 +129,7 @@ def test_restfulness_grows_with_the_distance_from_speech() -> None:
     between = ~near & ~far
     order = np.argsort(np.array(distance)[between], kind="stable")
     assert np.diff(found[between][order]).min() > -1e-9
-    assert (away_from_speech(times, speech_s, FAR_FROM_SPEECH_S) == far).all()
+    assert (is_away_from_speech(times, speech_s, FAR_FROM_SPEECH_S) == far).all()
 
 
 def test_points_share_a_gain_for_each_axis() -> None:
@@ -163,7 +163,7 @@ def test_a_channel_that_somebody_does_not_move_is_not_stretched() -> None:
 def test_people_without_silence_or_without_speech() -> None:
     talk = []
     for each in ben():
-        start_s, end_s = speech_intervals(each.speech.units)[0][0], speech_intervals(each.speech.units)[-1][1]
+        start_s, end_s = list_speech_intervals(each.speech.units)[0][0], list_speech_intervals(each.speech.units)[-1][1]
         first, stop = int(np.ceil(start_s * 100)), int(end_s * 100)
         spans = [Span(s.start_s - start_s, s.end_s - start_s, s.label) for s in each.speech.units if s.label.word]
         motion = replace(each.motion, values=each.motion.values[first:stop])
@@ -184,13 +184,13 @@ def test_unseen_frames_change_nothing() -> None:
 
     _, one = both([with_unseen(each, 0.0) for each in anna()], ben())
     _, other = both([with_unseen(each, 9.0) for each in anna()], ben())
-    for array, same in zip(speaker_arrays(one).values(), speaker_arrays(other).values(), strict=True):
+    for array, same in zip(speakers_to_arrays(one).values(), speakers_to_arrays(other).values(), strict=True):
         assert np.array_equal(array, same)
 
 
 def test_speakers_without_a_name_are_one_person_more() -> None:
     examples = [*anna(), *ben(), *anna(3)]
-    mapped, maps = mean_person_examples(examples, ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
+    mapped, maps = map_to_mean_person(examples, ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
     assert maps.names == ("anna", "ben")
     assert len(mapped) == 15
 
@@ -212,25 +212,25 @@ def test_channels_in_another_order() -> None:
 
 def test_habits_are_what_is_left_in_each_viseme() -> None:
     examples, names = [*anna(), *ben()], ["anna"] * 6 + ["ben"] * 6
-    mapped, maps = mean_person_examples(examples, names)
+    mapped, maps = map_to_mean_person(examples, names)
     planted = np.zeros((len(VISEME_NAMES), 3))
     planted[VISEME_NAMES.index("lr1"), 1], planted[VISEME_NAMES.index("al"), 2] = 0.1, -0.2
     generated = [
         each.motion.values
-        - (viseme_weights(each.speech.units, len(each.motion.values)) @ planted if name == "ben" else 0.0)
+        - (weigh_visemes(each.speech.units, len(each.motion.values)) @ planted if name == "ben" else 0.0)
         for each, name in zip(mapped, names, strict=True)
     ]
-    found = with_habits(maps, mapped, names, generated)
+    found = add_habits(maps, mapped, names, generated)
     np.testing.assert_allclose(found.of("anna").habits, 0, atol=1e-12)
     habits = found.of("ben").habits
     assert 0.05 < habits[VISEME_NAMES.index("lr1"), 1] < 0.1
     assert -0.2 < habits[VISEME_NAMES.index("al"), 2] < -0.05
     assert np.abs(habits[:, 0]).max() < 1e-12
     one = mapped[-1]
-    visemes = viseme_weights(one.speech.units, len(one.motion.values))
+    visemes = weigh_visemes(one.speech.units, len(one.motion.values))
     shift = found.of("ben").shift(one.motion.values, visemes)
     assert np.abs(shift).max() > 0.03
-    restful = restfulness(one.speech.units, len(shift)) >= 1
+    restful = measure_restfulness(one.speech.units, len(shift)) >= 1
     assert np.abs(shift[restful]).max() < 1e-12
     closed_lips = one.motion.values[:, 0] <= found.lips[0] + 1e-9  # rounding
     assert closed_lips.any()
@@ -239,18 +239,18 @@ def test_habits_are_what_is_left_in_each_viseme() -> None:
 
 def test_weights_of_visemes_fade() -> None:
     units = toy_sentences(3)[0].units
-    weights = viseme_weights(units, 250)
-    assert np.abs(weights.sum(axis=1) + restfulness(units, 250) - 1).max() < 1e-9
+    weights = weigh_visemes(units, 250)
+    assert np.abs(weights.sum(axis=1) + measure_restfulness(units, 250) - 1).max() < 1e-9
     assert 0 < np.abs(np.diff(weights, axis=0)).max() < 0.3
     unknown = Timeline((Span(0.0, 1.0, Unit("", "a group")),))
-    assert np.abs(viseme_weights(unknown, 100)).max() < 1e-12
+    assert np.abs(weigh_visemes(unknown, 100)).max() < 1e-12
 
 
 def test_maps_are_stored() -> None:
     _, maps = both(anna(), ben())
-    again = speakers_from_arrays(speaker_arrays(maps))
+    again = speakers_from_arrays(speakers_to_arrays(maps))
     assert (again.names, again.channels) == (maps.names, maps.channels)
-    for array, same in zip(speaker_arrays(maps).values(), speaker_arrays(again).values(), strict=True):
+    for array, same in zip(speakers_to_arrays(maps).values(), speakers_to_arrays(again).values(), strict=True):
         assert np.array_equal(array, same)
 
 
@@ -269,14 +269,14 @@ def test_damaged_maps_are_refused() -> None:
         ("channels", np.array([["a", "b"]] * 3)),
         ("more", np.ones(2)),
     ):
-        arrays = speaker_arrays(both(anna(3), ben(3))[1])
+        arrays = speakers_to_arrays(both(anna(3), ben(3))[1])
         with pytest.raises(ModelFormatError, match="table of speakers"):
             speakers_from_arrays(arrays | {name: value})
 
 
 def test_missing_arrays_are_refused() -> None:
     for name in ("channels", "names", "gain", "offset", "rest", "habits", "lips"):
-        arrays = speaker_arrays(both(anna(3), ben(3))[1])
+        arrays = speakers_to_arrays(both(anna(3), ben(3))[1])
         del arrays[name]
         with pytest.raises(ModelFormatError, match=name):
             speakers_from_arrays(arrays)
@@ -292,7 +292,7 @@ def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> Non
         else:
             labels.append(replace(span, label=Unit("t" if span.label.phone in ("p", "b", "m") else span.label.phone)))
     recognised = replace(clip, speech=replace(clip.speech, units=Timeline(tuple(labels))))
-    opened = [clip.motion.values[f, 0].min() for f in closable_ranges(recognised.speech.units, 10_000)]
+    opened = [clip.motion.values[f, 0].min() for f in find_closable_ranges(recognised.speech.units, 10_000)]
     assert np.median(opened) > closed([clip]) + 0.02
     _, maps = both(anna(), [recognised])
     shut = np.full((1, 3), maps.lips[0])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.motion.closure import closable_ranges
-from lipmotion.motion.speaker_maps import RANGE_PRIOR_S, SpeakerMap, restfulness
-from lipmotion.motion.transfer_map import REST_PRIOR_S, composed, measured_speech_s, transfer_map, with_channels
+from lipmotion.motion.closure import find_closable_ranges
+from lipmotion.motion.speaker_maps import RANGE_PRIOR_S, SpeakerMap, measure_restfulness
+from lipmotion.motion.transfer_map import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map, select_channels
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
 
@@ -29,7 +29,7 @@ def source(count: int = 6) -> list[Example]:
 
 
 def restful(example: Example) -> np.ndarray:
-    return restfulness(example.speech.units, len(example.motion.values))
+    return measure_restfulness(example.speech.units, len(example.motion.values))
 
 
 def target(examples: list[Example]) -> list[Example]:
@@ -50,7 +50,7 @@ def random_map(seed: int, habits: float = 0.0) -> SpeakerMap:
 def test_motion_of_the_source_becomes_that_of_the_target() -> None:
     examples = source()
     wanted = target(examples)
-    person = transfer_map(examples, wanted)
+    person = fit_transfer_map(examples, wanted)
     for mine, theirs in zip(examples, wanted, strict=True):
         mapped = person.to_person(mine.motion.values, restful(mine))
         before = np.abs(mine.motion.values - theirs.motion.values).mean(axis=0)
@@ -63,7 +63,7 @@ def test_the_rest_pose_counts_by_the_seconds_of_silence(count: int) -> None:
     """With S seconds the way from the map of speech to the target's rest pose counts S / (S + 0.5)."""
     examples = source(count)
     wanted = target(examples)
-    person = transfer_map(examples, wanted)
+    person = fit_transfer_map(examples, wanted)
     silences = [restful(each) > 1 - 1e-9 for each in examples]
     silence_s = sum(map(np.count_nonzero, silences)) / 100
     for mine, theirs, silence in zip(examples, wanted, silences, strict=True):
@@ -75,10 +75,10 @@ def test_the_rest_pose_counts_by_the_seconds_of_silence(count: int) -> None:
 
 def test_closed_lips_stay_closed() -> None:
     examples = source()
-    person = transfer_map(examples, target(examples))
+    person = fit_transfer_map(examples, target(examples))
     for each in examples:
         mapped = person.to_person(each.motion.values, restful(each))
-        for frames in closable_ranges(each.speech.units, len(mapped)):
+        for frames in find_closable_ranges(each.speech.units, len(mapped)):
             assert mapped[frames, 0].min() == pytest.approx(OFFSET[0], abs=0.01)
 
 
@@ -87,16 +87,16 @@ def test_gains_grow_with_the_seconds_of_speech() -> None:
     examples = source()
     for count in (1, 6):
         some = examples[:count]
-        person = transfer_map(some, target(some))
-        trust = measured_speech_s(some) / (measured_speech_s(some) + RANGE_PRIOR_S)
+        person = fit_transfer_map(some, target(some))
+        trust = count_speech_s(some) / (count_speech_s(some) + RANGE_PRIOR_S)
         np.testing.assert_allclose(np.log(person.gain) / trust, np.log(GAIN), atol=0.05)
 
 
 def test_gains_have_limits() -> None:
     examples = source()
     wild = [replace(each, motion=replace(each.motion, values=12 * each.motion.values)) for each in examples]
-    assert transfer_map(examples, wild).gain.max() == pytest.approx(4.0)
-    assert transfer_map(wild, examples).gain.min() == pytest.approx(0.25)
+    assert fit_transfer_map(examples, wild).gain.max() == pytest.approx(4.0)
+    assert fit_transfer_map(wild, examples).gain.min() == pytest.approx(0.25)
 
 
 def test_frames_that_were_not_measured_do_not_matter() -> None:
@@ -108,8 +108,8 @@ def test_frames_that_were_not_measured_do_not_matter() -> None:
         valid[20:40], values[20:40] = False, 1e3
         hidden.append(replace(each, valid=valid, motion=replace(each.motion, values=values)))
     mine = [replace(each, valid=other.valid) for each, other in zip(examples, hidden, strict=True)]
-    left_out = transfer_map(mine, hidden)
-    np.testing.assert_allclose(left_out.gain, transfer_map(examples, wanted).gain, rtol=0.2)
+    left_out = fit_transfer_map(mine, hidden)
+    np.testing.assert_allclose(left_out.gain, fit_transfer_map(examples, wanted).gain, rtol=0.2)
     assert np.abs(left_out.offset).max() < 1
 
 
@@ -117,18 +117,18 @@ def test_two_maps_one_after_the_other() -> None:
     rng = np.random.default_rng(3)
     values, rest, weights = rng.normal(size=(40, 3)), rng.uniform(size=40), rng.uniform(size=(40, 13))
     first, second = random_map(0, habits=0.1), random_map(1)
-    both = composed(first, second)
+    both = compose_maps(first, second)
     shifted = values + first.shift(values, weights)
     wanted = second.to_person(first.to_person(shifted, rest), rest)
     np.testing.assert_allclose(both.to_person(values + both.shift(values, weights), rest), wanted, atol=1e-12)
-    assert composed(None, second) is second
+    assert compose_maps(None, second) is second
 
 
 def test_channels_in_the_order_of_a_model() -> None:
     motion = Motion(np.arange(6.0).reshape(2, 3), 100.0, tuple(map(Channel, ("a", "b", "c"))))
-    assert with_channels(motion, (Channel("c"), Channel("a")), "x").values.tolist() == [[2.0, 0.0], [5.0, 3.0]]
+    assert select_channels(motion, (Channel("c"), Channel("a")), "x").values.tolist() == [[2.0, 0.0], [5.0, 3.0]]
     with pytest.raises(InputError, match=r"x: .*no channel 'jaw' in the unit 'weight'.*1 of 2 are missing.*lipmotion"):
-        with_channels(motion, (Channel("a"), Channel("jaw", "weight")), "x")
+        select_channels(motion, (Channel("a"), Channel("jaw", "weight")), "x")
 
 
 def test_seconds_of_measured_speech() -> None:
@@ -137,4 +137,4 @@ def test_seconds_of_measured_speech() -> None:
     valid = np.ones(200, bool)
     valid[80:] = False
     example = Example("x", Speech(Features(np.zeros((200, 39), np.float32), 2.0), units), motion, valid)
-    assert measured_speech_s([example]) == pytest.approx(0.3, abs=0.011)
+    assert count_speech_s([example]) == pytest.approx(0.3, abs=0.011)

@@ -11,17 +11,17 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import load_model
-from lipmotion.motion.closure import REACH_S, closable_ranges
+from lipmotion.motion.closure import REACH_S, find_closable_ranges
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import (
     CONSONANT_CLOSING,
     INSET_S,
     OPENING_BY_DURATION,
     VOWEL_S,
-    closing_reach_s,
-    typical_range,
-    with_breath,
-    with_contrast,
+    choose_closing_reach,
+    open_before_speech,
+    raise_contrast,
+    widen_range,
 )
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import understand
@@ -68,7 +68,7 @@ def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, 
     phones = ("t", "aa", "t", "aa", "t", "aa", "t")
     units = Timeline(tuple(Span(*edges, Unit(phone)) for edges, phone in zip(pairwise(seconds), phones, strict=True)))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = with_contrast(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 1.0, voice)
+    statistics = raise_contrast(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 1.0, voice)
     deviation = prior.matrix[0, 0]
     changed, kept = statistics(slice(20, 240))
     opening = changed[:, 0, 0] / deviation
@@ -84,7 +84,7 @@ def test_half_known_voices_open_before_they_speak(voice: float, share: float) ->
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit("aa")), Span(1.8, 2.5, Unit("sil"))))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = with_breath(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 0.5, voice)
+    statistics = open_before_speech(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 0.5, voice)
     changed, kept = statistics(slice(10, 250))
     assert changed[130 - 10, 0] == pytest.approx(share * prior.centre, rel=1e-3)
     assert np.abs(changed[[10, 60, 170, 230], 0]).max() < 1e-3
@@ -99,7 +99,9 @@ def test_a_model_of_few_phones_opens_no_mouth_before_speech() -> None:
     means, precisions = np.zeros((250, 3, len(prior.centre))), np.ones((250, 3, len(prior.centre)))
     changes = [
         np.abs(
-            with_breath(lambda frames: (means[frames], precisions[frames]), each, units, 250, 1.0, 0.8)(slice(250))[0]
+            open_before_speech(lambda frames: (means[frames], precisions[frames]), each, units, 250, 1.0, 0.8)(
+                slice(250)
+            )[0]
         ).max()
         for each in (prior, few)
     ]
@@ -128,7 +130,7 @@ def test_movements_are_those_of_typical_talkers_about_the_same_rest(welcome: Spe
     assert np.percentile(own, 98) < 0.18
     assert 0.2 < np.percentile(typical, 98) < 0.3
     assert np.abs(typical[:10] - own[:10]).max() < 0.01
-    for frames in closable_ranges(unknown.units, len(typical), reach_s=closing_reach_s(0.0)):
+    for frames in find_closable_ranges(unknown.units, len(typical), reach_s=choose_closing_reach(0.0)):
         assert typical[frames].min() <= load_model().learned.closure.closed + 1e-9
     ratio = np.sqrt(unknown.variance[:, 0] / np.maximum(known.variance[:, 0], 1e-12))
     assert 1.4 < np.median(ratio) < 2
@@ -155,21 +157,21 @@ def test_pins_are_in_delivered_units(welcome: Speech) -> None:
 
 def test_the_range_grows_with_what_is_not_known() -> None:
     learned = load_model().learned
-    factors = [typical_range(learned.prior, learned.space, voice, 1.0) for voice in (1.0, 0.7, 0.3, 0.0)]
+    factors = [widen_range(learned.prior, learned.space, voice, 1.0) for voice in (1.0, 0.7, 0.3, 0.0)]
     assert factors[0] == pytest.approx(1)
     assert np.diff(factors).min() > 0
-    assert typical_range(learned.prior, learned.space, 0.0, 0.0) > factors[-1]
+    assert widen_range(learned.prior, learned.space, 0.0, 0.0) > factors[-1]
     weights = tuple(replace(channel, unit="weight") for channel in learned.space.channels)
     other = MotionSpace(weights, learned.space.direct, learned.space.points)
-    assert typical_range(learned.prior, other, 0.0, 1.0) == pytest.approx(1)
+    assert widen_range(learned.prior, other, 0.0, 1.0) == pytest.approx(1)
 
 
 def test_lips_close_within_the_phones_of_unknown_voices() -> None:
-    assert closing_reach_s(1.0) == pytest.approx(REACH_S)
-    assert closing_reach_s(0.0) == pytest.approx(-INSET_S)
+    assert choose_closing_reach(1.0) == pytest.approx(REACH_S)
+    assert choose_closing_reach(0.0) == pytest.approx(-INSET_S)
     for duration_s in (0.02, 0.1):
         span = timeline(("b",), duration_s)[1]
-        (frames,) = closable_ranges(timeline(("b",), duration_s), 200, reach_s=-INSET_S)
+        (frames,) = find_closable_ranges(timeline(("b",), duration_s), 200, reach_s=-INSET_S)
         assert span.start_s - 1e-9 <= frames.start / 100 <= (frames.stop - 1) / 100 <= span.end_s + 1e-9
 
 

@@ -25,7 +25,7 @@ from lipmotion.pipeline.outputs.delivered import delivered
 from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.moods import MOODS
-from lipmotion.units import closing_phones
+from lipmotion.units import mark_closing_phones
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.shape_fit import lip_gap
 from lipmotion_faces.head.stage import figure, head_mesh
@@ -257,7 +257,7 @@ def _closures_kept(kind: str, mood: str) -> Generation:
     generation, moody = (delivered(KINDS[kind](), Delivery(mood=name)) for name in ("", mood))
     plain, mouth = (spoken_mouth(with_mouth(each.motion), each.units).contact for each in (generation, moody))
     time_s = generation.motion.time_s
-    for span, closing in zip(generation.units, closing_phones(generation.units), strict=True):
+    for span, closing in zip(generation.units, mark_closing_phones(generation.units), strict=True):
         within = (span.start_s <= time_s) & (time_s < span.end_s)
         assert not closing or (mouth[within].sum() >= 1 and plain[within].sum() - mouth[within].sum() <= 2)
     return moody

@@ -10,8 +10,8 @@ import pytest
 
 from lipmotion import Model
 from lipmotion.errors import ModelFormatError
-from lipmotion.hmm.model import hmm_arrays
-from lipmotion.motion.eigenlips import eigenlips_arrays
+from lipmotion.hmm.model import hmm_to_arrays
+from lipmotion.motion.eigenlips import eigenlips_to_arrays
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
@@ -62,8 +62,8 @@ def test_damaged_arrays_of_all_other_parts(pictured_model: Model) -> None:
     model = pictured_model
     assert model.eigenlips is not None
     parts = {
-        "phones": hmm_arrays(model.phones),
-        "eigenlips": eigenlips_arrays(model.eigenlips),
+        "phones": hmm_to_arrays(model.phones),
+        "eigenlips": eigenlips_to_arrays(model.eigenlips),
         "adaptation": adaptation_arrays(identity_adaptation(1.0, 0.5)),
     }
     read = [

@@ -22,7 +22,7 @@ from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.motion_files import in_format, thinned
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
-from lipmotion.types.moods import moods_of
+from lipmotion.types.moods import parse_moods
 from lipmotion_faces import Staging
 from meshes.speech import motion, units
 
@@ -145,7 +145,7 @@ def test_controls_of_a_rig_follow_brows_in_every_mood(generation: Generation, tm
     table = tmp_path / "rig.csv"
     table.write_text("control,source\nfrown,browDownLeft\ncheek,cheekSquintRight\n")
     plain, angry = (
-        curves_of(with_moods(generation.motion, moods_of(mood)), generation.units, table) for mood in ("", "angry")
+        curves_of(with_moods(generation.motion, parse_moods(mood)), generation.units, table) for mood in ("", "angry")
     )
     assert not plain["frown"].any()
     assert angry["frown"].min() > 0.5

@@ -20,7 +20,7 @@ from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Pin, StateTrace, Timeline
-from lipmotion.types.moods import moods_of
+from lipmotion.types.moods import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
@@ -102,7 +102,7 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
 
 @pytest.mark.long
 def test_shapes_of_moods_are_in_the_head_where_a_mood_is(generation: Generation, own_head: Scene) -> None:
-    moody = replace(generation, motion=with_moods(generation.motion, moods_of("angry:0.8, surprised at 1.0")))
+    moody = replace(generation, motion=with_moods(generation.motion, parse_moods("angry:0.8, surprised at 1.0")))
     scene = head_scene(moody, staging=Staging(brows=False))
     added = {*scene.mesh.shape_names} - {*own_head.mesh.shape_names}
     assert "browDownLeft" in added
@@ -128,7 +128,7 @@ def test_some_frames_are_those_of_the_whole(generation: Generation, mood: str, o
     values, spans, each_s = np.tile(generation.motion.values, (3, 1)), list(generation.units), 2.01
     units = [replace(s, start_s=s.start_s + n * each_s, end_s=s.end_s + n * each_s) for n in range(3) for s in spans]
     moved = replace(generation.motion, values=values)
-    moved = with_moods(moved, moods_of(mood)) if mood else moved
+    moved = with_moods(moved, parse_moods(mood)) if mood else moved
     pin = Pin(2.7, "jawOpen", 0.4)
     long = replace(
         generation, motion=moved, units=Timeline(tuple(units)), spread=np.zeros(moved.values.shape), curve_edits=(pin,)

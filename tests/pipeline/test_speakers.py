@@ -14,8 +14,8 @@ from lipmotion import Corpus, Model, Selection, animate, evaluate, explain, load
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.motion.closure import closable_ranges
-from lipmotion.motion.speaker_maps import speaker_arrays
+from lipmotion.motion.closure import find_closable_ranges
+from lipmotion.motion.speaker_maps import speakers_to_arrays
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.pipeline.request import Request
@@ -81,7 +81,7 @@ def test_each_person_moves_as_far_as_they_do(model: Model, toy_sentence: ToySent
 
 
 def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model: Model, toy_sentence: ToySentence) -> None:
-    ranges = closable_ranges(toy_sentence.units, len(opening(model, toy_sentence)))
+    ranges = find_closable_ranges(toy_sentence.units, len(opening(model, toy_sentence)))
     assert ranges
     for name, closed in (("anna", 0.0), ("ben", OFFSET[0])):
         curve = opening(model, toy_sentence, name)
@@ -142,11 +142,11 @@ def test_maps_of_other_channels_are_refused(
     model: Model, toy_sentence: ToySentence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def of_jaw(maps: object) -> dict[str, np.ndarray]:
-        arrays = speaker_arrays(maps)
+        arrays = speakers_to_arrays(maps)
         arrays["channels"] = np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")])
         return arrays
 
-    monkeypatch.setattr("lipmotion.pipeline.model.speaker_arrays", of_jaw)
+    monkeypatch.setattr("lipmotion.pipeline.model.speakers_to_arrays", of_jaw)
     save_model(model, tmp_path / "jaw.lipmotion")
     again = load_model(tmp_path / "jaw.lipmotion")
     with pytest.raises(InputError, match="'outer'"):

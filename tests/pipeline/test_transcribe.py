@@ -22,8 +22,8 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import Lexicon, is_silent, lexicon, words_of
-from lipmotion.units.phones import phone_edits
+from lipmotion.units import Lexicon, is_silent, lexicon, split_words
+from lipmotion.units.phones import count_phone_edits
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_unknown_words_are_recognised(
 @pytest.fixture
 def rules(monkeypatch: pytest.MonkeyPatch) -> None:
     """Words that are in no dictionary are read by rules."""
-    monkeypatch.setattr(lexicon, "network_pronunciation", lambda _: ())
+    monkeypatch.setattr(lexicon, "pronounce_by_network", lambda _: ())
 
 
 @pytest.mark.usefixtures("rules")
@@ -115,7 +115,7 @@ WELCOME = Path("examples/welcome.flac")
 @pytest.fixture(scope="module")
 def welcome() -> tuple[AnalysedAudio, tuple[str, ...]]:
     """Real speech of five seconds, and its words."""
-    return analysed(read_audio(WELCOME)), words_of(WELCOME.with_suffix(".txt").read_text())
+    return analysed(read_audio(WELCOME)), split_words(WELCOME.with_suffix(".txt").read_text())
 
 
 def corrected(audio: AnalysedAudio, words: tuple[str, ...]) -> Transcription:
@@ -167,7 +167,7 @@ def test_words_here_and_there_are_no_worse_than_none(
     wanted, with_some, with_none = (
         [span.label.phone for span in units if not is_silent(span.label.phone)] for units in (right, some, none)
     )
-    assert phone_edits(wanted, with_some) <= phone_edits(wanted, with_none)
+    assert count_phone_edits(wanted, with_some) <= count_phone_edits(wanted, with_none)
 
 
 @pytest.mark.parametrize("first", [False, True])
@@ -175,7 +175,7 @@ def test_a_sentence_that_nobody_says_is_left_out(
     welcome: tuple[AnalysedAudio, tuple[str, ...]], first: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     (audio, words), phones = welcome, Recogniser(load_model().phones, "auto")
-    extra = words_of("nobody answered the bell")
+    extra = split_words("nobody answered the bell")
     whole = transcribe(phones, audio, audio.mfcc(), words, Lexicon()).units
     longer = corrected(audio, (*extra, *words) if first else (*words, *extra))
     assert longer.units is not None

@@ -24,7 +24,7 @@ from lipmotion import (
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.motion.closure import closable_ranges
+from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
@@ -81,7 +81,7 @@ def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) ->
     assert np.abs(np.median(mapped.motion.values, axis=0) - np.median(wanted, axis=0)).max() < 0.03
     for name in own.motion.names:
         assert np.corrcoef(own.motion[name], mapped.motion[name])[0, 1] > 0.98
-    for frames in closable_ranges(sentence.units, len(mapped.motion.values)):
+    for frames in find_closable_ranges(sentence.units, len(mapped.motion.values)):
         assert mapped.motion["opening"][frames].min() == pytest.approx(OFFSET[0], abs=0.02)
 
 

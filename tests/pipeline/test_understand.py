@@ -115,7 +115,7 @@ def test_the_name_of_a_file_is_no_transcript(toy_model: Model, toy_sentence: Toy
         understand(toy_model, request)
 
 
-def words_in_time(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
+def group_words(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
     """Return each word of a sentence as a line in time."""
     lines = []
     for word, spans in groupby(sentence.units, key=lambda span: span.label.word):
@@ -133,7 +133,7 @@ def test_subtitles_are_aligned_within_their_times(toy_model: Model, toy_sentence
     plain = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
     wanted = understand(toy_model, plain)
     text = (tmp_path / "said.srt").read_text(encoding="utf-8")
-    for transcript in (tmp_path / "said.srt", text, words_in_time(toy_sentence), words_in_time(toy_sentence, 0.4)):
+    for transcript in (tmp_path / "said.srt", text, group_words(toy_sentence), group_words(toy_sentence, 0.4)):
         found = understand(toy_model, replace(plain, transcript=transcript))
         assert found.units == wanted.units
         assert found.units_known
@@ -142,7 +142,7 @@ def test_subtitles_are_aligned_within_their_times(toy_model: Model, toy_sentence
 def test_times_decide_where_words_alone_do_not(toy_model: Model, toy_sentence: ToySentence) -> None:
     """The sentence twice, and a transcript of the second time alone."""
     twice = Audio(np.tile(toy_sentence.audio.samples, 2), 16_000)
-    second = words_in_time(toy_sentence, toy_sentence.audio.duration_s)
+    second = group_words(toy_sentence, toy_sentence.audio.duration_s)
     found = understand(toy_model, Request(twice, transcript=second, recogniser="own")).units
     starts_s = [span.start_s for span in found if span.label.word]
     true_s = [span.start_s + toy_sentence.audio.duration_s for span in toy_sentence.units if span.label.word]
@@ -152,7 +152,7 @@ def test_times_decide_where_words_alone_do_not(toy_model: Model, toy_sentence: T
 def test_words_of_an_installed_recogniser_are_aligned(
     toy_model: Model, toy_sentence: ToySentence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    said = [words_in_time(toy_sentence), None]
+    said = [group_words(toy_sentence), None]
     monkeypatch.setattr(pipeline_understand, "recognise_words", lambda _, kind: said.pop(0) if kind == "vosk" else None)
     request = Request(toy_sentence.audio, recogniser="vosk")
     found = understand(toy_model, request)

@@ -15,7 +15,7 @@ from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
 from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Span, Timeline
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon, split_words
 
 RATE_HZ, EACH_S = 22_050, 0.09
 VOICES = (SyntheticVoice("one", "stand-in", "nobody"), SyntheticVoice("two", "stand-in", "nobody"))
@@ -26,7 +26,7 @@ def say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedS
     path = folder / "said.wav"
     for text in texts:
         lexicon = Lexicon()
-        words = [phone for word in words_of(text) for phone in lexicon.pronunciations(word)[0]]
+        words = [phone for word in split_words(text) for phone in lexicon.pronunciations(word)[0]]
         labels = ["sil", *words, "sil"]
         audio, timeline = synthesise([(label, EACH_S) for label in labels], rate_hz=RATE_HZ, seed=len(voice))
         with wave.open(str(path), "wb") as file:

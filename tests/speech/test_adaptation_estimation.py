@@ -12,7 +12,7 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.stats.constrained_mllr import log_determinant
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
-from lipmotion.units.phones import phone_edits
+from lipmotion.units.phones import count_phone_edits
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
         changed = one.own_features(analysed(audio)) - features.values
         assert np.sqrt(np.square(changed).mean()) < 0.5
         first, then = ([s.label.phone for s in recogniser.recognise(audio, features)] for recogniser in (before, after))
-        assert phone_edits(first, then) <= 2
+        assert count_phone_edits(first, then) <= 2
 
 
 def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[Audio]) -> None:

@@ -25,7 +25,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentence
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon, split_words
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_synthetic_voices_are_believed() -> None:
     for voice in installed_voices()[::2]:
         audio, _ = speak_sentence(texts[0], voice)
         right, wrong = (
-            agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), words_of(text), Lexicon()))
+            agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), split_words(text), Lexicon()))
             for text in texts
         )
         assert right > DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion import load_model
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.hmm.log_likelihoods import log_likelihoods_from
+from lipmotion.hmm.log_likelihoods import wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network import network_search, posteriors
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
@@ -36,7 +36,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import Audio
 from lipmotion.units import PHONES
-from lipmotion.units.phones import phone_edits
+from lipmotion.units.phones import count_phone_edits
 
 TOKENS = ("b", "p", "iː", "uː", "l", "ŋ", "t", "͡", "ʃ", WORD_BOUNDARY, BLANK)
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
@@ -104,7 +104,7 @@ def test_nothing_is_said_in_blanks() -> None:
 def test_posteriors_draw_phones_that_models_do_not_tell_apart(frames: int) -> None:
     recogniser = Recogniser(load_model().phones, "fast")
     hmm = recogniser.combined.hmm
-    same = log_likelihoods_from(np.zeros((60, len(hmm.table.names)), np.float32))
+    same = wrap_log_likelihoods(np.zeros((60, len(hmm.table.names)), np.float32))
     rows = said(*["b"] * 7, sure=0.99)
     found = [PosteriorStretch(Stretch(10, 10 + frames), rows)]
     (part,) = phones_without_words(hmm, recogniser._loop, same, found)
@@ -125,8 +125,8 @@ def test_a_sure_word_is_believed_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_forms_of_a_phone_are_the_same() -> None:
-    assert phone_edits(("ax", "b", "el"), ["ah", "b", "l"]) == 0
-    assert phone_edits(("b", "uw"), ["p", "uw", "t"]) == 2
+    assert count_phone_edits(("ax", "b", "el"), ["ah", "b", "l"]) == 0
+    assert count_phone_edits(("b", "uw"), ["p", "uw", "t"]) == 2
 
 
 def test_posteriors_of_phones_sum_to_one() -> None:

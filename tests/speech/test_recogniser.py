@@ -21,7 +21,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
-from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
 from lipmotion.units.phones import SHORT_PAUSE_S
 
 
@@ -83,7 +83,7 @@ def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
     hmm: UnitHmm, passage: AnalysedAudio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bounds = np.array([0, 10, 12, 40, 60, passage.frames])
-    monkeypatch.setattr(word_search, "units_of_path", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
+    monkeypatch.setattr(word_search, "decode_path", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
     found = recognise(hmm, passage)
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
     assert covers(found, passage.duration_s)
@@ -201,7 +201,7 @@ def test_noises_are_silence_and_silences_are_one(
 ) -> None:
     bounds = np.array([0, 10, 30, 40, 60, 80, passage.frames])
     labels = ("+spn+", "sil", "aa", "+nsn+", "sil", "+spn+")
-    monkeypatch.setattr(word_search, "units_of_path", lambda *_: (labels, bounds))
+    monkeypatch.setattr(word_search, "decode_path", lambda *_: (labels, bounds))
     found = recognise(hmm, passage, "general")
     assert phones(found) == ["sil", "aa", "sil"]
     assert [span.start_s for span in found] == pytest.approx([0, 0.295, 0.395])
@@ -216,7 +216,7 @@ def test_speakers_and_words_beyond_all_training(recordings: Path) -> None:
         for name in ("61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav"):
             audio = read_audio(recordings / "speech-open" / name)
             text = (recordings / "speech-open" / name).with_suffix(".txt" if name.endswith("wav") else ".lab")
-            spoken = phones(align(load_model().phones, audio, words_of(text.read_text()), Lexicon(), "general"))
+            spoken = phones(align(load_model().phones, audio, split_words(text.read_text()), Lexicon(), "general"))
             matcher = SequenceMatcher(None, spoken, phones(recognise(load_model().phones, audio, kind)), autojunk=False)
             right += sum(block.size for block in matcher.get_matching_blocks())
             count += len(spoken)

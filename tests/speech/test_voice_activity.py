@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import animate
-from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, power_level, spoken_frames
+from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW, log_energy
 from lipmotion.speech.sound.audio_files import read_audio
@@ -135,7 +135,7 @@ def test_a_passage_is_the_same_whatever_silence_is_around_it(before_s: float, af
 
 def test_a_noise_as_loud_as_the_room_may_be_its_margin_and_nothing_more() -> None:
     (found,) = moved(passages(noise(5, 25), spoken(0), noise(5, 25)), -500)
-    sound = np.flatnonzero(spoken_frames(log_energy(spoken(0))))
+    sound = np.flatnonzero(find_spoken_frames(log_energy(spoken(0))))
     assert sound[0] - PASSAGE_MARGIN - 2 <= found.first <= sound[0] - 10
     assert sound[-1] + 10 <= found.end <= sound[-1] + PASSAGE_MARGIN + 3
 
@@ -156,7 +156,7 @@ def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, dec
     assert first == first_alone
     (second,) = moved([second], -place)
     if decibels:
-        sound = np.flatnonzero(spoken_frames(log_energy(other)))
+        sound = np.flatnonzero(find_spoken_frames(log_energy(other)))
         assert second_alone.first <= second.first <= sound[0] + 3
         assert sound[-1] - 3 <= second.end <= second_alone.end
     else:
@@ -183,7 +183,7 @@ def test_every_line_of_a_stem_of_ten_minutes_is_a_passage() -> None:
     found = find_passages(stem)
     assert len(found) == len(starts)
     for (first, end), start, values in zip(found, starts, energies, strict=True):
-        sound = start + np.flatnonzero(spoken_frames(values))
+        sound = start + np.flatnonzero(find_spoken_frames(values))
         assert start <= first <= sound[0]
         assert sound[-1] < end <= start + len(values)
 
@@ -213,7 +213,7 @@ def test_what_is_no_voice_is_no_passage(sound: NDArray[np.float64], units: float
 
 def loudness_db(samples: Samples, seconds: slice) -> float:
     """Return the level of the loudest quarter of a second in some seconds of a recording."""
-    level = power_level(log_energy(samples)) - np.log(WINDOW)
+    level = average_power(log_energy(samples)) - np.log(WINDOW)
     return float(level[100 * seconds.start : 100 * seconds.stop].max() / DECIBEL)
 
 
@@ -322,7 +322,7 @@ def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:
     filled = fill_gaps(samples, log_energy(samples))
     assert np.array_equal(filled[:15_800], samples[:15_800])
     assert np.array_equal(filled[20_200:], samples[20_200:])
-    loud = power_level(log_energy(samples)).max()
+    loud = average_power(log_energy(samples)).max()
     drop = (loud - log_energy(filled)[104:122]) / DECIBEL
     assert drop.min() > 30
     assert drop.max() < 36

@@ -54,7 +54,7 @@ def test_fillers() -> None:
 
 
 def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(word_decoder, "english_data", lambda: tmp_path)
+    monkeypatch.setattr(word_decoder, "find_english_data", lambda: tmp_path)
     word_decoder._decoder.cache_clear()
     try:
         with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):

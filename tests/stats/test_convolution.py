@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.stats import convolution, network_training
-from lipmotion.stats.convolution import initial_network
+from lipmotion.stats.convolution import make_network
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
 
 
@@ -20,7 +20,7 @@ def sequence(length: int = 40, seed: int = 0) -> TrainingSequence:
 
 
 def test_gradients_are_those_of_differences() -> None:
-    network = initial_network(3, 5, 2, (1, 2), seed=1)
+    network = make_network(3, 5, 2, (1, 2), seed=1)
     batch, weights = [sequence(9), sequence(6, 1)], np.array([0.3, 0.7], np.float32)
     batch[0].valid[2] = False
     _, gradients = network_training._gradients(network, batch, weights, 0.0, 0)
@@ -45,7 +45,7 @@ def test_gradients_are_those_of_differences() -> None:
 
 
 def test_steps_beyond_the_reach_change_nothing_and_those_within_do() -> None:
-    network = initial_network(3, 8, 2, (1, 2, 4), seed=0)
+    network = make_network(3, 8, 2, (1, 2, 4), seed=0)
     x = sequence(60).inputs.astype(np.float32)
     changed = x.copy()
     changed[30] += 1
@@ -57,7 +57,7 @@ def test_steps_beyond_the_reach_change_nothing_and_those_within_do() -> None:
 
 
 def test_long_sequences_are_computed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    network = initial_network(3, 8, 2, (1, 2, 4), seed=0)
+    network = make_network(3, 8, 2, (1, 2, 4), seed=0)
     x = sequence(100).inputs.astype(np.float32)
     whole = network(x)
     monkeypatch.setattr(convolution, "BLOCK", 16)
@@ -68,7 +68,7 @@ def train(seed: int = 0) -> tuple[list[float], convolution.ConvolutionalNetwork]
     errors: list[float] = []
     sequences = [sequence(seed=number) for number in range(8)]
     network = fit_network(
-        initial_network(3, 16, 2, (1, 1), seed),
+        make_network(3, 16, 2, (1, 1), seed),
         lambda _, number: sequences[number],
         len(sequences),
         np.ones(2),
@@ -91,7 +91,7 @@ def test_steps_that_do_not_count_are_not_learned() -> None:
     broken[10:20] = 1e3
     valid = valid.copy()
     valid[10:20] = False
-    network = initial_network(3, 5, 2, (1,), seed=1)
+    network = make_network(3, 5, 2, (1,), seed=1)
     weights = np.full(2, 0.5, np.float32)
     good, _ = network_training._gradients(network, [TrainingSequence(x, y, valid)], weights, 0.0, 0)
     bad, _ = network_training._gradients(network, [TrainingSequence(x, broken, valid)], weights, 0.0, 0)

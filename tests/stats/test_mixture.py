@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from lipmotion.stats.mixture import SPLIT_STEP, Mixtures, equal_gaussians
+from lipmotion.stats.mixture import SPLIT_STEP, Mixtures, make_equal_gaussians
 
 SEEDS = st.integers(0, 2**32 - 1)
 FLOOR = np.full(3, 1e-3, np.float32)
@@ -53,8 +53,8 @@ def test_chosen_densities_come_in_the_order_asked_for():
     mixtures, (x, _) = random_mixtures(1), random_data(1, 10)
     chosen = np.array([2, 0, 2])
     assert mixtures.log_likelihood(x, chosen) == pytest.approx(mixtures.log_likelihood(x)[:, chosen], abs=1e-5)
-    assert np.array_equal(mixtures.selected(chosen).log_likelihood(x), mixtures.log_likelihood(x, chosen))
-    assert mixtures.concatenated(mixtures.selected(chosen)).size == (6, 2, 3)
+    assert np.array_equal(mixtures.select(chosen).log_likelihood(x), mixtures.log_likelihood(x, chosen))
+    assert mixtures.concatenate(mixtures.select(chosen)).size == (6, 2, 3)
 
 
 @given(seed=SEEDS)
@@ -65,7 +65,7 @@ def test_no_step_of_improvement_lowers_the_likelihood(seed):
     for _ in range(8):
         mixtures.em_update(1, x, share, FLOOR)
         used = np.isfinite(mixtures.log_weights[1])
-        after = weighted_log_likelihood(mixtures.selected(np.array([1])), 0, x, share)
+        after = weighted_log_likelihood(mixtures.select(np.array([1])), 0, x, share)
         if used.all():  # switching a component off is no step of EM
             assert after >= before - 1e-2  # single precision, 200 frames
         before = after
@@ -83,7 +83,7 @@ def test_one_gaussian_takes_the_weighted_mean_and_variance():
 
 
 def test_variances_stay_above_the_floor():
-    mixtures = equal_gaussians(np.zeros((10, 3), np.float32), 1)
+    mixtures = make_equal_gaussians(np.zeros((10, 3), np.float32), 1)
     floor = np.array([0.1, 0.2, 0.3], np.float32)
     mixtures.em_update(0, np.ones((50, 3), np.float32), np.ones(50, np.float32), floor)
     assert mixtures.variances[0, 0] == pytest.approx(floor)
@@ -103,7 +103,7 @@ def test_a_component_without_data_is_switched_off():
 @settings(max_examples=20)
 def test_huge_relevance_keeps_the_prior(seed):
     mixtures, (x, share) = random_mixtures(seed), random_data(seed)
-    wanted = mixtures.selected(np.array([2]))
+    wanted = mixtures.select(np.array([2]))
     mixtures.means[0], mixtures.variances[0], mixtures.log_weights[0] = (
         wanted.means[0],
         wanted.variances[0],

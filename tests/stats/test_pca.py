@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.stats import pca as module
-from lipmotion.stats.pca import evenly_spaced, fit_pca
+from lipmotion.stats.pca import choose_evenly, fit_pca
 from oracles.components import components, share
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -85,10 +85,10 @@ def test_few_rows_span_few_components():
 
 
 def test_places_are_spread_evenly():
-    assert evenly_spaced(4, 8).tolist() == [1, 3, 5, 7]
-    assert evenly_spaced(9, 3).tolist() == [0, 1, 2]
-    assert evenly_spaced(5, 0).tolist() == []
-    chosen = evenly_spaced(980, 33_000)
+    assert choose_evenly(4, 8).tolist() == [1, 3, 5, 7]
+    assert choose_evenly(9, 3).tolist() == [0, 1, 2]
+    assert choose_evenly(5, 0).tolist() == []
+    chosen = choose_evenly(980, 33_000)
     assert (np.diff(chosen) > 30).all()
     assert (chosen[0], chosen[-1]) == (16, 32_983)
 

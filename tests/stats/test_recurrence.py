@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.stats import network_training, recurrence
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
-from lipmotion.stats.recurrence import RecurrentNetwork, initial_recurrent_network
+from lipmotion.stats.recurrence import RecurrentNetwork, make_recurrent_network
 from oracles.recurrence import recurrent_outputs
 
 
@@ -20,12 +20,12 @@ def sequence(length: int = 30, seed: int = 0) -> TrainingSequence:
 
 
 def test_it_is_what_its_equations_say() -> None:
-    network, x = initial_recurrent_network(2, 4, 3, 2, seed=0), sequence(7).inputs.astype(np.float32)
+    network, x = make_recurrent_network(2, 4, 3, 2, seed=0), sequence(7).inputs.astype(np.float32)
     np.testing.assert_allclose(network(x), recurrent_outputs(network, x), atol=1e-5)
 
 
 def test_gradients_are_those_of_differences() -> None:
-    network, weights = initial_recurrent_network(2, 4, 2, 2, seed=1), np.array([0.3, 0.7], np.float32)
+    network, weights = make_recurrent_network(2, 4, 2, 2, seed=1), np.array([0.3, 0.7], np.float32)
     batch = [sequence(9), sequence(6, 1)]
     batch[0].valid[2] = False
     _, gradients = network_training._gradients(network, batch, weights, 0.0, 0)
@@ -42,21 +42,21 @@ def test_gradients_are_those_of_differences() -> None:
 
 
 def test_dropped_units_have_no_gradient() -> None:
-    network, weights = initial_recurrent_network(2, 4, 2, 2, seed=1), np.ones(2, np.float32)
+    network, weights = make_recurrent_network(2, 4, 2, 2, seed=1), np.ones(2, np.float32)
     _, gradients = network_training._gradients(network, [sequence(9)], weights, 1 - 1e-6, 0)
     assert not any(gradient.any() for gradient in gradients[:-1])
     assert gradients[-1].any()
 
 
 def test_what_follows_the_end_of_a_shorter_sequence_counts_nothing() -> None:
-    network, x = initial_recurrent_network(2, 4, 2, 2, seed=0), sequence(9).inputs.astype(np.float32)
+    network, x = make_recurrent_network(2, 4, 2, 2, seed=0), sequence(9).inputs.astype(np.float32)
     inside = np.array([[True] * 9, [True] * 6 + [False] * 3])
     together, _ = network.forward(np.stack([x, x]), inside, None)
     np.testing.assert_allclose(together[1, :6], network.hidden(x[:6]), atol=1e-6)
 
 
 def test_long_sequences_are_computed_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    network, x = initial_recurrent_network(2, 4, 2, 2, seed=0), sequence(100).inputs.astype(np.float32)
+    network, x = make_recurrent_network(2, 4, 2, 2, seed=0), sequence(100).inputs.astype(np.float32)
     whole = network(x)
     for name, value in {"PIECE": 8, "REACH": 60, "PIECES": 3}.items():
         monkeypatch.setattr(recurrence, name, value)
@@ -70,7 +70,7 @@ def train() -> tuple[list[float], RecurrentNetwork]:
     errors: list[float] = []
     sequences = [sequence(seed=number) for number in range(8)]
     network = fit_network(
-        initial_recurrent_network(2, 12, 2, 1, seed=0),
+        make_recurrent_network(2, 12, 2, 1, seed=0),
         lambda _, number: sequences[number],
         len(sequences),
         np.ones(2),

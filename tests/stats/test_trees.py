@@ -8,8 +8,8 @@ from lipmotion.stats.trees import (
     gaussian_log_likelihood,
     grow_tree,
     multispace_log_likelihood,
-    tree_arrays,
     trees_from_arrays,
+    trees_to_arrays,
 )
 
 UNITS = ("a", "b", "c", "d")
@@ -102,7 +102,7 @@ def test_trees_come_back_from_arrays():
         "one": grown(sample(lambda context: float(UNITS.index(context[0]) + 3 * UNITS.index(context[2])))),
         "two": grown(sample(lambda _: 0.0)),
     }
-    again = trees_from_arrays(tree_arrays(trees))
+    again = trees_from_arrays(trees_to_arrays(trees))
     assert list(again) == ["one", "two"]
     for name, tree in trees.items():
         assert again[name].text() == tree.text()
@@ -116,7 +116,7 @@ def test_damaged_trees_are_refused():
         ("asked", lambda asked: asked + 100),
         ("asked", lambda asked: asked[:-1]),
     ):
-        arrays = tree_arrays({"one": grown(sample(lambda context: float(UNITS.index(context[0]))))})
+        arrays = trees_to_arrays({"one": grown(sample(lambda context: float(UNITS.index(context[0]))))})
         with pytest.raises(ValueError, match=r"tree|required"):
             trees_from_arrays(arrays | {key: change(arrays[key])})
 

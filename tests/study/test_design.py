@@ -22,7 +22,7 @@ from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.design import design_study
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.settings import Region, StudySettings
-from lipmotion_studio.study.sources import condition_of, encode_shown, named_conditions, sentences_of
+from lipmotion_studio.study.sources import condition_of, encode_shown, named_conditions, read_sentences
 
 DRAWN = Job(Request(), Outputs(face="portrait"))
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
@@ -170,7 +170,7 @@ def test_conditions_that_are_refused(conditions: list[str], says: str) -> None:
 )
 def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], object], source: str, says: str) -> None:
     prepare(here)
-    said = sentences_of([here / "said"])
+    said = read_sentences([here / "said"])
     if not says:
         assert callable(condition_of(str(here / source), said, DRAWN))
         return
@@ -179,7 +179,7 @@ def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], objec
 
 
 def test_recordings_without_pictures_cannot_be_shown() -> None:
-    said = sentences_of([Path("examples/welcome.flac")])
+    said = read_sentences([Path("examples/welcome.flac")])
     with pytest.raises(InputError, match="has no pictures"):
         condition_of("recording", said, DRAWN)
 
@@ -197,7 +197,7 @@ def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) 
 
 def test_two_sentences_of_one_name_are_refused(here: Path) -> None:
     with pytest.raises(InputError, match="two sentences are called 'one'"):
-        sentences_of([here / "said", here / "ours" / "one.mp4"])
+        read_sentences([here / "said", here / "ours" / "one.mp4"])
 
 
 @pytest.mark.long

@@ -14,8 +14,8 @@ from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion import (
     LEARNED_MOTION_ARRAYS,
     fit_motion,
-    learned_motion_arrays,
     learned_motion_from_arrays,
+    learned_motion_to_arrays,
     with_unit_names,
 )
 from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -58,7 +58,7 @@ class MeanPoses(Engine[Any]):
         return Generation(values, variance, with_unit_names(speech.units), trace)
 
     def to_arrays(self, model: Any) -> dict[str, Any]:
-        return learned_motion_arrays(model[0]) | {"means": model[1]}
+        return learned_motion_to_arrays(model[0]) | {"means": model[1]}
 
     def from_arrays(self, arrays: Any) -> Any:
         motion = learned_motion_from_arrays(arrays)

@@ -2,16 +2,16 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.types import Delivery
-from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
+from lipmotion.types.moods import MoodKey, format_moods, parse_moods, sort_moods
 
 
 def test_a_text_of_moods_is_read_and_written():
-    keys = moods_of("sad at 2.5, Happy:0.7, neutral at 4")
+    keys = parse_moods("sad at 2.5, Happy:0.7, neutral at 4")
     assert keys == (MoodKey(0.0, "happy", 0.7), MoodKey(2.5, "sad"), MoodKey(4.0, "neutral"))
-    assert moods_of(text_of(keys)) == keys
-    assert moods_of("") == ()
+    assert parse_moods(format_moods(keys)) == keys
+    assert parse_moods("") == ()
     exact = (MoodKey(2e-05, "sad", 1e-05), MoodKey(7201.2345, "happy"))
-    assert moods_of(text_of(exact)) == exact
+    assert parse_moods(format_moods(exact)) == exact
 
 
 @pytest.mark.parametrize(
@@ -27,17 +27,17 @@ def test_a_text_of_moods_is_read_and_written():
 )
 def test_other_texts_are_refused(text, said):
     with pytest.raises(InputError, match=said):
-        moods_of(text)
+        parse_moods(text)
     with pytest.raises(InputError, match=said):
         Delivery(mood=text)
 
 
 def test_of_two_moods_at_one_time_the_last_holds():
-    assert in_time([MoodKey(1.0, "sad"), MoodKey(0.0, "happy"), MoodKey(1.0, "angry")]) == (
+    assert sort_moods([MoodKey(1.0, "sad"), MoodKey(0.0, "happy"), MoodKey(1.0, "angry")]) == (
         MoodKey(0.0, "happy"),
         MoodKey(1.0, "angry"),
     )
 
 
 def test_a_manner_and_a_mood_may_begin_together():
-    assert [key.label for key in moods_of("whisper, sad:0.5, mumble")] == ["sad:0.5", "mumble"]
+    assert [key.label for key in parse_moods("whisper, sad:0.5, mumble")] == ["sad:0.5", "mumble"]

@@ -12,15 +12,15 @@ from lipmotion.types.values import (
     items,
     members,
     number,
-    number_of,
     one_of,
     optional,
+    parse_number,
+    parse_whole,
     path,
     text,
     truth,
     value_of,
     whole,
-    whole_of,
 )
 
 POINT = members({"at": items(number(-1, 1), 2, 2), "count": whole(0, 9), "kind": one_of(["a", 1])}, ["at"])
@@ -63,14 +63,14 @@ def test_what_does_not_fit_is_named_with_its_place() -> None:
 
 
 def test_numbers_in_texts_are_of_plain_digits() -> None:
-    assert number_of(" -1.5e3 ") == pytest.approx(-1500)
-    assert whole_of("+12") == 12
+    assert parse_number(" -1.5e3 ") == pytest.approx(-1500)
+    assert parse_whole("+12") == 12
     for given in ("1_0", "٣", "nan", "1e999", "9" * 400, "0x1", "", "1,5"):
         with pytest.raises(InputError, match="required a number"):
-            number_of(given)
+            parse_number(given)
     for given in ("1_0", "٣", "9" * 5000, "1.0", ""):
         with pytest.raises(InputError, match="required a whole number"):
-            whole_of(given)
+            parse_whole(given)
 
 
 def test_texts_and_paths_that_no_file_holds() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lipmotion.units import LIP_CLOSING, PHONES
 from lipmotion.units.classes import CLASSES
-from lipmotion.units.ipa_phones import IPA_PHONES, VOWEL_CHART, ipa_phones, is_mark, token_phones
+from lipmotion.units.ipa_phones import IPA_PHONES, VOWEL_CHART, is_mark, read_ipa, read_tokens
 
 SPOKEN = set(PHONES) - {"sil", "sp"}
 
@@ -25,8 +25,8 @@ LABELS = {
 
 def test_the_lips_decide() -> None:
     for label, phones in LABELS.items():
-        assert ipa_phones(label) == (tuple(phones.split()), "")
-        assert ipa_phones(unicodedata.normalize("NFC", label)) == ipa_phones(label)
+        assert read_ipa(label) == (tuple(phones.split()), "")
+        assert read_ipa(unicodedata.normalize("NFC", label)) == read_ipa(label)
 
 
 def test_a_vowel_keeps_its_rounding_and_its_height() -> None:
@@ -40,7 +40,7 @@ def test_a_vowel_keeps_its_rounding_and_its_height() -> None:
 def test_only_what_closes_the_lips_closes_them() -> None:
     closing = {symbol for symbol, phones in IPA_PHONES.items() if set(phones) & set(LIP_CLOSING)}
     assert {symbol[0] for symbol in closing} == set("pbɓʙʘm不")
-    lips = {ipa_phones(letter)[0] for letter in "ɸβɱʋⱱ"}
+    lips = {read_ipa(letter)[0] for letter in "ɸβɱʋⱱ"}
     assert lips == {("f",), ("v",)}  # nearly closed, but open
 
 
@@ -48,7 +48,7 @@ def test_every_token_of_the_network_has_a_meaning() -> None:
     tokens = pytest.importorskip("hama.asr").ASRModel().decoder_tokens
     assert len(tokens) == 191
     for token in tokens:
-        phones, unknown = ipa_phones(token)
+        phones, unknown = read_ipa(token)
         assert not unknown, token
         silent = token[0] in "<ʔ" or all(map(is_mark, unicodedata.normalize("NFD", token)))
         assert silent != bool(phones), token
@@ -56,7 +56,7 @@ def test_every_token_of_the_network_has_a_meaning() -> None:
 
 def test_tokens_that_are_one_sound_are_one() -> None:
     tokens = ["<blank>", "t", "͡", "ʃ", "ɔ", "ɪ", "<wb>", "k", "ʷ", "ɯ", "ᵝ", "n", "̩", "ː", "t", "<wb>", "ʃ"]
-    assert token_phones(tokens) == [
+    assert read_tokens(tokens) == [
         *(("ch", 1), ("oy", 4), ("k", 7), ("w", 8), ("uh", 9)),
         *(("en", 11), ("t", 14), ("sh", 16)),
     ]
@@ -65,6 +65,6 @@ def test_tokens_that_are_one_sound_are_one() -> None:
 @settings(max_examples=40)
 @given(st.text(st.sampled_from("aeəɪʊtʃdʒpbmɲʁøœ̃ːˈˌ̩ʰ˥()ꙮ? "), max_size=6))
 def test_any_label_becomes_phones(label: str) -> None:
-    phones, unknown = ipa_phones(label)
+    phones, unknown = read_ipa(label)
     assert set(phones) <= SPOKEN
     assert len(phones) >= len(unknown)

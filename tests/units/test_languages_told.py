@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.units.languages_told import is_english, language_of_text
-from lipmotion.units.text_normalisation import written_words
+from lipmotion.units.languages_told import detect_language, is_english
+from lipmotion.units.text_normalisation import split_written_words
 
 TEXTS = {
     "en": "bin blue at f two now",
@@ -26,8 +26,8 @@ SPANISH = ["l eh s ao f", "k ow s t ow", "k ax s ih t iy", "p er ao t ax", "ih s
 
 def test_of_a_text() -> None:
     for language, text in TEXTS.items():
-        assert language_of_text(written_words(text)) == language
-    assert language_of_text(("mandrusa", "kolpeti", "vastrini")) == ""
+        assert detect_language(split_written_words(text)) == language
+    assert detect_language(("mandrusa", "kolpeti", "vastrini")) == ""
 
 
 @pytest.mark.long
@@ -47,4 +47,4 @@ def test_words_are_as_they_are_written_in_every_script() -> None:
         ("こんにちは、ラーメン", "こんにちは ラーメン"),
         ("हिन्दी 'ok'", "हिन्दी ok"),
     ):
-        assert " ".join(written_words(text)) == words
+        assert " ".join(split_written_words(text)) == words

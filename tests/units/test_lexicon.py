@@ -75,7 +75,7 @@ def test_a_lengthened_word_is_the_word_that_is_meant() -> None:
         assert Lexicon().spoken_forms(word)[0][0][1] == meant
     assert said("hahaha") == said("hahahah") == ["hh aa hh aa hh aa"]
     for word in ("aaaaaaargle", "xyyyz", "booker", "bananana"):
-        assert not lexicon.lengthened(word)
+        assert not lexicon.expand_lengthened(word)
     assert not Lexicon().known("x" * 5000 + "yyy")
 
 

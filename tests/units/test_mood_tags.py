@@ -2,18 +2,18 @@ import pytest
 
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.types.moods import NEUTRAL, MoodKey, MoodTag
-from lipmotion.units import words_of
-from lipmotion.units.mood_tags import SYNONYMS, moods_in_time, tagged_text, without_known_tags
+from lipmotion.units import split_words
+from lipmotion.units.mood_tags import SYNONYMS, parse_tagged_text, remove_known_tags, time_moods
 
 
 def test_a_text_without_tags_is_returned_as_it_is():
     text = "It is 3 < 4, and (really) a > b."
-    assert tagged_text(text) == (text, ())
+    assert parse_tagged_text(text) == (text, ())
 
 
 def test_tags_hold_until_the_next_and_end_tags_are_neutral():
-    plain, tags = tagged_text("One [Angry] two <smile>three</smile> four [sad: 0.25]")
-    assert words_of(plain) == ("one", "two", "three", "four")
+    plain, tags = parse_tagged_text("One [Angry] two <smile>three</smile> four [sad: 0.25]")
+    assert split_words(plain) == ("one", "two", "three", "four")
     assert tags == (
         MoodTag(0.25, "angry"),
         MoodTag(0.5, "happy", 0.6),
@@ -23,8 +23,8 @@ def test_tags_hold_until_the_next_and_end_tags_are_neutral():
 
 
 def test_unknown_tags_are_named_and_not_spoken(caplog):
-    plain, tags = tagged_text("[plays the harp] hello <b>you</b>")
-    assert words_of(plain) == ("hello", "you")
+    plain, tags = parse_tagged_text("[plays the harp] hello <b>you</b>")
+    assert split_words(plain) == ("hello", "you")
     assert tags == ()
     assert "[plays the harp], <b>, </b>" in caplog.text
 
@@ -61,13 +61,13 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
     ],
 )
 def test_markup_and_names_of_speakers_are_named_and_not_spoken(caplog, text, words, named):
-    assert " ".join(words_of(tagged_text(text).text)) == words
+    assert " ".join(split_words(parse_tagged_text(text).text)) == words
     assert named in caplog.text
     assert bool(caplog.records) == bool(named)
 
 
 def test_what_somebody_does_is_a_tag_between_asterisks():
-    assert [tag.mood for tag in tagged_text("*laughs* {angry}no{/angry} *gasps*").tags] == [
+    assert [tag.mood for tag in parse_tagged_text("*laughs* {angry}no{/angry} *gasps*").tags] == [
         "happy",
         "angry",
         NEUTRAL,
@@ -76,11 +76,11 @@ def test_what_somebody_does_is_a_tag_between_asterisks():
 
 
 def test_known_tags_alone_can_be_taken_out():
-    assert without_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
+    assert remove_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
 
 
 def test_manners_are_tags_too():
-    tags = tagged_text("[whispers] one </whispers> two")[1]
+    tags = parse_tagged_text("[whispers] one </whispers> two")[1]
     assert [tag.mood for tag in tags] == ["whisper", "plain"]
 
 
@@ -94,7 +94,7 @@ def test_every_synonym_means_a_mood():
 def test_moods_begin_with_the_word_after_the_tag(words):
     said = [("sil", ""), ("ay", "i"), ("aa", "a"), ("iy", "e"), ("sil", "")]
     spans = tuple(Span(0.2 * n, 0.2 * (n + 1), Unit(phone, word=word * words)) for n, (phone, word) in enumerate(said))
-    keys = moods_in_time((MoodTag(0.0, "sad"), MoodTag(2 / 3, "happy", 0.5), MoodTag(1.0, NEUTRAL)), Timeline(spans))
+    keys = time_moods((MoodTag(0.0, "sad"), MoodTag(2 / 3, "happy", 0.5), MoodTag(1.0, NEUTRAL)), Timeline(spans))
     assert [key.label for key in keys] == ["sad", "happy:0.5", NEUTRAL]
     assert [key.time_s for key in keys] == pytest.approx([0.0, 0.6, 0.8 if words else 1.0])
-    assert moods_in_time((), Timeline(spans)) == ()
+    assert time_moods((), Timeline(spans)) == ()

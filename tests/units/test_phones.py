@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.units import PHONES, SIMILAR_PHONES, is_silent, most_similar_phone
+from lipmotion.units import PHONES, SIMILAR_PHONES, find_similar_phone, is_silent
 
 SPOKEN = tuple(phone for phone in PHONES if not is_silent(phone))
 VOWELS = frozenset("aa ae ah ao aw ax axr ay eh er ey ih ix iy ow oy uh uw el em en".split())
@@ -14,7 +14,7 @@ UNSAID_IN_GRID = ("er", "hh", "ng", "oy", "sh", "uh", "zh")
 def test_the_first_relative_that_is_known_stands_in() -> None:
     for phone in PHONES:
         for position, relative in enumerate(SIMILAR_PHONES[phone]):
-            assert most_similar_phone(phone, set(PHONES) - {phone, *SIMILAR_PHONES[phone][:position]}) == relative
+            assert find_similar_phone(phone, set(PHONES) - {phone, *SIMILAR_PHONES[phone][:position]}) == relative
 
 
 def steps_to(phone: str) -> dict[str, int]:
@@ -28,13 +28,13 @@ def steps_to(phone: str) -> dict[str, int]:
 @settings(max_examples=40)
 @given(st.sampled_from(SPOKEN), st.sets(st.sampled_from(SPOKEN), min_size=1, max_size=8))
 def test_the_nearest_known_relative_stands_in(phone: str, known: set[str]) -> None:
-    chosen, steps = most_similar_phone(phone, known), steps_to(phone)
+    chosen, steps = find_similar_phone(phone, known), steps_to(phone)
     assert chosen in known
-    assert chosen == most_similar_phone(phone, sorted(known, reverse=True))
+    assert chosen == find_similar_phone(phone, sorted(known, reverse=True))
     assert steps.get(chosen, 99) == min(steps.get(other, 99) for other in known)  # nobody nearer is passed over
 
 
 def test_vowels_stand_in_for_vowels() -> None:
     for phone in UNSAID_IN_GRID:
-        chosen = most_similar_phone(phone, [other for other in SPOKEN if other not in UNSAID_IN_GRID])
+        chosen = find_similar_phone(phone, [other for other in SPOKEN if other not in UNSAID_IN_GRID])
         assert (chosen in VOWELS) == (phone in VOWELS)

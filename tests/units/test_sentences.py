@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.units.sentences import LONGEST_SENTENCE, LONGEST_WORD, MOST_CHARACTERS, clean_text, sentences_of
-from lipmotion.units.text_normalisation import words_in
+from lipmotion.units.sentences import LONGEST_SENTENCE, LONGEST_WORD, MOST_CHARACTERS, clean_text, split_sentences
+from lipmotion.units.text_normalisation import find_words
 
 
 def test_sentences() -> None:
@@ -24,34 +24,34 @@ def test_sentences() -> None:
         ("Wait... what?", ["Wait...", "what?"]),
         ("a\x00b\x1b[31m c\ud800d\u2028e", ["a b [31m c d e"]),
     ):
-        assert sentences_of(text) == sentences
+        assert split_sentences(text) == sentences
 
 
 def test_a_long_sentence_is_divided_at_a_comma_else_between_words() -> None:
     clause = "a b c d e f g h " * 15
-    first, second = sentences_of(f"{clause}, {clause}.")
+    first, second = split_sentences(f"{clause}, {clause}.")
     assert first.endswith("h ,")
     assert second.endswith("h .")
-    parts = sentences_of("word " * 200)
+    parts = split_sentences("word " * 200)
     assert max(map(len, parts)) <= LONGEST_SENTENCE
     assert " ".join(parts) == ("word " * 200).strip()
 
 
 def test_scripts_without_blanks_are_cut() -> None:
-    parts = sentences_of("好" * 900)
+    parts = split_sentences("好" * 900)
     assert [len(part) for part in parts] == [400, 400, 100]
 
 
 @settings(max_examples=50)
 @given(st.text(max_size=300))
 def test_no_word_is_lost_or_made(text: str) -> None:
-    words = words_in(clean_text(text))
+    words = find_words(clean_text(text))
     if words:
-        parts = sentences_of(text)
-        assert tuple(word for part in parts for word in words_in(part)) == words
+        parts = split_sentences(text)
+        assert tuple(word for part in parts for word in find_words(part)) == words
     else:
         with pytest.raises(InputError, match="holds no word"):
-            sentences_of(text)
+            split_sentences(text)
 
 
 def test_what_cannot_be_said() -> None:
@@ -63,4 +63,4 @@ def test_what_cannot_be_said() -> None:
         ("a " * MOST_CHARACTERS, "has 100000 characters, required at most 50000, about an hour of speech"),
     ):
         with pytest.raises(InputError, match=message):
-            sentences_of(text)
+            split_sentences(text)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.units import PHONES, Lexicon, is_silent
-from lipmotion.units.spelling import guess_pronunciation, without_accents
+from lipmotion.units.spelling import guess_pronunciation, remove_accents
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 
@@ -51,7 +51,7 @@ def test_accents_are_left_out() -> None:
         ("plain", "plain"),
         ("kā́", "ka"),
     ):
-        assert without_accents(word) == plain
+        assert remove_accents(word) == plain
         assert guess_pronunciation(word) == guess_pronunciation(plain)
 
 

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.units import words_of
-from lipmotion.units.spelling import MOST_MARKS, normalised_text
-from lipmotion.units.written_forms import ONES, SCALES, TENS, number_words
+from lipmotion.units import split_words
+from lipmotion.units.spelling import MOST_MARKS, normalise_text
+from lipmotion.units.written_forms import ONES, SCALES, TENS, spell_number
 
 
 def test_texts() -> None:
@@ -43,18 +43,18 @@ def test_texts() -> None:
         ("you & me, AT&T", "you and me a t and t"),
         ("you &amp; me &#39;", "you and me"),
     ):
-        assert " ".join(words_of(text)) == words
+        assert " ".join(split_words(text)) == words
 
 
 def test_quotation_marks_are_not_spoken() -> None:
     for text in ("say 'hello'.", "say ‘Hello’", "say hello'", "say 'hello", "say “hello”", "SAY «HELLO»"):
-        assert words_of(text) == ("say", "hello")
+        assert split_words(text) == ("say", "hello")
 
 
 def test_a_text_without_words_is_refused() -> None:
     for text in ("", "   \n", "...", "—", "'", "’’", "🙂", "_"):
         with pytest.raises(InputError, match="holds no word; give the words that are spoken"):
-            words_of(text)
+            split_words(text)
 
 
 def test_numbers() -> None:
@@ -74,7 +74,7 @@ def test_numbers() -> None:
         ("1000000000000", "one" + " zero" * 12),
         ("00", "zero zero"),
     ):
-        assert " ".join(number_words(digits)) == words
+        assert " ".join(spell_number(digits)) == words
 
 
 @settings(max_examples=60)
@@ -83,7 +83,7 @@ def test_a_number_comes_back_from_its_words(number: int) -> None:
     values = {word: n for n, word in enumerate(ONES)} | {word: 10 * n for n, word in enumerate(TENS) if n > 1}
     scales = {name: scale for scale, name in SCALES}
     total = part = 0
-    for word in number_words(str(number)):
+    for word in spell_number(str(number)):
         if word == "hundred":
             part *= 100
         elif word in scales:
@@ -97,14 +97,14 @@ def test_a_number_comes_back_from_its_words(number: int) -> None:
 @given(st.text(max_size=60))
 def test_any_text_gives_words_or_says_that_there_are_none(text: str) -> None:
     try:
-        words = words_of(text)
+        words = split_words(text)
     except InputError:
         return
     assert words
     for word in words:
         assert word == word.lower()
         assert not any(character.isspace() or character.isdecimal() for character in word)
-    assert words_of(" ".join(words)) == words
+    assert split_words(" ".join(words)) == words
 
 
 def test_a_letter_keeps_thirty_marks() -> None:
@@ -112,9 +112,9 @@ def test_a_letter_keeps_thirty_marks() -> None:
     for mark in ("\u0301", "\u0316\u0301", "\u0f73", "\uff9e"):
         many = "a" + mark * 200_000
         kept = "a" + (mark * 200_000)[:MOST_MARKS]
-        assert normalised_text(many) == unicodedata.normalize("NFKC", kept)
-        assert normalised_text("e\u0301" * 100) == "é" * 100
+        assert normalise_text(many) == unicodedata.normalize("NFKC", kept)
+        assert normalise_text("e\u0301" * 100) == "é" * 100
 
 
 def test_numbers_of_any_length_are_digits() -> None:
-    assert words_of("7" * 10_000) == ("seven",) * 10_000
+    assert split_words("7" * 10_000) == ("seven",) * 10_000

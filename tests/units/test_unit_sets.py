@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.types import Unit
-from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, UnitSet, is_silent, phone_classes, unit_set
+from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, UnitSet, is_silent, list_phone_classes, load_unit_set
 from lipmotion.units.unit_sets import GROUPS
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "unit-sets.md"
@@ -41,13 +41,13 @@ def test_every_phone_stands_in_one_group(name: str) -> None:
     assert sorted(phones) == list(PHONES)
     assert len({group.unit for group in GROUPS[name]}) == len(GROUPS[name])
     assert all(group.reason for group in GROUPS[name])
-    found = unit_set(name)
+    found = load_unit_set(name)
     assert {found.unit(phone) for phone in PHONES} == set(found.units)
 
 
 @named
 def test_silence_is_alone_unless_it_is_a_closed_mouth(name: str) -> None:
-    found = unit_set(name)
+    found = load_unit_set(name)
     beside = {phone for unit in found.silence for phone in found.phones(unit)}
     assert beside - {"sil", "sp"} == (set(LIP_CLOSING) if name == "2vis" else set())
     assert [found.silent(unit) for unit in found.silence] == [name != "2vis"] * len(found.silence)
@@ -56,7 +56,7 @@ def test_silence_is_alone_unless_it_is_a_closed_mouth(name: str) -> None:
 
 @named
 def test_lips_that_meet_are_no_part_of_an_open_unit(name: str) -> None:
-    found = unit_set(name)
+    found = load_unit_set(name)
     closing = {found.unit(phone) for phone in LIP_CLOSING}
     assert all(phone in LIP_CLOSING or is_silent(phone) for unit in closing for phone in found.phones(unit))
 
@@ -64,7 +64,7 @@ def test_lips_that_meet_are_no_part_of_an_open_unit(name: str) -> None:
 def kinds(name: str) -> dict[str, int]:
     """Count units of diphthongs alone, of other vowels, and of the rest."""
     count = {"diphthong": 0, "vowel": 0, "other": 0}
-    found = unit_set(name)
+    found = load_unit_set(name)
     for unit in found.units:
         phones = set(found.phones(unit))
         assert phones <= VOWELS or not phones & VOWELS
@@ -75,21 +75,21 @@ def kinds(name: str) -> dict[str, int]:
 def test_the_parts_of_the_sets_are_those_of_the_paper() -> None:
     assert kinds("eVis") == {"diphthong": 5, "vowel": 4, "other": 10}
     assert kinds("sVis") == {"diphthong": 0, "vowel": 3, "other": 3 + 1}
-    assert unit_set("phone").unit_of_phone == {phone: phone for phone in PHONES}
+    assert load_unit_set("phone").unit_of_phone == {phone: phone for phone in PHONES}
 
 
 def test_the_extended_set_breaks_the_simple_one_down() -> None:
     for fine, coarse in (("phone", "eVis"), ("eVis", "sVis"), ("sVis", "2vis")):
-        for unit in unit_set(fine).units:
-            speech = [phone for phone in unit_set(fine).phones(unit) if not is_silent(phone)]
-            assert len({unit_set(coarse).unit(phone) for phone in speech}) <= 1
+        for unit in load_unit_set(fine).units:
+            speech = [phone for phone in load_unit_set(fine).phones(unit) if not is_silent(phone)]
+            assert len({load_unit_set(coarse).unit(phone) for phone in speech}) <= 1
 
 
 def check_classes(found: UnitSet) -> None:
     """By the definition, set by set."""
     whole = frozenset(found.units)
     wanted = {frozenset([unit]) for unit in found.units}
-    for phones in phone_classes().values():
+    for phones in list_phone_classes().values():
         wanted.add(frozenset(unit for unit in found.units if set(found.phones(unit)) <= phones))
     classes = found.classes()
     assert len(set(classes.values())) == len(classes)
@@ -101,7 +101,7 @@ def check_classes(found: UnitSet) -> None:
 
 @named
 def test_classes_hold_whole_units(name: str) -> None:
-    check_classes(unit_set(name))
+    check_classes(load_unit_set(name))
 
 
 @settings(max_examples=20)
@@ -117,17 +117,17 @@ def test_classes_of_any_table(units: list[str], quiet: tuple[str, str]) -> None:
 
 @named
 def test_a_table_says_the_same_as_the_set(name: str, tmp_path: Path) -> None:
-    path = written(tmp_path, "# mine\n\n" + table(dict(unit_set(name).unit_of_phone)).replace("\n", " # why\n"))
-    found = unit_set(path)
+    path = written(tmp_path, "# mine\n\n" + table(dict(load_unit_set(name).unit_of_phone)).replace("\n", " # why\n"))
+    found = load_unit_set(path)
     assert (found.name, dict(found.unit_of_phone), found.units) == (
         "mine",
-        dict(unit_set(name).unit_of_phone),
-        unit_set(name).units,
+        dict(load_unit_set(name).unit_of_phone),
+        load_unit_set(name).units,
     )
     assert found.count == len(found.units)
 
 
-GOOD = table(dict(unit_set("eVis").unit_of_phone))
+GOOD = table(dict(load_unit_set("eVis").unit_of_phone))
 WRONG = {
     "a phone is missing": (GOOD.replace(" zh", ""), r"mine\.txt.*missing zh"),
     "a phone twice": (GOOD + "more zh\n", r"line 20: phone 'zh' has a unit in line 15"),
@@ -146,25 +146,25 @@ def test_a_wrong_table_is_refused(case: str, tmp_path: Path) -> None:
     text, message = WRONG[case]
     assert text != GOOD
     with pytest.raises(InputError, match=message):
-        unit_set(written(tmp_path, text))
+        load_unit_set(written(tmp_path, text))
 
 
 def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"'evis'; there are: 2vis, sVis, pbVis, eVis, phone"):
-        unit_set("evis")
+        load_unit_set("evis")
     with pytest.raises(InputError, match="there are: 2vis"):
-        unit_set("x" * 300)
+        load_unit_set("x" * 300)
     with pytest.raises(InputError, match=r"not a file|directory|folder"):
-        unit_set(tmp_path)
+        load_unit_set(tmp_path)
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="UTF-8"):
-        unit_set(tmp_path / "binary")
+        load_unit_set(tmp_path / "binary")
 
 
 def test_a_unit_is_a_word() -> None:
     for unit in ("", "a b", " a", "a\n"):
         with pytest.raises(InputError, match="not a word"):
-            UnitSet("mine", {**unit_set("phone").unit_of_phone, "zh": unit})
+            UnitSet("mine", {**load_unit_set("phone").unit_of_phone, "zh": unit})
 
 
 def test_the_document_says_what_the_tables_say() -> None:
@@ -184,17 +184,17 @@ def test_the_document_says_what_the_tables_say() -> None:
 
 def test_the_table_in_the_document_is_one(tmp_path: Path) -> None:
     example = DOCUMENT.read_text(encoding="utf-8").partition("```text\n")[2].partition("```")[0]
-    found = unit_set(written(tmp_path, example))
+    found = load_unit_set(written(tmp_path, example))
     assert found.units == ("closed", "teeth", "rounded", "open")
     assert found.silence == ("closed",)
 
 
 def test_a_table_is_small_and_so_are_messages(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="required at most 262144: is it a unit table"):
-        unit_set(written(tmp_path, "#" * 300_000))
+        load_unit_set(written(tmp_path, "#" * 300_000))
     for text in ("x " + "q" * 9000, "x" * 9000, "x" * 9000 + " b sil"):
         with pytest.raises(InputError) as caught:
-            unit_set(written(tmp_path, text))
+            load_unit_set(written(tmp_path, text))
         assert len(str(caught.value)) < 500
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import Lexicon, word_spans, words_in_time
+from lipmotion.units import Lexicon, group_words, word_spans
 
 
 def said(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
     """Return the words in time of words with their phones, each phone a second long."""
     phones = [Unit(phone, word=word) for word, text in words for phone in text.split()]
     units = Timeline(tuple(Span(float(n), n + 1.0, unit) for n, unit in enumerate(phones)))
-    return [(span.start_s, span.end_s, span.label) for span in words_in_time(units)]
+    return [(span.start_s, span.end_s, span.label) for span in group_words(units)]
 
 
 def test_a_word_that_is_said_again_is_another_one() -> None:

@@ -8,9 +8,9 @@ from lipmotion import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.units import Lexicon, words_in, words_in_time, words_of
-from lipmotion.units.text_normalisation import tokens_in
-from lipmotion.units.written_forms import MOST_READINGS, readings
+from lipmotion.units import Lexicon, find_words, group_words, split_words
+from lipmotion.units.text_normalisation import tokenise
+from lipmotion.units.written_forms import MOST_READINGS, list_readings
 
 USUAL = (
     (
@@ -246,21 +246,21 @@ SAID = (
 
 @pytest.mark.parametrize(("text", "words"), USUAL)
 def test_the_usual_reading(text: str, words: str) -> None:
-    assert " ".join(words_in(text)) == words
+    assert " ".join(find_words(text)) == words
 
 
 def test_a_form_has_few_readings_and_a_word_has_one() -> None:
-    assert readings("boat") == (("boat",),)
+    assert list_readings("boat") == (("boat",),)
     for text, _ in USUAL:
-        for token in tokens_in(text):
-            found = readings(token)
+        for token in tokenise(text):
+            found = list_readings(token)
             assert 1 <= len(found) == len(set(found)) <= MOST_READINGS
             assert all(word == word.lower() and not any(map(str.isdecimal, word)) for said in found for word in said)
 
 
 @pytest.mark.parametrize(("text", "said"), SAID)
 def test_what_else_may_be_said_is_a_reading(text: str, said: str) -> None:
-    (token,) = tokens_in(text)
+    (token,) = tokenise(text)
     forms = Lexicon().spoken_forms(token)
     phones = [phone for word in said.split() for phone in Lexicon().pronunciations(word)[0]]
     assert phones in [[phone for phone, word in form if word] for form in forms]
@@ -273,14 +273,14 @@ def test_the_sound_chooses_the_reading() -> None:
     lexicon, recogniser = Lexicon(), Recogniser(load_model().phones, "general")
     wrong = []
     for text, said in SAID:
-        words = ("mother", "saw", *words_of(said), "to", "baby")
+        words = ("mother", "saw", *split_words(said), "to", "baby")
         phones = [phone for word in words for phone in lexicon.pronunciations(word)[0]]
         audio, _ = synthesise(
             [("sil", 0.2), *((phone, 0.09) for phone in phones), ("sil", 0.2)], rate_hz=16_000, seed=1
         )
-        given = ("mother", "saw", *tokens_in(text), "to", "baby")
+        given = ("mother", "saw", *tokenise(text), "to", "baby")
         units = recogniser.align(audio, analysed(audio).mfcc(), given, lexicon)
-        found = tuple(span.label for span in words_in_time(units) if span.label)
+        found = tuple(span.label for span in group_words(units) if span.label)
         wrong += [(text, found)] if found != words else []
     assert not wrong
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import Motion, Timeline, Unit
-from lipmotion.types.motion import between_frames
-from lipmotion.units import closing_phones
+from lipmotion.types.motion import interpolate_rows
+from lipmotion.units import mark_closing_phones
 
 Curve = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -84,7 +84,7 @@ def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
     if "opening" not in motion.names:
         return []
     gap, phones = read_gap(motion), dict[int, ClosedPhone]()
-    for span, closing in zip(units, closing_phones(units), strict=True):
+    for span, closing in zip(units, mark_closing_phones(units), strict=True):
         if closing:
             first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
             stop = min(int(np.floor(span.end_s * motion.rate_hz + 1e-6)) + 1, len(gap))
@@ -149,7 +149,7 @@ def sample_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -
     the lips touch in one of these, show the other one.
     """
     table = rows.reshape(len(rows), -1)
-    values = between_frames(table, rate_hz, time_s)
+    values = interpolate_rows(table, rate_hz, time_s)
     shown = show_contact(contact, rate_hz, time_s)
     position = time_s * rate_hz
     low = np.clip(np.floor(position + 1e-6).astype(int), 0, len(rows) - 1)

@@ -20,9 +20,9 @@ from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
-from lipmotion.types.values import clock_seconds, number_of
-from lipmotion.units import SILENCE, VISEMES, closing_phones, is_silent, words_in_time
-from lipmotion.units.mouth_chart import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, drawn_shape
+from lipmotion.types.values import parse_clock, parse_number
+from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones
+from lipmotion.units.mouth_chart import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
@@ -55,7 +55,7 @@ class CueSheet:
     @property
     def rest(self) -> str:
         """The shape before and after speech."""
-        return drawn_shape(REST, self.drawn)
+        return choose_drawn_shape(REST, self.drawn)
 
     @property
     def rows(self) -> list[tuple[float, str]]:
@@ -96,7 +96,7 @@ def whole_hundredths(duration_s: float) -> float:
 def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
     """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
     starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
-    shapes = [shape for _, shape in segments] or [drawn_shape(REST, drawn)]
+    shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
     ends = [*starts[1:], whole_hundredths(duration_s)]
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
 
@@ -223,7 +223,7 @@ def frame_costs(generation: Generation, frames: int, fps: float, intensity: floa
         spread = np.clip(intensity * spread, *limits)
         cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
     cost *= COST_RATE_HZ / fps
-    closing = closing_phones(generation.units)
+    closing = mark_closing_phones(generation.units)
     for span, closes in zip(generation.units, closing, strict=True):
         if closes or span.label.phone in LIP_BITING:
             shape, penalty = ("A", UNCLOSED_COST) if closes else ("G", UNBITTEN_COST)
@@ -316,11 +316,11 @@ def choose_cues(
     cost = np.empty((0, len(drawn)))
     if frames:  # of the drawn shapes: the least cost of those that each one stands for
         costs = frame_costs(generation, frames, fps, intensity)
-        groups = [[drawn_shape(other, drawn) == name for other in SHAPES] for name in drawn]
+        groups = [[choose_drawn_shape(other, drawn) == name for other in SHAPES] for name in drawn]
         cost = np.stack([costs[:, group].min(axis=1) for group in groups], axis=1)
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE_COST)
     sheet = lay_out_cues([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
-    return replace(sheet, words=Timeline(tuple(span for span in words_in_time(generation.units) if span.label)))
+    return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
 
 
 _OCULUS = "sil:X PP:A FF:G TH:B DD:B kk:B CH:B SS:B nn:B RR:B aa:D E:C ih:B oh:E ou:F I:B O:E U:F"
@@ -369,9 +369,9 @@ def parse_cue_time(text: str, place: str) -> float:
 
     Raises InputError: it is none, with its place.
     """
-    value = clock_seconds(text)
+    value = parse_clock(text)
     if math.isnan(value):
-        value = number_of(text.replace(",", "."), f"{place}: the time is", "a number from 0 on")
+        value = parse_number(text.replace(",", "."), f"{place}: the time is", "a number from 0 on")
     if not 0 <= value <= LONGEST_S * 1000:
         raise InputError(f"{place}: the time is {value:g}, required a number from 0 to {LONGEST_S * 1000:g}")
     return value

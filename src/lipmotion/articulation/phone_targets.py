@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
-from lipmotion.units import LIP_CLOSING, closing_phones
+from lipmotion.units import LIP_CLOSING, mark_closing_phones
 
 Curve = NDArray[np.float64]
 GESTURES = ("tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth")
@@ -131,7 +131,7 @@ def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] 
     names  : of ``GESTURES``, or ``OVAL``
     Without phones, ``teeth`` is that of speech, and all others are 0.
     """
-    closing = closing_phones(units)
+    closing = mark_closing_phones(units)
     phones = [LIP_CLOSING[0] if closes else span.label.phone for span, closes in zip(units, closing, strict=True)]
     start_s, end_s = np.array([(span.start_s, span.end_s) for span in units]).reshape(-1, 2).T
     curves = {}

@@ -13,7 +13,7 @@ from lipmotion.articulation.contact import CLOSED_OPENING, smooth_step
 from lipmotion.errors import InputError
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.voice_event import BREATH, LAUGHTER
-from lipmotion.units import SILENCE, closing_phones, is_silent
+from lipmotion.units import SILENCE, is_silent, mark_closing_phones
 
 Curve = NDArray[np.float64]
 LARGEST_REST = 0.06
@@ -190,7 +190,7 @@ def rest_in_pauses(
 def _open_for_breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
     """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]."""
     gap = np.zeros(len(time_s))
-    phones = zip(units, closing_phones(units), strict=True)
+    phones = zip(units, mark_closing_phones(units), strict=True)
     spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
     begins_s = np.array([span.start_s for span, _ in spoken])
     for start_s, end_s, _, before_speech in find_pauses(units):

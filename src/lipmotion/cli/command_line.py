@@ -21,7 +21,7 @@ from lipmotion.cli.terminal.printing import flush_output, print_usage, with_prog
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
-from lipmotion.types.values import number_of, whole_of
+from lipmotion.types.values import parse_number, parse_whole
 
 _VERBS = "animate batch speak render edit explain cues words train adapt character addon info cite doctor"
 VERBS: Registry[Callable[[Any], None]] = Registry(
@@ -200,8 +200,8 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.register("type", int, whole_of)
-        self.register("type", float, partial(number_of, finite=False))
+        self.register("type", int, parse_whole)
+        self.register("type", float, partial(parse_number, finite=False))
 
     def error(self, message: str) -> NoReturn:
         raise WrongCommandLineError(f"{message}{'' if message.endswith('?') else ';'} see: {self.prog} --help")

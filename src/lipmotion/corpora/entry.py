@@ -29,7 +29,7 @@ from lipmotion.types import (
     Utterance,
     check_curves,
     from_sixteen_bits,
-    sixteen_bits,
+    to_sixteen_bits,
 )
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, truth, whole
 
@@ -60,7 +60,7 @@ def quantise(audio: Audio) -> Audio:
     samples = np.empty(len(audio.samples), np.float32)
     for start in range(0, len(samples), BLOCK):
         block = slice(start, start + BLOCK)
-        samples[block] = from_sixteen_bits(sixteen_bits(audio.samples[block]))
+        samples[block] = from_sixteen_bits(to_sixteen_bits(audio.samples[block]))
     return Audio(samples, audio.rate_hz)
 
 
@@ -84,7 +84,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
     crops, phones = utterance.track.crops, utterance.phones
     check_curves(motion)
     arrays: dict[str, NDArray[Any]] = {
-        "audio": sixteen_bits(utterance.audio.samples),
+        "audio": to_sixteen_bits(utterance.audio.samples),
         "features": utterance.features.values.astype(np.float32),
         "motion": motion.values.astype(np.float32),
         "seen": seen.astype(np.bool_),

@@ -16,7 +16,7 @@ from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError, shortened
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.storage.files import read_text_file
-from lipmotion.units import words_of
+from lipmotion.units import split_words
 
 KIND = "GRID corpus"
 RIGHTS = {"licence": "CC BY 4.0", "attribution": "GRID corpus (Cooke, Barker, Cunningham, Shao 2006), CC BY 4.0"}
@@ -187,7 +187,7 @@ def _tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words
     if not rows or not all(rows):
         return read_labels(script).words
     spoken = [row[1] for row in rows if row and row[1].lower() not in SILENCES]
-    return words_of(" ".join(spoken))
+    return split_words(" ".join(spoken))
 
 
 def _research(attribution: str) -> dict[str, str]:
@@ -206,7 +206,7 @@ LAYOUTS = (
         "CREMA-D",
         re.compile(rf".*/(?P<stem>(?P<speaker>1\d{{3}})_(?P<sentence>{'|'.join(CREMA_SENTENCES)})_[A-Z]{{3}}_[A-Z]+)"),
         "{stem}",
-        lambda _directory, _video, groups: words_of(CREMA_SENTENCES[groups["sentence"]]),
+        lambda _directory, _video, groups: split_words(CREMA_SENTENCES[groups["sentence"]]),
         rights={"licence": "ODbL 1.0", "attribution": "CREMA-D (Cao, Cooper, Keutmann, Gur, Nenkova, Verma 2014)"},
     ),
     Layout(

@@ -39,11 +39,11 @@ from lipmotion.printable import is_line
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.sources import check_kind
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, phone_named, with_confidences
+from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
-from lipmotion.units.mood_tags import tagged_text, without_known_tags
-from lipmotion.units.text_normalisation import checked_tokens
-from lipmotion.units.written_forms import readings
+from lipmotion.units.mood_tags import parse_tagged_text, remove_known_tags
+from lipmotion.units.text_normalisation import require_tokens
+from lipmotion.units.written_forms import list_readings
 
 LOG = logging.getLogger("lipmotion")
 RECOGNISED = tuple(".srt .vtt .ass .ssa .sbv .lrc .ttml .dfxp .json .jsonl .ctm .stm .tsv".split())
@@ -91,7 +91,7 @@ class RecordingLabels:
     def words(self) -> tuple[str, ...] | None:
         """The words of the transcript, lower case, as they are usually read, or None."""
         tokens = self.transcript.words if self.transcript else ()
-        return tuple(word for token in tokens for word in readings(token)[0]) or None
+        return tuple(word for token in tokens for word in list_readings(token)[0]) or None
 
 
 def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
@@ -182,7 +182,7 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
     pairs = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
     rows = (RecognisedPhone(each.start_s, each.end_s, match[1], float(match[2])) for each, match in pairs if match)
-    return units if recognised is None else with_confidences(units, rows)
+    return units if recognised is None else restore_confidences(units, rows)
 
 
 def speakers_in(path: Path) -> tuple[str, ...]:
@@ -216,15 +216,15 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if tiers is not None or unknown_json:
         return None if tiers is None else _choose_labels(tiers, str(path))
     _check_plain(text, path)
-    text, tags = tagged_text(text)
+    text, tags = parse_tagged_text(text)
     tokens = text.split()
     one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
-    if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
+    if len(tokens) > 1 and one_a_line and all(map(find_phone, tokens)):
         raise InputError(f"{path}: a list of phones without times; add their times, or give the words instead")
     if not tokens:
         LOG.warning("%s: is empty: it counts as no transcript; write the words that are said, or remove it", path)
         return RecordingLabels()
-    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, checked_tokens(text)))),), tags))
+    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, require_tokens(text)))),), tags))
 
 
 def _choose_labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
@@ -393,7 +393,7 @@ def _check_plain(text: str, path: Path) -> None:
         raise InputError(f"{path}: {len(text)} characters, {most}: is it a transcript?")
     if is_json(text):
         raise InputError(f"{path}: {describe_json(text, str(path))}")
-    _check_no_labels(without_known_tags(text), str(path))
+    _check_no_labels(remove_known_tags(text), str(path))
 
 
 def _read_text(path: Path, kind: str = "label") -> str:

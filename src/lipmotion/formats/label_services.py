@@ -36,10 +36,10 @@ from lipmotion.formats.label_tiers import (
     unit_of_times,
 )
 from lipmotion.types import values
-from lipmotion.types.values import clock_seconds, number_of, require
+from lipmotion.types.values import parse_clock, parse_number, require
 from lipmotion.units import SILENCE
-from lipmotion.units.spoken_text import check_word_count, spoken_text
-from lipmotion.units.text_normalisation import words_in
+from lipmotion.units.spoken_text import check_word_count, extract_spoken_text
+from lipmotion.units.text_normalisation import find_words
 
 LOG = logging.getLogger("lipmotion")
 _TEXT = values.text(1 << 20)
@@ -247,14 +247,14 @@ def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     if not isinstance(value, str):
         missing = value in (None, -1)  # some services write -1 where they have none
         return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
-    found, clock_s = DIGITS.fullmatch(value.strip()), clock_seconds(value)
+    found, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
     if found is None and not math.isnan(clock_s):
         return clock_s, 1
     if found is not None:
         value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
     if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
         return math.nan, per_s
-    return number_of(value, f"{where}: a time is", "a number of seconds"), per_s
+    return parse_number(value, f"{where}: a time is", "a number of seconds"), per_s
 
 
 def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
@@ -410,7 +410,7 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
         rows = rows[half:]  # Google's last result has the words of all again, with their speakers
     if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
         rows = [part for row in rows for part in row.parts or (row,)]
-    counts = [len(words_in(spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
+    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
     check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
     single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
     role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES

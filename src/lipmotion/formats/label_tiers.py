@@ -13,28 +13,28 @@ from statistics import median
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
-from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, in_order
-from lipmotion.types.values import number_of
+from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, sort_lines
+from lipmotion.types.values import parse_number
 from lipmotion.units import (
     PAUSE,
     PHONES,
     RECOGNISED,
     SILENCE,
     UNKNOWN_PHONES,
+    find_phone,
     is_silent,
-    phone_named,
-    with_reduced_vowels,
+    reduce_vowels,
 )
-from lipmotion.units.ipa_phones import ipa_phones, token_phones, xsampa_as_ipa
+from lipmotion.units.ipa_phones import read_ipa, read_tokens, xsampa_to_ipa
 from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS, SHORT_PAUSE_S
 from lipmotion.units.spoken_text import (
     SpokenAs,
     check_word_count,
-    line_words,
-    speaker_names,
-    spoken_as,
-    spoken_text,
-    timed_words,
+    classify_label,
+    extract_spoken_text,
+    find_speaker_names,
+    read_line_words,
+    time_words,
 )
 
 LOG = logging.getLogger("lipmotion")
@@ -131,7 +131,7 @@ def check_count(count: int, where: str) -> None:
 
 def require_time(text: str, place: str, where: str) -> float:
     """Return a time from its text, also with a decimal comma. Raises InputError: it is none, or not finite."""
-    return number_of(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
+    return parse_number(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
 
 
 def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
@@ -145,7 +145,7 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
     lengths = [
         (end - start) / (1 if role == PHONE_LABELS else max(len(text.split()), 1))
         for start, end, text in spans
-        if math.inf > end > start and spoken_as(text) is SpokenAs.SPEECH
+        if math.inf > end > start and classify_label(text) is SpokenAs.SPEECH
     ]
     whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
     if len(lengths) < 1 + (usual == 1):
@@ -184,7 +184,7 @@ def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[
 
 def holds_phones(tier: LabelTier) -> bool:
     """Return whether a tier's name says that it holds phones, or most of its labels other than silence are phones."""
-    spoken = [label for label in tier.labels if spoken_as(label.text) is SpokenAs.SPEECH]
+    spoken = [label for label in tier.labels if classify_label(label.text) is SpokenAs.SPEECH]
     if tier.role:
         return tier.role == PHONE_LABELS and any(label.text for label in tier.labels)
     return bool(spoken) and sum(phone_of(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
@@ -195,7 +195,10 @@ def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     unknown = [tier for tier in tiers if not tier.role and any(label.text for label in tier.labels)]
     if len(unknown) < 2 or any(tier.speaker or tier.role in (WORDS, LINES) for tier in tiers):
         return tiers
-    spoken = [[label for label in tier.labels if line_words(spoken_text(label.text), tier.name)] for tier in unknown]
+    spoken = [
+        [label for label in tier.labels if read_line_words(extract_spoken_text(label.text), tier.name)]
+        for tier in unknown
+    ]
     if any(map(holds_phones, unknown)) or not all(spoken):
         return tiers
     first, others = spoken[0], [label for labels in spoken[1:] for label in labels]
@@ -225,7 +228,7 @@ def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[
             edges = (span.start_s - timed[place].start_s, span.end_s - timed[place].end_s)
             inside = max(map(abs, edges)) <= WHOLE_WORD_S
         word = timed[place].text if inside else ""
-        said = word if is_line(word) and spoken_as(word) is SpokenAs.SPEECH else ""
+        said = word if is_line(word) and classify_label(word) is SpokenAs.SPEECH else ""
         again = place > before and bool(spans) and said == spans[-1].label.word != ""
         spans.append(replace(span, label=replace(span.label, word=said, again=again)))
     return Timeline(tuple(spans))
@@ -237,7 +240,7 @@ def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
     Each label is a line; words have its time where it is one of words, or a single word.
     Raises InputError: a label ends before it starts, or there are too many words.
     """
-    names = speaker_names(label.text for tier in tiers for label in tier.labels)
+    names = find_speaker_names(label.text for tier in tiers for label in tier.labels)
     lines: list[TranscriptLine] = []
     count = 0
     for tier in tiers:
@@ -246,14 +249,14 @@ def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
             start_s, end_s = _find_times(label, where)
             words: list[TimedWord] = []
             for part in label.parts or (label,):
-                text = spoken_text(part.text, names) if spoken_as(part.text) is SpokenAs.SPEECH else ""
-                single = not tier.role and len(line_words(text, place)) == 1
+                text = extract_spoken_text(part.text, names) if classify_label(part.text) is SpokenAs.SPEECH else ""
+                single = not tier.role and len(read_line_words(text, place)) == 1
                 timed = bool(label.parts) or tier.role == WORDS or single
-                words += timed_words(text, *(_find_times(part, where) if timed else (None, None)), where=place)
+                words += time_words(text, *(_find_times(part, where) if timed else (None, None)), where=place)
             lines.append(TranscriptLine(tuple(words), start_s, end_s))
             count += len(words)
             check_word_count(count, where)
-    return in_order(lines)
+    return sort_lines(lines)
 
 
 def _find_times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
@@ -330,10 +333,10 @@ def phone_of(text: str) -> str | None:
     """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
     text = STATE_NUMBER.sub("", text)
     inner = IN_CONTEXT.sub(r"\1", text)
-    name = phone_named(text) or phone_named(inner)
+    name = find_phone(text) or find_phone(inner)
     if name is not None or text == GLOTTAL_STOP:
         return name or "hh"
-    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(spoken_as(inner))
+    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(classify_label(inner))
 
 
 def _join_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
@@ -363,7 +366,7 @@ def _reduce_vowels(labels: Sequence[TimedLabel], phones: Sequence[str], words: S
     for word in words:
         start, end = max(end, bisect_left(sorted_s, word.start_s)), max(end, bisect_left(sorted_s, word.end_s))
         inside = [i for i in sorted(in_time[start:end]) if not is_silent(phones[i])]
-        reduced = with_reduced_vowels(word.text.lower(), tuple(phones[i] for i in inside))
+        reduced = reduce_vowels(word.text.lower(), tuple(phones[i] for i in inside))
         for i, phone in zip(inside, reduced, strict=True):
             result[i] = phone
     return result
@@ -373,15 +376,15 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
     """Return phones in IPA as phones of the inventory, in the same time.
 
     Symbols that are one sound together are one phone, as ``a`` and ``ɪ``; a symbol of several sounds is divided into
-    equal times; marks, as those of stress and length, are part of the phone before. Source: ``units.ipa_phones``.
+    equal times; marks, as those of stress and length, are part of the phone before. Source: ``units.read_ipa``.
     Raises InputError: a symbol that is none of IPA, with its place.
     """
-    unspoken = [label.text in PAUSES or spoken_as(label.text) is not SpokenAs.SPEECH for label in labels]
+    unspoken = [label.text in PAUSES or classify_label(label.text) is not SpokenAs.SPEECH for label in labels]
     for label, pause in zip(labels, unspoken, strict=True):
         if len(label.text) > LONGEST_SYMBOL:
             long = f"{label.position} has {len(label.text)} letters"
             raise InputError(f"{where}: {long}, required a phone: {LONGEST_SYMBOL} at most")
-        unknown = "" if pause else ipa_phones(label.text)[1]
+        unknown = "" if pause else read_ipa(label.text)[1]
         if unknown:
             raise InputError(
                 f"{where}: {label.position} is {shortened(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
@@ -390,7 +393,7 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
     phones_of: dict[int, list[str]] = defaultdict(list)
     # no sound goes on beyond silence
     tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
-    for phone, number in token_phones(tokens):
+    for phone, number in read_tokens(tokens):
         phones_of[number].append(phone)
     result: list[TimedLabel] = []
     for number, label in enumerate(labels):
@@ -405,7 +408,7 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
         elif not unspoken[number] and result and result[-1].end_s >= label.start_s:
             result[-1] = replace(result[-1], end_s=label.end_s)
         else:
-            is_speech = spoken_as(label.text) is SpokenAs.UNKNOWN
+            is_speech = classify_label(label.text) is SpokenAs.UNKNOWN
             result.append(replace(label, text=UNKNOWN_PHONES if is_speech else SILENCE))
     return result
 
@@ -416,14 +419,16 @@ def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     Raises InputError: as ``ipa_labels``.
     """
     labels = tier.labels if tier.role == PHONE_LABELS else ()
-    spoken = [WITH_GLIDES.get(label.text, label.text) for label in labels if spoken_as(label.text) is SpokenAs.SPEECH]
+    spoken = [
+        WITH_GLIDES.get(label.text, label.text) for label in labels if classify_label(label.text) is SpokenAs.SPEECH
+    ]
     known = sum(phone_of(text) is not None for text in spoken)
-    in_xsampa = sum(bool(xsampa_as_ipa(text)) for text in spoken)
+    in_xsampa = sum(bool(xsampa_to_ipa(text)) for text in spoken)
     if known == len(spoken) or (known >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
         return tier
     as_ipa = WITH_GLIDES
     if all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
-        as_ipa = {text: xsampa_as_ipa(text) or text for text in spoken}
+        as_ipa = {text: xsampa_to_ipa(text) or text for text in spoken}
     symbols = [replace(label, text=as_ipa.get(label.text, label.text)) for label in labels]
     return replace(tier, labels=tuple(ipa_labels(symbols, where)))
 
@@ -438,7 +443,7 @@ def add_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:
         filled.append(label)
     return tuple(
         replace(label, text=PAUSE)
-        if spoken_as(label.text) is SpokenAs.SILENCE
+        if classify_label(label.text) is SpokenAs.SILENCE
         and 0 < number < len(filled) - 1
         and label.end_s - label.start_s < SHORT_PAUSE_S
         else label

@@ -27,7 +27,7 @@ from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
 from lipmotion.storage.json_text import as_json, json_errors
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import items, members, number, require, text, truth
-from lipmotion.units import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
+from lipmotion.units import RECOGNISED, RecognisedPhone, list_recognised_phones, restore_confidences
 
 FORMAT = "lipmotion.motion"
 VERSION = 1
@@ -54,7 +54,7 @@ def list_unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
         label = span.label
         row = {"start_s": span.start_s, "end_s": span.end_s, "phone": label.phone, "unit": label.unit}
         rows.append(row | ({"word": label.word} if label.word else {}) | ({"again": True} if label.again else {}))
-    recognised = recognised_phones(units)
+    recognised = list_recognised_phones(units)
     return {"units": rows} | ({RECOGNISED: recognised} if recognised else {})
 
 
@@ -92,7 +92,7 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
             RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
             for start_s, end_s, name, confidence in _ROWS(recognised or [])
         ]
-        return with_confidences(Timeline(tuple(map(_read_span, _UNITS(rows)))), confidences)
+        return restore_confidences(Timeline(tuple(map(_read_span, _UNITS(rows)))), confidences)
 
 
 def _read_span(row: Any) -> Span[Unit]:

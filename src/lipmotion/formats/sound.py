@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lipmotion.errors import ExportError
 from lipmotion.storage.files import whole_file
-from lipmotion.types import Audio, sixteen_bits
+from lipmotion.types import Audio, to_sixteen_bits
 
 SOUND_CODECS: dict[str, tuple[str, str, int | None]] = {
     ".wav": ("wav", "pcm_s16le", None),
@@ -38,7 +38,7 @@ def write_sound(path: Path, audio: Audio) -> None:
             with av.open(str(temporary), "w", format=container_name) as container:
                 stream = container.add_stream(codec, rate=rate_hz or audio.rate_hz, layout="mono")
                 for start in range(0, len(audio.samples), BLOCK):
-                    values = sixteen_bits(audio.samples[None, start : start + BLOCK])
+                    values = to_sixteen_bits(audio.samples[None, start : start + BLOCK])
                     part = av.AudioFrame.from_ndarray(values, format="s16", layout="mono")
                     part.rate, part.pts, part.time_base = audio.rate_hz, start, Fraction(1, audio.rate_hz)
                     container.mux(stream.encode(part))

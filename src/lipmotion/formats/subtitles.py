@@ -15,9 +15,9 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.formats.label_tiers import LINES, LabelTier, TimedLabel, check_count
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Timeline, Unit
-from lipmotion.types.values import clock_seconds
-from lipmotion.units import is_silent, words_in_time
-from lipmotion.units.spoken_text import speaker_names, spoken_text
+from lipmotion.types.values import parse_clock
+from lipmotion.units import group_words, is_silent
+from lipmotion.units.spoken_text import extract_spoken_text, find_speaker_names
 
 TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
 ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
@@ -84,8 +84,8 @@ def subtitle_tier(text: str, where: str) -> LabelTier:
 def subtitle_words(text: str) -> str:
     """Return what is said of subtitles as a text. Raises InputError: as ``subtitle_tier``."""
     lines = [label.text for label in subtitle_tier(text, "the text").labels]
-    names = speaker_names(lines)
-    return "\n".join(spoken_text(WORD_TIME.sub("", line), names) for line in lines)
+    names = find_speaker_names(lines)
+    return "\n".join(extract_spoken_text(WORD_TIME.sub("", line), names) for line in lines)
 
 
 def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
@@ -102,7 +102,7 @@ def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
             continue
         for time in re.finditer(TIME, timed[1]):
             check_count(len(cues), where)
-            start_s = max(clock_seconds(time[1]) - early_s, 0.0)
+            start_s = max(parse_clock(time[1]) - early_s, 0.0)
             cues.append(TimedLabel(start_s, math.inf, line[timed.end(1) :], f"line {number}"))
     cues.sort(key=lambda cue: cue.start_s)
     for cue, end_s in zip(cues, [*(cue.start_s for cue in cues[1:]), math.inf], strict=True):
@@ -124,7 +124,7 @@ def _read_cues(text: str, where: str) -> Iterator[TimedLabel]:
             yield replace(cue, text=_join_shown(lines))
         count += 1
         check_count(count, where)
-        cue, lines = TimedLabel(clock_seconds(times[1]), clock_seconds(times[2]), "", f"line {number}"), []
+        cue, lines = TimedLabel(parse_clock(times[1]), parse_clock(times[2]), "", f"line {number}"), []
     if cue is not None:
         yield replace(cue, text=_join_shown([*lines, "", ""]))
 
@@ -159,7 +159,7 @@ def _read_table(text: str, where: str) -> Iterator[TimedLabel]:
 def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
     """Return cues without the lines that captions that scroll repeat."""
     plain = [
-        tuple(spoken_text(" ".join(WORD_TIME.sub("", line).split())).strip() for line in cue.text.split("\n"))
+        tuple(extract_spoken_text(" ".join(WORD_TIME.sub("", line).split())).strip() for line in cue.text.split("\n"))
         for cue in cues
     ]
     bridges = sum(
@@ -184,7 +184,7 @@ def _split_words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
         return ()
     edges = [0, *(mark.end() for mark in marks)]
     ends = [*(mark.start() for mark in marks), len(text)]
-    times_s = [cue.start_s, *(min(max(clock_seconds(mark[1]), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
+    times_s = [cue.start_s, *(min(max(parse_clock(mark[1]), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
     return tuple(
         TimedLabel(start_s, max(start_s, end_s), text[first:end], cue.position)
         for first, end, start_s, end_s in zip(edges, ends, times_s, times_s[1:], strict=False)
@@ -217,19 +217,19 @@ def _read_dialogue(text: str, where: str) -> Iterator[TimedLabel]:
                 modes = DRAWING_MODE.findall(part) if place % 2 else []  # of a tag
                 drawing = modes[-1] != "0" if modes else drawing
                 shown += "" if drawing or place % 2 else part
-            times = (clock_seconds(start[1]), clock_seconds(end[1]))
+            times = (parse_clock(start[1]), parse_clock(end[1]))
             yield TimedLabel(*times, BREAK.sub("\n", shown), f"line {number}")
 
 
 def list_shown_labels(path: Path, units: Timeline[Unit]) -> list[tuple[float, float, str]]:
     """Return start, end and text of each word, or of each phone where the name of the file asks for them; no silence.
 
-    Words are those of ``units.words_in_time``.
+    Words are those of ``units.group_words``.
     """
     if path.stem.lower().endswith(PHONES):
         spoken = [span for span in units if not is_silent(span.label.phone)]
         return [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
-    return [(span.start_s, span.end_s, span.label) for span in words_in_time(units) if span.label]
+    return [(span.start_s, span.end_s, span.label) for span in group_words(units) if span.label]
 
 
 def clock(seconds: float, mark: str) -> str:

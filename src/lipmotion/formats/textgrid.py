@@ -13,7 +13,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, find_tier, require_time
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Timeline, Unit
-from lipmotion.units import RECOGNISED, recognised_phones, words_in_time
+from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
 
 TOKEN = re.compile(
     r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
@@ -102,16 +102,16 @@ def _take(tokens: Iterator[tuple[str, str]], wanted: str) -> str:
 def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     """Write phones in time to a TextGrid in long text form, with the tiers ``phones`` and ``words``.
 
-    Where a label has no phone, the name of its unit is written. Words are those of ``units.words_in_time``. Recognised
+    Where a label has no phone, the name of its unit is written. Words are those of ``units.group_words``. Recognised
     phones are in a third tier, ``recognised``, with their confidence (``p 0.37``), so that a reader can tell them from
     corrected ones. Times are as exact as floats are. After a failure there is no partial file.
     Raises ExportError: the file cannot be written.
     """
     phones = [(float(span.start_s), float(span.end_s), span.label.phone or span.label.unit) for span in units]
-    words = [(float(span.start_s), float(span.end_s), span.label) for span in words_in_time(units)]
+    words = [(float(span.start_s), float(span.end_s), span.label) for span in group_words(units)]
     tiers = [("phones", phones), ("words", words)]
     recognised = [
-        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in recognised_phones(units)
+        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in list_recognised_phones(units)
     ]
     if recognised:
         tiers.append((RECOGNISED, recognised))

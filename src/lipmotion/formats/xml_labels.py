@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, find_tier
-from lipmotion.types.values import clock_seconds
+from lipmotion.types.values import parse_clock
 
 ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
 """The first element of XML; those of ``READ_ROOTS`` hold labels in time."""
@@ -125,7 +125,7 @@ def _read_times(
 
 def _parse_seconds(value: str, per_s: dict[str, float], where: str) -> float:
     """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: it is none."""
-    clock_s, offset = clock_seconds(value, per_s.get("f", 0)), OFFSET_TIME.fullmatch(value.strip())
+    clock_s, offset = parse_clock(value, per_s.get("f", 0)), OFFSET_TIME.fullmatch(value.strip())
     if not math.isnan(clock_s):
         return clock_s
     if offset is None:

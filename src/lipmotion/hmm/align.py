@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import Network, NetworkBuilder
+from lipmotion.hmm.network import NetworkBuilder, build_chain
 from lipmotion.kernels.paths import Windows
 
 FIT_BLOCK = 2048
 """Frames whose log densities are in memory at a time."""
-MOST_BASE_ARCS, ARCS_A_FRAME = 1_000_000, 10
+MAX_BASE_ARCS, ARCS_A_FRAME = 1_000_000, 10
 """The largest number of arcs of a network, and how many more for each frame; sentences need about one a frame."""
 
 
@@ -37,7 +37,7 @@ class StateSequence:
     positions: NDArray[np.intp]
 
 
-def state_sequence(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
+def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
     """Return the context-dependent states of a unit sequence; beyond its ends lies silence."""
     table, silence = hmm.table, hmm.table.free[0]
     neighbours = [silence, *(silence if unit in table.free else unit for unit in units), silence]
@@ -52,19 +52,21 @@ def state_sequence(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
     return StateSequence(tuple(names), np.array(densities, np.intp), plain, np.array(positions, np.intp))
 
 
-def state_path(
+def align_states(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
-) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
-    """Return the states of a unit sequence (``StateSequence.names``), and the state of every frame [shape=(T,)].
+) -> tuple[StateSequence, NDArray[np.intp]]:
+    """Return the states of a unit sequence, and the number of the state of every frame [shape=(T,)].
 
-    windows : of the units
-    Raises AlignmentError: fewer frames than states.
+    windows : of the units: the frames that each may have
+    Raises AlignmentError: fewer frames than states, or none within the windows.
     """
-    chain = state_sequence(hmm, units)
+    chain = expand_states(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
-    of_states = None if windows is None else Windows(windows.first[chain.positions], windows.end[chain.positions])
-    path = _chain_network(hmm, chain, local).best_path(log_likelihoods, used, windows=of_states)
-    return chain.names, path
+    if windows is not None:
+        windows = Windows(windows.first[chain.positions], windows.end[chain.positions])
+    log_stay = hmm.log_stay[chain.plain].astype(float)
+    network = build_chain(local, log_stay, np.log(-np.expm1(log_stay)))
+    return chain, network.best_path(log_likelihoods, used, windows=windows)
 
 
 def align_units(
@@ -72,26 +74,10 @@ def align_units(
 ) -> NDArray[np.intp]:
     """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
 
-    windows : of the units: the frames that each may have
-    Raises AlignmentError: fewer frames than states, or none within the windows.
+    Parameters and errors as for ``align_states``.
     """
-    _, path = state_path(hmm, log_likelihoods, units, windows)
-    positions = state_sequence(hmm, units).positions[path]
-    return np.append(np.searchsorted(positions, np.arange(len(units))), log_likelihoods.frames)
-
-
-def _chain_network(hmm: UnitHmm, chain: StateSequence, emission: NDArray[np.intp]) -> Network:
-    """Return the left-to-right network of a state sequence; ``emission`` numbers the density of each [shape=(S,)]."""
-    builder = NetworkBuilder()
-    stay = hmm.log_stay[chain.plain].astype(float)
-    move = np.log(-np.expm1(stay))
-    for number, density in enumerate(emission):
-        builder.state(int(density), stay[number])
-        if number:
-            builder.arc(number - 1, number, move[number - 1])
-    builder.initial(0)
-    builder.final(len(stay) - 1, move[-1])
-    return builder.build()
+    chain, path = align_states(hmm, log_likelihoods, units, windows)
+    return np.append(np.searchsorted(chain.positions[path], np.arange(len(units))), log_likelihoods.frames)
 
 
 class SpokenWord(NamedTuple):
@@ -148,7 +134,7 @@ def place_words(
               the fit is computed
     Raises AlignmentError: the words do not fit into the frames, or into their windows.
     """
-    _check_room(hmm, log_likelihoods, words)
+    _check_room(hmm, log_likelihoods.frames, words)
     silence = SpokenWord(-1, 0, (hmm.table.free[0],))
     slots: list[list[SpokenWord]] = [[silence]]
     for word, variants in enumerate(words):
@@ -157,46 +143,40 @@ def place_words(
         slots.append([SpokenWord(word, number, tuple(variant)) for number, variant in enumerate(variants)])
     slots.append([silence])
     builder = NetworkBuilder()
-    owners: list[SpokenWord] = []
-    slot_of: list[int] = []
-    place_of: list[int] = []
+    nodes: list[tuple[SpokenWord, int, int]] = []  # of each state the pronunciation, its slot, the unit within it
     open_ends: list[tuple[int, float]] = []
     for slot, choices in enumerate(slots):
         ends: list[tuple[int, float]] = []
         for choice in choices:
-            begin = len(owners)
-            ends += _append(builder, hmm, choice.units, open_ends, pause if choice.word >= 0 else "")
-            places = [place for place, unit in enumerate(choice.units) for _ in range(hmm.table.count(unit))]
-            owners += [choice] * len(places)
-            slot_of += [slot] * len(places)
-            place_of += places
             if slot == 0:
-                builder.initial(begin)
+                builder.initial(len(nodes))
+            ends += _append_units(builder, hmm, choice.units, open_ends, pause if choice.word >= 0 else "")
+            counts = [hmm.table.count(unit) for unit in choice.units]
+            nodes += [(choice, slot, place) for place, count in enumerate(counts) for _ in range(count)]
         open_ends = ends
     for state, move in open_ends:
         builder.final(state, move)
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
+    slot_of = np.array([slot for _, slot, _ in nodes])
     of_states = None
     if windows is not None:
         of_slots = _slot_windows(windows, log_likelihoods.frames)
         of_states = Windows(of_slots.first[slot_of], of_slots.end[slot_of])
     network = builder.build()
     path = network.best_path(log_likelihoods, plain, windows=of_states)
-    starts = np.flatnonzero(np.diff(np.array(slot_of)[path], prepend=-1))
+    starts = np.flatnonzero(np.diff(slot_of[path], prepend=-1))
     fits = np.full(len(starts), np.nan)
     if windows is not None:
-        fits = _fits(log_likelihoods, plain, network.emission[path], starts)
-    placed = zip(np.split(path, starts[1:]), starts.tolist(), fits.tolist(), strict=True)
-    return [PlacedWord(_made(owners[states[0]], states, place_of), start, fit) for states, start, fit in placed]
+        fits = _measure_fits(log_likelihoods, plain, network.emission[path], starts)
+    placed = []
+    for states, start, fit in zip(np.split(path, starts[1:]), starts.tolist(), fits.tolist(), strict=True):
+        spoken = nodes[states[0]][0]
+        units = tuple(spoken.units[place] for place in dict.fromkeys(nodes[state][2] for state in states.tolist()))
+        placed.append(PlacedWord(spoken._replace(units=units), start, fit))
+    return placed
 
 
-def _made(word: SpokenWord, states: NDArray[np.intp], place_of: Sequence[int]) -> SpokenWord:
-    """Return a word with the units that its states are of, given the place of each state's unit in it."""
-    places = dict.fromkeys(place_of[state] for state in states.tolist())
-    return word._replace(units=tuple(word.units[place] for place in places))
-
-
-def _fits(
+def _measure_fits(
     log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp], densities: NDArray[np.intp], starts: NDArray[np.intp]
 ) -> NDArray[np.float64]:
     """Return the fit of stretches of a path, given the density of each frame, and the first frame of each stretch."""
@@ -216,7 +196,7 @@ def _slot_windows(windows: Windows, frames: int) -> Windows:
     return Windows(first, end)
 
 
-def unit_windows(spoken: Sequence[SpokenWord], windows: Windows, frames: int) -> Windows:
+def spread_windows(spoken: Sequence[SpokenWord], windows: Windows, frames: int) -> Windows:
     """Return the windows of all units of words with silences and pauses, from those of the words."""
     of_slots = _slot_windows(windows, frames)
     slots, word = [], -1
@@ -226,39 +206,27 @@ def unit_windows(spoken: Sequence[SpokenWord], windows: Windows, frames: int) ->
     return Windows(of_slots.first[slots], of_slots.end[slots])
 
 
-def _check_room(hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]]) -> None:
+def _check_room(hmm: UnitHmm, frames: int, words: Sequence[Sequence[Sequence[str]]]) -> None:
     """Raise AlignmentError if no path fits into the frames, or if the network might fill the memory."""
-    states = _state_counts(hmm, words)
-    least = sum(min(states[id(variants)]) for variants in words)
-    if least > log_likelihoods.frames:
+    count_of = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+    different = {id(variants): variants for variants in words}  # equal words share one object: few of many are counted
+    states = {number: [sum(map(count_of.__getitem__, v)) for v in variants] for number, variants in different.items()}
+    fewest = sum(min(states[id(variants)]) for variants in words)
+    if fewest > frames:
         raise AlignmentError(
-            f"{len(words)} words take at least {least} frames of 10 ms, found {log_likelihoods.frames}: the recording "
+            f"{len(words)} words take at least {fewest} frames of 10 ms, found {frames}: the recording "
             "is too short for what should be said in it; give its own transcript"
         )
     ends = [1, *(len(variants) + 1 for variants in words)]  # of the word before, and of the pause
     arcs = sum(2 * sum(states[id(v)]) + len(v) * before for v, before in zip(words, ends, strict=False))
-    most = MOST_BASE_ARCS + ARCS_A_FRAME * log_likelihoods.frames
-    if arcs > most:
+    if arcs > MAX_BASE_ARCS + ARCS_A_FRAME * frames:
         raise AlignmentError(
-            f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most {most} for "
-            f"{log_likelihoods.frames} frames of 10 ms; give fewer pronunciations"
+            f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most "
+            f"{MAX_BASE_ARCS + ARCS_A_FRAME * frames} for {frames} frames of 10 ms; give fewer pronunciations"
         )
 
 
-def _state_counts(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dict[int, list[int]]:
-    """Return the number of states of each pronunciation, by the ``id`` of the word's pronunciations.
-
-    Equal words share one object, so few of many words are counted.
-    """
-    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
-    different = {id(variants): variants for variants in words}
-    return {
-        number: [sum(counts[unit] for unit in variant) for variant in variants]
-        for number, variants in different.items()
-    }
-
-
-def _append(
+def _append_units(
     builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]], pause: str
 ) -> list[tuple[int, float]]:
     """Add the states of some units, joined to all open ends; return the new open ends: states and log P(leave).

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.align import StateSequence, state_sequence
-from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.states import StateTable
+from lipmotion.hmm.align import StateSequence, expand_states
+from lipmotion.hmm.model import StateTable, UnitHmm
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.em import EmResult, no_report, run_em
 from lipmotion.stats.mixture import Mixtures
@@ -18,7 +18,7 @@ from lipmotion.types import ParallelMap
 
 CELLS = 1_000_000
 """Frames × utterances × states of a batch whose posteriors are computed together: 8 MB an array, some fifty arrays."""
-LEAST_POSTERIOR = 1e-3
+MIN_POSTERIOR = 1e-3
 """Smaller state posteriors are left out of the statistics of densities."""
 LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES = 200.0, 12.0
 """Largest mean duration, in frames, of a state of silence, and of a state of any other unit. Without the second limit
@@ -45,7 +45,7 @@ def baum_welch(
     """
 
     def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
-        mixtures = reestimated_mixtures(model, statistics, data)
+        mixtures = reestimate_mixtures(model, statistics, data)
         return replace(model, mixtures=mixtures, log_stay=statistics.log_stay())
 
     return run_em(
@@ -61,7 +61,7 @@ def adapt_contexts(
     after_step: AfterStep = no_report,
     parallel_map: ParallelMap = map,
 ) -> EmResult[UnitHmm, UnitStatistics]:
-    """Take some steps of adapting the states in context to their data, with the states without context as their prior.
+    """Adapt the states in context to their data by some steps of EM, with the states without context as their prior.
 
     Parameters and result as for ``baum_welch``; the states without context, and all durations, stay as they are.
     """
@@ -79,7 +79,7 @@ def adapt_contexts(
     )
 
 
-def reestimated_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
+def reestimate_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
     """Return the densities re-estimated from the statistics (the M-step).
 
     data : all features, whose variance gives the variance floor
@@ -102,19 +102,18 @@ def accumulate_statistics(
     """Return the sufficient statistics of utterances for every state (the E-step). Parameters as ``baum_welch``."""
     statistics = UnitStatistics(hmm)
     states = [sum(hmm.table.count(unit) for unit in sequence) for sequence in sequences]
-    groups = list(batches([len(x) for x in data], states))
+    groups = list(group_by_length([len(x) for x in data], states))
     jobs = (_Batch(hmm, [data[i] for i in batch], [sequences[i] for i in batch]) for batch in groups)
-    for batch, (of_utterances, log_likelihood, frames) in zip(
-        groups, parallel_map(_batch_statistics, jobs), strict=True
-    ):
+    results = parallel_map(_collect_batch, jobs)
+    for batch, (of_utterances, log_likelihood, frames) in zip(groups, results, strict=True):
         for i, of_utterance in zip(batch, of_utterances, strict=True):
             statistics.add(data[i], of_utterance)
-        statistics.add_log_likelihood(log_likelihood, frames)
+        statistics.log_likelihood += log_likelihood
+        statistics.frames += frames
     return statistics
 
 
-@dataclass(frozen=True, eq=False)
-class _Batch:
+class _Batch(NamedTuple):
     """Some utterances, their unit sequences, and the models that give their posteriors."""
 
     hmm: UnitHmm
@@ -122,14 +121,13 @@ class _Batch:
     sequences: list[tuple[str, ...]]
 
 
-@dataclass(frozen=True, eq=False)
-class UtteranceStatistics:
+class UtteranceStatistics(NamedTuple):
     """The statistics of one utterance for the S states of its unit sequence.
 
     plain    : [shape=(S,)], the densities of the states without context
     stay     : [shape=(S,)], expected number of transitions from each state to itself
     occupied : [shape=(S,)], expected number of frames in each state
-    frames, densities, weights : [shape=(N,)], one entry for each state posterior above ``LEAST_POSTERIOR``: its frame,
+    frames, densities, weights : [shape=(N,)], one entry for each state posterior above ``MIN_POSTERIOR``: its frame,
         its density, and the posterior
     """
 
@@ -141,21 +139,21 @@ class UtteranceStatistics:
     weights: NDArray[np.float32]
 
 
-def utterance_statistics(
+def collect_statistics(
     sequence: StateSequence, posterior: NDArray[np.float64], stay: NDArray[np.float64]
 ) -> UtteranceStatistics:
     """Return the statistics of an utterance from its state posteriors [shape=(T, S)].
 
     stay : [shape=(S,)], expected number of transitions from each state to itself
     """
-    frame, state = np.nonzero(posterior > LEAST_POSTERIOR)
+    frame, state = np.nonzero(posterior > MIN_POSTERIOR)
     weights = posterior[frame, state].astype(np.float32)
     return UtteranceStatistics(sequence.plain, stay, posterior.sum(axis=0), frame, sequence.densities[state], weights)
 
 
-def _batch_statistics(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int]:
+def _collect_batch(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int]:
     """Return the statistics of each utterance, and the log likelihood and frame count of all that have a path."""
-    hmm, chains = batch.hmm, [state_sequence(batch.hmm, sequence) for sequence in batch.sequences]
+    hmm, chains = batch.hmm, [expand_states(batch.hmm, sequence) for sequence in batch.sequences]
     frames = np.array([len(x) for x in batch.data], np.intp)
     states = np.array([len(chain.densities) for chain in chains], np.intp)
     log_emission = np.zeros((frames.max(), len(chains), states.max()))
@@ -167,69 +165,63 @@ def _batch_statistics(batch: _Batch) -> tuple[list[UtteranceStatistics], float, 
     log_move = np.log(-np.expm1(log_stay))
     posterior, stay, log_likelihood = chain_posteriors(log_emission, log_stay, log_move, frames, states)
     statistics = [
-        utterance_statistics(chain, posterior[: frames[u], u, : states[u]], stay[u, : states[u]])
+        collect_statistics(chain, posterior[: frames[u], u, : states[u]], stay[u, : states[u]])
         for u, chain in enumerate(chains)
     ]
     possible = log_likelihood > LOG_ZERO / 2
     return statistics, float(log_likelihood[possible].sum()), int(frames[possible].sum())
 
 
-def batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
+def group_by_length(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
     """Give the numbers of utterances in batches of similar length.
 
     frames, states : of each utterance
     Padded to its longest utterance, a batch has at most ``CELLS`` cells, unless one utterance alone has more.
     """
     batch: list[int] = []
-    most = 0
+    max_states = 0
     for i in sorted(range(len(frames)), key=lambda i: frames[i]):
-        most = max(most, states[i])
-        if batch and frames[i] * most * (len(batch) + 1) > CELLS:
+        max_states = max(max_states, states[i])
+        if batch and frames[i] * max_states * (len(batch) + 1) > CELLS:
             yield batch
-            batch, most = [], states[i]
+            batch, max_states = [], states[i]
         batch.append(i)
     if batch:
         yield batch
 
 
 class UnitStatistics:
-    """The sufficient statistics of one pass over the data, for the states of unit models."""
+    """The sufficient statistics of one pass over the data, for the states of unit models.
+
+    log_likelihood, frames : of all utterances that have a path
+    """
 
     def __init__(self, hmm: UnitHmm) -> None:
         self._hmm = hmm
-        self._log_likelihood, self._frames = 0.0, 0
-        self._stay = np.zeros(len(hmm.log_stay))
-        self._occupied = np.zeros(len(hmm.log_stay))
-        self._densities: list[NDArray[np.intp]] = []
-        self._weights: list[NDArray[np.float32]] = []
-        self._rows: list[NDArray[np.intp]] = []
+        self.log_likelihood, self.frames = 0.0, 0
+        self._stay, self._occupied = np.zeros((2, len(hmm.log_stay)))
         self._features: list[NDArray[np.float32]] = []
-        self._frames_added = 0
+        self._utterances: list[UtteranceStatistics] = []
 
     @property
     def mean_log_likelihood(self) -> float:
         """Mean log likelihood per frame."""
-        return self._log_likelihood / max(self._frames, 1)
+        return self.log_likelihood / max(self.frames, 1)
 
     def add(self, x: NDArray[np.float32], utterance: UtteranceStatistics) -> None:
         """Accumulate the statistics of one utterance with features ``x`` [shape=(T, D)]."""
         np.add.at(self._stay, utterance.plain, utterance.stay)
         np.add.at(self._occupied, utterance.plain, utterance.occupied)
-        self._densities.append(utterance.densities)
-        self._weights.append(utterance.weights)
-        self._rows.append(utterance.frames + self._frames_added)
         self._features.append(x)
-        self._frames_added += len(x)
-
-    def add_log_likelihood(self, log_likelihood: float, frames: int) -> None:
-        """Accumulate the log likelihood of so many frames."""
-        self._log_likelihood += log_likelihood
-        self._frames += frames
+        self._utterances.append(utterance)
 
     def by_density(self) -> Iterator[tuple[int, NDArray[np.float32], NDArray[np.float32]]]:
         """Give each density that has data: its number, its frames [shape=(N, D)] and their posteriors [shape=(N,)]."""
-        densities, weights = np.concatenate(self._densities), np.concatenate(self._weights)
-        rows, features = np.concatenate(self._rows), np.concatenate(self._features)
+        begins = np.cumsum([0, *map(len, self._features)])
+        rows = np.concatenate([each.frames + begin for each, begin in zip(self._utterances, begins, strict=False)])
+        densities = np.concatenate([each.densities for each in self._utterances])
+        weights = np.concatenate([each.weights for each in self._utterances])
+        features = np.concatenate(self._features)
         order = np.argsort(densities, kind="stable")
         visited, starts = np.unique(densities[order], return_index=True)
         for density, entries in zip(visited, np.split(order, starts[1:]), strict=True):
@@ -240,13 +232,13 @@ class UnitStatistics:
 
         A state without data keeps its probability; all are limited by the largest mean durations.
         """
-        kept = self._stay / np.maximum(self._occupied, 1e-9)
-        keep = np.where(self._occupied > 0, kept, np.exp(self._hmm.log_stay))
-        longest = longest_mean_durations(self._hmm.table)[: len(keep)]
-        return np.log(np.clip(keep, 0.05, 1 - 1 / longest)).astype(np.float32)
+        measured = self._stay / np.maximum(self._occupied, 1e-9)
+        stay = np.where(self._occupied > 0, measured, np.exp(self._hmm.log_stay))
+        longest = max_mean_durations(self._hmm.table)[: len(stay)]
+        return np.log(np.clip(stay, 0.05, 1 - 1 / longest)).astype(np.float32)
 
 
-def longest_mean_durations(table: StateTable) -> NDArray[np.float64]:
+def max_mean_durations(table: StateTable) -> NDArray[np.float64]:
     """Return the largest mean duration allowed for each state, in frames [shape=(G,)]."""
     units = [name.split(".")[0] for name in table.names]
     return np.array([LONGEST_SILENCE_FRAMES if unit in table.free else LONGEST_STATE_FRAMES for unit in units])

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
-from lipmotion.hmm.model import UnitHmm
+from lipmotion.hmm.model import Neighbour, StateTable, UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
-from lipmotion.hmm.states import Neighbour
 
 StateNodes = dict[Neighbour, int]
 """The nodes of one state of a unit: by neighbour, and under None the node for all other neighbours."""
@@ -30,23 +29,39 @@ class UnitLoop:
     entries: frozenset[int]
 
 
-def unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
+def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
     """Return the loop over an inventory, which includes silence (the first free unit).
 
     A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
     """
-    silence = hmm.table.free[0]
+    table, silence = hmm.table, hmm.table.free[0]
     builder = NetworkBuilder()
     owners: list[str] = []
-    rows = {unit: _unit_rows(builder, owners, hmm, unit, inventory) for unit in inventory}
+    rows: dict[str, list[StateNodes]] = {}
     for unit in inventory:
-        _join(builder, hmm, unit, inventory, rows)
-        if unit == silence:
-            builder.initial(_node(rows[unit][0], silence), hmm.config.insertion)
-            builder.final(_node(rows[unit][-1], silence), hmm.move(unit, len(rows[unit]) - 1))
-        else:
-            builder.initial(_node(rows[unit][0], silence), _language(hmm, silence, unit))
-            builder.final(_node(rows[unit][-1], silence), _leave(hmm, unit, silence, rows))
+        rows[unit] = []
+        for state in range(table.count(unit)):
+            row: StateNodes = {}
+            for neighbour in _distinct_neighbours(table, unit, state, inventory):
+                row[neighbour] = builder.state(table.density(unit, state, neighbour), hmm.stay(unit, state))
+                owners.append(unit)
+            if rows[unit]:
+                _advance(builder, hmm, unit, state, rows[unit][-1], row)
+            rows[unit].append(row)
+
+    def leave(unit: str, following: str) -> float:
+        """Return the score of the arc to another unit: with the language model's, unless an earlier arc has it."""
+        score = 0.0 if following in rows[unit][-1] else _language_score(hmm, unit, following)
+        return hmm.move(unit, len(rows[unit]) - 1) + score
+
+    for unit in inventory:
+        first, last = rows[unit][0], rows[unit][-1]
+        for following in inventory:
+            builder.arc(_node(last, following), _node(rows[following][0], unit), leave(unit, following))
+        at_rest = unit == silence
+        begin = hmm.config.insertion if at_rest else _language_score(hmm, silence, unit)
+        builder.initial(_node(first, silence), begin)
+        builder.final(_node(last, silence), hmm.move(unit, len(rows[unit]) - 1) if at_rest else leave(unit, silence))
     entries = frozenset(entry for unit_rows in rows.values() for entry in unit_rows[0].values())
     return UnitLoop(builder.build(), tuple(owners), entries)
 
@@ -59,16 +74,16 @@ def decode_units(
     beam : as in ``Network.best_path``; None: exact
     Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5).
     """
-    return units_of_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
+    return decode_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
 
 
-def units_of_path(loop: UnitLoop, path: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+def decode_path(loop: UnitLoop, path: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units of a path through the loop [shape=(T,)], and their frames as ``decode_units`` does."""
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
     return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)
 
 
-def _language(hmm: UnitHmm, unit: str, following: str) -> float:
+def _language_score(hmm: UnitHmm, unit: str, following: str) -> float:
     """Return the score of the language model: weighted log bigram plus insertion penalty."""
     return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
 
@@ -77,36 +92,20 @@ def _node(row: StateNodes, neighbour: str) -> int:
     return row[neighbour] if neighbour in row else row[None]
 
 
-def _unit_rows(
-    builder: NetworkBuilder, owners: list[str], hmm: UnitHmm, unit: str, inventory: Sequence[str]
-) -> list[StateNodes]:
-    """Add the states of one unit in all contexts, and the arcs between them; return the nodes of each state."""
-    rows: list[StateNodes] = []
-    for state in range(hmm.table.count(unit)):
-        row: StateNodes = {}
-        for context in _contexts(hmm, unit, state, inventory):
-            row[context] = builder.state(hmm.table.density(unit, state, context), hmm.stay(unit, state))
-            owners.append(unit)
-        if rows:
-            _advance(builder, hmm, unit, state, rows[-1], row)
-        rows.append(row)
-    return rows
-
-
-def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> list[Neighbour]:
+def _distinct_neighbours(table: StateTable, unit: str, state: int, inventory: Sequence[str]) -> list[Neighbour]:
     """Return the neighbours that need a node of their own; all others (None) share a node, as they share densities.
 
     A neighbour that any state on one side of the unit depends on has nodes for all states on that side: so a node
     tells all that a path must know, and the search stays exact.
     """
-    side = hmm.table.side(unit, state)
-    same_side = [k for k in range(hmm.table.count(unit)) if hmm.table.side(unit, k) == side] if side else []
-    own: list[Neighbour] = [
+    side = table.side(unit, state)
+    same_side = [k for k in range(table.count(unit)) if table.side(unit, k) == side] if side else []
+    distinct: list[Neighbour] = [
         neighbour
         for neighbour in inventory
-        if any(hmm.table.density(unit, k, neighbour) != hmm.table.density(unit, k) for k in same_side)
+        if any(table.density(unit, k, neighbour) != table.density(unit, k) for k in same_side)
     ]
-    return own if len(own) == len(inventory) else [*own, None]
+    return distinct if len(distinct) == len(inventory) else [*distinct, None]
 
 
 def _advance(
@@ -122,20 +121,5 @@ def _advance(
     for source_neighbour, source in sources.items():
         for neighbour, target in targets.items():
             if not same_side or source_neighbour == neighbour:
-                score = _language(hmm, unit, neighbour) if chooses and neighbour is not None else 0.0
+                score = _language_score(hmm, unit, neighbour) if chooses and neighbour is not None else 0.0
                 builder.arc(source, target, move + score)
-
-
-def _join(
-    builder: NetworkBuilder, hmm: UnitHmm, unit: str, inventory: Sequence[str], rows: dict[str, list[StateNodes]]
-) -> None:
-    """Join the last state of a unit to the first state of every unit."""
-    for following in inventory:
-        entry = _node(rows[following][0], unit)
-        builder.arc(_node(rows[unit][-1], following), entry, _leave(hmm, unit, following, rows))
-
-
-def _leave(hmm: UnitHmm, unit: str, following: str, rows: dict[str, list[StateNodes]]) -> float:
-    """Return the score of the arc from a unit to another: with the language model's, unless an earlier arc has it."""
-    score = 0.0 if following in rows[unit][-1] else _language(hmm, unit, following)
-    return hmm.move(unit, len(rows[unit]) - 1) + score

@@ -35,7 +35,7 @@ class LogLikelihoods:
         return self.log_density(first, end, None)
 
 
-def log_likelihoods_from(values: NDArray[np.float32]) -> LogLikelihoods:
+def wrap_log_likelihoods(values: NDArray[np.float32]) -> LogLikelihoods:
     """Return the log likelihoods of a recording, or a stretch of one, that were computed [shape=(T, G)]."""
 
     def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
@@ -44,7 +44,7 @@ def log_likelihoods_from(values: NDArray[np.float32]) -> LogLikelihoods:
     return LogLikelihoods(len(values), log_density)
 
 
-def log_likelihoods_of(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
+def compute_log_likelihoods(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
     """Return the log likelihoods of features [shape=(T, D)] under models of the same features."""
     return LogLikelihoods(
         len(features), lambda first, end, chosen: hmm.mixtures.log_likelihood(features[first:end], chosen)
@@ -52,32 +52,28 @@ def log_likelihoods_of(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikeli
 
 
 def penalise_silence(hmm: UnitHmm, log_likelihoods: LogLikelihoods, loud: NDArray[np.bool_]) -> LogLikelihoods:
-    """Return log likelihoods that makes silence improbable in loud frames [shape=(T,)], for forced alignment.
+    """Return log likelihoods that make silence improbable in loud frames [shape=(T,)], for forced alignment.
 
     For a voice unlike those of the training, the densities hardly tell speech from silence; the energy does.
     """
-    return _penalised(log_likelihoods, loud, _silent_densities(hmm), LOUD_SILENCE_PENALTY)
+    return _penalise(hmm, log_likelihoods, loud, LOUD_SILENCE_PENALTY, silent=True)
 
 
 def penalise_speech(hmm: UnitHmm, log_likelihoods: LogLikelihoods, quiet: NDArray[np.bool_]) -> LogLikelihoods:
-    """Return log likelihoods that makes all but silence improbable in quiet frames [shape=(T,)]."""
-    return _penalised(log_likelihoods, quiet, ~_silent_densities(hmm), QUIET_SPEECH_PENALTY)
+    """Return log likelihoods that make all but silence improbable in quiet frames [shape=(T,)]."""
+    return _penalise(hmm, log_likelihoods, quiet, QUIET_SPEECH_PENALTY, silent=False)
 
 
-def _silent_densities(hmm: UnitHmm) -> NDArray[np.bool_]:
-    free = [hmm.table.density(unit, state) for unit in hmm.table.free for state in range(hmm.table.count(unit))]
-    return np.isin(np.arange(len(hmm.table.names)), free)
-
-
-def _penalised(
-    log_likelihoods: LogLikelihoods, frames: NDArray[np.bool_], densities: NDArray[np.bool_], loss: float
+def _penalise(
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, frames: NDArray[np.bool_], penalty: float, *, silent: bool
 ) -> LogLikelihoods:
-    """Return log likelihoods reduced by ``loss``, for some densities in some frames."""
+    """Return log likelihoods reduced by a penalty in some frames, of the densities that are of silence or are not."""
+    free = [hmm.table.density(unit, state) for unit in hmm.table.free for state in range(hmm.table.count(unit))]
+    penalised = np.isin(np.arange(len(hmm.table.names)), free) == silent
 
     def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
         values = log_likelihoods.log_density(first, end, chosen)
-        lost = densities if chosen is None else densities[chosen]
-        values[np.ix_(frames[first:end], lost)] -= loss
+        values[np.ix_(frames[first:end], penalised if chosen is None else penalised[chosen])] -= penalty
         return values
 
     return LogLikelihoods(log_likelihoods.frames, log_density)

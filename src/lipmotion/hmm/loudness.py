@@ -38,7 +38,7 @@ def smooth_level(log_energy: NDArray[np.floating], smoothing: int = SMOOTHING_FR
     return np.convolve(padded, np.full(smoothing, 1 / smoothing), "valid")
 
 
-def power_level(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
+def average_power(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return the logarithm of the energy averaged over a quarter of a second around every frame [shape=(T,)]."""
     from scipy.ndimage import uniform_filter1d
 
@@ -47,14 +47,14 @@ def power_level(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
     return highest + np.log(np.maximum(uniform_filter1d(power, LEVEL_FRAMES, mode="constant"), 1e-12))
 
 
-def levels_of(log_energy: NDArray[np.floating]) -> tuple[float, float]:
+def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
     """Return the loud level of a recording, and that of the noise beneath its speech, as natural logarithms.
 
     log_energy : of every frame, natural logarithm [shape=(T,)]
     """
     from scipy.ndimage import minimum_filter1d
 
-    loud = float(power_level(log_energy).max())
+    loud = float(average_power(log_energy).max())
     smooth = smooth_level(log_energy)
     spoken = smooth > loud - NEAR_LOUD
     half = NOISE_FRAMES // 2
@@ -65,7 +65,7 @@ def levels_of(log_energy: NDArray[np.floating]) -> tuple[float, float]:
     return loud, float(np.median(lowest[spoken])) if spoken.any() else loud
 
 
-def frames_above(
+def find_loud_frames(
     log_energy: NDArray[np.floating], drop: float = SOUND_DROP, smoothing: int = SMOOTHING_FRAMES
 ) -> NDArray[np.bool_]:
     """Return which frames are louder than a level, and than the noise [shape=(T,)]; none where the level is constant.
@@ -74,14 +74,14 @@ def frames_above(
     drop       : how far the level lies beneath the loud level
     smoothing  : frames averaged over, an odd number
     """
-    loud, noise = levels_of(log_energy)
+    loud, noise = measure_levels(log_energy)
     if loud - noise < LEAST_RANGE:
         return np.zeros(len(log_energy), bool)
     threshold = max(loud - drop, noise + min(ABOVE_NOISE, NOISE_SHARE * (loud - noise)))
     return smooth_level(log_energy, smoothing) > threshold
 
 
-def sound_runs(sound: NDArray[np.bool_], pause: int = PAUSE_FRAMES) -> list[tuple[int, int]]:
+def find_sound_runs(sound: NDArray[np.bool_], pause: int = PAUSE_FRAMES) -> list[tuple[int, int]]:
     """Return runs of frames with sound, each from its first frame to before its end; clicks are none.
 
     sound : of every frame [shape=(T,)]
@@ -94,19 +94,19 @@ def sound_runs(sound: NDArray[np.bool_], pause: int = PAUSE_FRAMES) -> list[tupl
     return [(int(run[0]), int(run[-1]) + 1) for run in runs if run[-1] + 1 - run[0] >= LEAST_FRAMES]
 
 
-def spoken_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
+def find_spoken_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Return the frames with sound, and those of short pauses in it [shape=(T,)]."""
     spoken = np.zeros(len(log_energy), bool)
-    for first, end in sound_runs(frames_above(log_energy)):
+    for first, end in find_sound_runs(find_loud_frames(log_energy)):
         spoken[first:end] = True
     return spoken
 
 
-def quiet_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
+def find_quiet_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Return which frames are too quiet for speech [shape=(T,)].
 
     log_energy : [shape=(T,)], natural logarithm
     """
     padded = np.pad(log_energy, QUIET_REACH_FRAMES, "edge")
     loudest = sliding_window_view(padded, 2 * QUIET_REACH_FRAMES + 1).max(axis=1)
-    return loudest < levels_of(log_energy)[0] - QUIET_DROP
+    return loudest < measure_levels(log_energy)[0] - QUIET_DROP

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,27 +12,12 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.kernels.paths import NetworkArrays, Windows, best_path
 
-KEPT_FRAMES = 12_000
-"""Up to so many frames (two minutes), log densities are computed once and kept; those of longer recordings twice."""
+CACHED_FRAMES = 12_000
+"""Log densities of up to so many frames (two minutes) are computed once and cached; those of more frames, twice."""
 
 
-@dataclass(frozen=True, eq=False)
-class Network:
-    """States joined by arcs, in the form that ``kernels.paths.best_path`` takes."""
-
-    emission: NDArray[np.intp]
-    arc_from: NDArray[np.intp]
-    arc_log: NDArray[np.float32]
-    arc_start: NDArray[np.intp]
-    log_initial: NDArray[np.float32]
-    log_final: NDArray[np.float32]
-
-    @property
-    def arrays(self) -> NetworkArrays:
-        """The network as kernels take it."""
-        return NetworkArrays(
-            self.emission, self.arc_from, self.arc_log, self.arc_start, self.log_initial, self.log_final
-        )
+class Network(NetworkArrays):
+    """States joined by arcs, in which the best path can be searched."""
 
     def best_path(
         self,
@@ -47,19 +33,16 @@ class Network:
         windows : the frames that each state may have; None: any
         Raises AlignmentError: no path reaches the end.
         """
-        cached = (
-            log_likelihoods.log_density(0, log_likelihoods.frames, chosen)
-            if log_likelihoods.frames <= KEPT_FRAMES
-            else None
-        )
+        frames = log_likelihoods.frames
+        cached = log_likelihoods.log_density(0, frames, chosen) if frames <= CACHED_FRAMES else None
 
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
             return log_likelihoods.log_density(first, end, chosen) if cached is None else cached[first:end]
 
-        path, score = best_path(log_emission, log_likelihoods.frames, self.arrays, beam, windows)
+        path, score = best_path(log_emission, frames, self, beam, windows)
         if not np.isfinite(score):
             raise AlignmentError(
-                f"no path through {len(self.emission)} states in {log_likelihoods.frames} frames of 10 ms: "
+                f"no path through {len(self.emission)} states in {frames} frames of 10 ms: "
                 "the recording is too short for what should be said in it"
             )
         return path
@@ -98,18 +81,31 @@ class NetworkBuilder:
         arcs = sorted(self._arcs, key=lambda arc: arc[0])
         targets = np.array([arc[0] for arc in arcs], np.intp)
         count = len(self._emission)
+        log_initial, log_final = np.full((2, count), -np.inf, np.float32)
+        log_initial[[*self._initial]] = [*self._initial.values()]
+        log_final[[*self._final]] = [*self._final.values()]
         return Network(
             emission=np.array(self._emission, np.intp),
             arc_from=np.array([arc[1] for arc in arcs], np.intp),
             arc_log=np.array([arc[2] for arc in arcs], np.float32),
             arc_start=np.searchsorted(targets, np.arange(count)).astype(np.intp),
-            log_initial=_dense(self._initial, count),
-            log_final=_dense(self._final, count),
+            log_initial=log_initial,
+            log_final=log_final,
         )
 
 
-def _dense(values: dict[int, float], count: int) -> NDArray[np.float32]:
-    """Return the values by number [shape=(count,)], -inf where there is none."""
-    full = np.full(count, -np.inf, np.float32)
-    full[list(values)] = list(values.values())
-    return full
+def build_chain(
+    densities: Iterable[int], log_stay: NDArray[np.floating[Any]], log_move: NDArray[np.floating[Any]]
+) -> Network:
+    """Return the network of S states in a row: paths go through all of them, from the first to the last.
+
+    log_stay, log_move : log probabilities of staying in each state, and of leaving it [each shape=(S,)]
+    """
+    builder = NetworkBuilder()
+    for number, (density, stay) in enumerate(zip(densities, log_stay.tolist(), strict=True)):
+        builder.state(int(density), stay)
+        if number:
+            builder.arc(number - 1, number, float(log_move[number - 1]))
+    builder.initial(0)
+    builder.final(len(log_stay) - 1, float(log_move[-1]))
+    return builder.build()

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.modulation_spectrum import modulation_spectrum
+from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
 from lipmotion.stats.rounding import varies
 
 Array = NDArray[np.float64]
@@ -28,8 +28,8 @@ def modulation_distance_db(generated: Clips, original: Clips, rate_hz: float) ->
     The mean is over frequencies up to ``HIGHEST_HZ``. NaN where the original is constant but for rounding.
     Source: Takamichi et al. 2016, who show the spectra; the distance is ours.
     """
-    frequencies, reference = modulation_spectrum(original, rate_hz)
-    _, made = modulation_spectrum(generated, rate_hz)
+    frequencies, reference = measure_modulation_spectrum(original, rate_hz)
+    _, made = measure_modulation_spectrum(generated, rate_hz)
     floor = np.where(varies(np.concatenate(original)), FLOOR * reference.max(axis=0), np.nan)
     difference = 10 * np.log10(np.maximum(made, floor) / np.maximum(reference, floor))
     return np.sqrt(np.square(difference[frequencies <= HIGHEST_HZ]).mean(axis=0))

@@ -4,31 +4,31 @@ An engine of your own needs ``fit_motion``, ``LearnedMotion`` and perhaps ``fit_
 (docs/extend/engine.md).
 """
 
-from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_arrays, learned_motion_from_arrays
+from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_from_arrays, learned_motion_to_arrays
 from lipmotion.motion.context_window import (
     WINDOW,
     AcousticContext,
-    acoustic_context_arrays,
-    acoustic_context_from,
+    acoustic_context_from_arrays,
+    acoustic_context_to_arrays,
     fit_acoustic_context,
 )
 from lipmotion.motion.fit import fit_motion
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 
 __all__ = [
     "LEARNED_MOTION_ARRAYS",
     "WINDOW",
     "AcousticContext",
     "LearnedMotion",
-    "acoustic_context_arrays",
-    "acoustic_context_from",
-    "dynamics_known",
+    "acoustic_context_from_arrays",
+    "acoustic_context_to_arrays",
     "fit_acoustic_context",
     "fit_motion",
-    "learned_motion_arrays",
     "learned_motion_from_arrays",
+    "learned_motion_to_arrays",
+    "mark_known_dynamics",
     "with_dynamics",
     "with_unit_names",
 ]

@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.motion.articulation import strangeness
+from lipmotion.motion.articulation import unseen_share
 from lipmotion.motion.network_steps import (
     STEP,
     ConvolutionalShape,
-    between_steps,
-    checked_scale,
-    error_variances,
-    random_piece,
-    spectrum_steps,
-    standard_poses,
+    check_scale,
+    cut_random_piece,
+    interpolate_steps,
+    measure_error_variances,
+    measure_poses,
+    stack_spectrum,
 )
 from lipmotion.motion.posterior_network import PosteriorNetwork, have_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
-from lipmotion.motion.reliability import clearness
+from lipmotion.motion.reliability import rate_clearness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
@@ -89,11 +89,11 @@ class AcousticNetwork(Predictor):
                 f"examples without acoustic conditions; a network is trained on {LEAST_MOTION_S:g} s of measured "
                 "motion or more, with the option conditions from 1"
             )
-        mean, scale = standard_poses(training)
+        mean, scale = measure_poses(training)
         network = _trained(replace(training, monitor=sub_monitor(training.monitor, 0, 0.8)), mean, scale)
         trained = cls(network, mean, scale, np.ones((3, len(mean))))
         predicted = (trained._predict(example.condition_spectra[0].values)[0] for example in examples)
-        variances = error_variances(training, predicted, scale)
+        variances = measure_error_variances(training, predicted, scale)
         last = replace(training, monitor=sub_monitor(training.monitor, 0.8, 1))
         beside = PosteriorNetwork.trained(last) if have_posteriors(examples) else None
         return PredictorFit(cls(network, mean, scale, variances, beside))
@@ -115,15 +115,15 @@ class AcousticNetwork(Predictor):
         if network is None or posteriors is None:
             return motion, distortion
         (known, unknown), (none, full) = POSTERIOR_SHARES, SURE_POSTERIORS
-        strange, sure = strangeness(speech.voice), np.clip((posteriors.mean - none) / (full - none), 0, 1)
-        fitting = sure + (1 - strange) * np.maximum(clearness(distortion) - sure, 0)
+        strange, sure = unseen_share(speech.voice), np.clip((posteriors.mean - none) / (full - none), 0, 1)
+        fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
         share = (fitting * (known + strange * (unknown - known)))[:, None]
         return motion + share * (network.predict(speech)[0] - motion), distortion
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""
-        steps = self.network(spectrum_steps(spectrum)).astype(float)
-        outputs = between_steps(steps, len(spectrum))
+        steps = self.network(stack_spectrum(spectrum)).astype(float)
+        outputs = interpolate_steps(steps, len(spectrum))
         return outputs[:, :-1] * self.scale + self.mean, np.clip(outputs[:, -1], 0, 1)
 
     def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:
@@ -134,7 +134,7 @@ class AcousticNetwork(Predictor):
         """
         if speech.spectrum is None:
             return None
-        hidden = self.network.hidden(spectrum_steps(speech.spectrum))
+        hidden = self.network.hidden(stack_spectrum(speech.spectrum))
         output = self.network.output
         distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
         if self.beside is not None and speech.posteriors is not None:
@@ -157,7 +157,7 @@ class AcousticNetwork(Predictor):
         network = SHAPE.from_arrays(arrays, dimensions + 1)
         found = not arrays.keys().isdisjoint(PosteriorNetwork.ARRAYS)
         beside = PosteriorNetwork.from_arrays(arrays, dimensions) if found else None
-        return cls(network, mean, checked_scale(scale, "network_targets"), stored["network_variances"], beside)
+        return cls(network, mean, check_scale(scale, "network_targets"), stored["network_variances"], beside)
 
 
 def _trained(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
@@ -173,7 +173,7 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
         versions = pieces()[number]
-        return random_piece(versions[int(rng.integers(len(versions)))], rng)
+        return cut_random_piece(versions[int(rng.integers(len(versions)))], rng)
 
     plan = TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED)
     return SHAPE.trained(training, len(mean) + 1, draw, plan)
@@ -181,7 +181,7 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
 
 def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:
     """Return inputs and targets of a whole recording in time steps; inputs at half precision."""
-    inputs = spectrum_steps(version.values).astype(np.float16)
+    inputs = stack_spectrum(version.values).astype(np.float16)
     frames = np.minimum(np.round(np.arange(len(inputs)) * STEP * version.tempo).astype(int), len(targets) - 1)
     distortion = np.full((len(inputs), 1), version.distortion)
     outputs = np.concatenate([targets[frames], distortion], axis=1).astype(np.float32)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from lipmotion.motion.articulation import (
     ARTICULATION,
     ArticulationPrior,
-    articulation_arrays,
     articulation_from_arrays,
+    articulation_to_arrays,
 )
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses
-from lipmotion.motion.modulation_filter import MODULATION, filter_arrays, filter_from_arrays
+from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.stats.pca import Pca, check_orthonormal
@@ -28,7 +28,7 @@ PHONE_SET = UNIT_SETS["phone"]
 """The unit set in which each phone is a unit of its own; models do not store it."""
 
 
-def motion_arrays(
+def motion_to_arrays(
     units: UnitSet, space: MotionSpace, closure: Closure | None, prior: ArticulationPrior | None = None
 ) -> dict[str, NDArray[Any]]:
     """Serialise the mapping of phones to units, the motion space, the closure and the prior."""
@@ -42,32 +42,34 @@ def motion_arrays(
         arrays |= {"points_mean": space.points.mean, "points_basis": space.points.basis.astype(np.float32)}
     if closure is not None:
         arrays |= {"closure": np.array([closure.column, closure.closed]), "closure_follow": closure.follow}
-    return arrays | articulation_arrays(prior)
+    return arrays | articulation_to_arrays(prior)
 
 
-def learned_motion_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
+def learned_motion_to_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
     """Serialise learned motion, with its limits, its variance scaling and its modulation filter.
 
     For engines that do not store these in arrays of their own.
     """
-    arrays = motion_arrays(PHONE_SET, motion.space, motion.closure, motion.prior) | {"limits": np.stack(motion.limits)}
-    return arrays | scaling_arrays(motion.scaling) | filter_arrays(motion.modulation)
+    arrays = motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior) | {
+        "limits": np.stack(motion.limits)
+    }
+    return arrays | scaling_to_arrays(motion.scaling) | filter_to_arrays(motion.modulation)
 
 
-def scaling_arrays(scaling: VarianceScaling | None) -> dict[str, NDArray[Any]]:
+def scaling_to_arrays(scaling: VarianceScaling | None) -> dict[str, NDArray[Any]]:
     """Serialise variance scaling; None has no arrays."""
     return {"scaling": np.stack(scaling)} if scaling is not None else {}
 
 
 def scaling_from_arrays(arrays: Arrays, dimensions: int) -> VarianceScaling | None:
-    """Deserialise what ``scaling_arrays`` returned. Raises ValueError: a wrong shape, type or range."""
+    """Deserialise what ``scaling_to_arrays`` returned. Raises ValueError: a wrong shape, type or range."""
     if "scaling" not in arrays:
         return None
     return VarianceScaling(*checked_arrays(arrays, SCALING, Q=dimensions)["scaling"])
 
 
 def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> LearnedMotion:
-    """Deserialise what ``learned_motion_arrays`` returned; other arrays are ignored.
+    """Deserialise what ``learned_motion_to_arrays`` returned; other arrays are ignored.
 
     filtered : there must be a modulation filter
     Raises ModelFormatError: an array is missing, or has a wrong shape, type or range.
@@ -115,9 +117,9 @@ UNITS = {"units": ArraySpec(np.str_, "N 2")}
 LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
 MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *ARTICULATION)
-"""Names of the arrays of ``motion_arrays``: P channels, of which R are reduced to K dimensions."""
+"""Names of the arrays of ``motion_to_arrays``: P channels, of which R are reduced to K dimensions."""
 LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTICULATION, *MODULATION)
-"""Names of the arrays of ``learned_motion_arrays``."""
+"""Names of the arrays of ``learned_motion_to_arrays``."""
 
 
 def _space(arrays: Arrays) -> MotionSpace:

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import with_neighbours
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
-from lipmotion.units import PHONES, SILENCE, VOWELS, is_silent, most_similar_phone, unknown_phone_message
+from lipmotion.units import PHONES, SILENCE, VOWELS, describe_unknown_phone, find_similar_phone, is_silent
 
 
-def strangeness(voice: float) -> float:
+def unseen_share(voice: float) -> float:
     """Return how far the measures for unknown voices apply, 0 to 1; more than half for voices half known."""
     return float(np.sqrt(1 - voice))
 
@@ -86,7 +86,7 @@ class ArticulationPrior:
         reliability : of the phones, 0 to 1 [shape=(frames,)]
         Raises InputError: an unknown phone.
         """
-        return self.centre + GAIN * articulators(units, frames, reliability) @ self.matrix
+        return self.centre + GAIN * trace_articulators(units, frames, reliability) @ self.matrix
 
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
         """Return how well training knows each phone between its neighbours, 0 to 1 [shape=(frames,)].
@@ -100,8 +100,8 @@ class ArticulationPrior:
                 count = self.contexts.get((_merged(left), _merged(span.label.phone), _merged(right)), 0)
                 first, stop = frames_of(span, frames)
                 steps[first:stop] = count / (count + HALF_FAMILIAR_COUNT)
-        steps[away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), REST_S)] = 1
-        return smoothed(steps)[:, 0]
+        steps[is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), REST_S)] = 1
+        return smooth_steps(steps)[:, 0]
 
     def blended(
         self,
@@ -120,18 +120,18 @@ class ArticulationPrior:
         """
         values = self.trajectory(units, frames)
         unknown = 1 - self.familiarity(units, frames)
-        of_voice = self.known_voice_share + strangeness(voice) * (1 - self.known_voice_share)
+        of_voice = self.known_voice_share + unseen_share(voice) * (1 - self.known_voice_share)
         weight = of_voice * self.weight * (np.asarray(reliability) * unknown) ** POWER
         share = (weight / (1 + weight))[:, None, None]
 
         def drawn(chosen: slice) -> Statistics:
             means, precisions = statistics(chosen)
-            return means + share[chosen] * (dynamics_of(values, chosen) - means), precisions
+            return means + share[chosen] * (slice_dynamics(values, chosen) - means), precisions
 
         return drawn
 
 
-def dynamics_of(values: Array, frames: slice) -> Array:
+def slice_dynamics(values: Array, frames: slice) -> Array:
     """Return static value, Δ and Δ² of a range of N frames [shape=(N, 3, Q)].
 
     values : of the whole recording [shape=(T, Q)]
@@ -141,7 +141,7 @@ def dynamics_of(values: Array, frames: slice) -> Array:
     return with_dynamics(values[first : stop + 1])[start - first :][: stop - start]
 
 
-def articulators(units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
+def trace_articulators(units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
     """Return the articulators of phones in time, in standard deviations of a speaker [shape=(frames, 8)].
 
     reliability : of the phones, 0 to 1 [shape=(frames,)]
@@ -150,23 +150,23 @@ def articulators(units: Timeline[Unit], frames: int, reliability: Array | float 
     all consonants.
     Raises InputError: an unknown phone.
     """
-    table, means, steps = articulation_table(), class_means(), np.zeros((frames, len(ARTICULATORS)))
+    table, means, steps = read_articulation_table(), average_classes(), np.zeros((frames, len(ARTICULATORS)))
     relied = np.broadcast_to(np.asarray(reliability, float), frames)[:, None]
     for span in units:
         phone, (first, stop) = span.label.phone, frames_of(span, frames)
         if phone and phone not in PHONES:
-            raise InputError(unknown_phone_message(phone, f" at {span.start_s} s"))
+            raise InputError(describe_unknown_phone(phone, f" at {span.start_s} s"))
         if first < stop and phone:
-            row = table[phone if phone in table else most_similar_phone(phone, list(table))]
+            row = table[phone if phone in table else find_similar_phone(phone, list(table))]
             time_s = np.arange(first, stop) / FRAME_RATE_HZ
             third = (time_s - span.start_s) / max(span.duration_s, 1e-9) * len(THIRDS)
             thirds, sure = np.minimum(np.maximum(third.astype(int), 0), len(THIRDS) - 1), relied[first:stop]
             mean = row if is_silent(phone) else means[phone in VOWELS]
             steps[first:stop] = sure * row[thirds] + (1 - sure) * mean[thirds]
-    return smoothed(steps)
+    return smooth_steps(steps)
 
 
-def smoothed(steps: Array) -> Array:
+def smooth_steps(steps: Array) -> Array:
     """Return values in frames [shape=(T, C)] smoothed by a Gaussian of ``SMOOTHING_S``; the ends are repeated."""
     deviation = SMOOTHING_S * FRAME_RATE_HZ
     reach = int(np.ceil(4 * deviation))
@@ -177,12 +177,12 @@ def smoothed(steps: Array) -> Array:
 
 
 @cache
-def class_means() -> dict[bool, Array]:
+def average_classes() -> dict[bool, Array]:
     """Return the mean of every articulator in each third of consonants (False) and vowels (True) [each shape=(3, 8)].
 
     Phones count as often as they occur.
     """
-    table, counts = articulation_table(), {row["phone"]: float(row["count"]) for row in _csv_rows()}
+    table, counts = read_articulation_table(), {row["phone"]: float(row["count"]) for row in _csv_rows()}
     spoken = [phone for phone in table if not is_silent(phone)]
     return {
         vowels: np.average(
@@ -195,7 +195,7 @@ def class_means() -> dict[bool, Array]:
 
 
 @cache
-def articulation_table() -> dict[str, Array]:
+def read_articulation_table() -> dict[str, Array]:
     """Return the mean of every articulator in each third of every phone [each shape=(3, 8)]."""
     return {
         row["phone"]: np.array([[float(row[f"{name}_{third}"]) for name in ARTICULATORS] for third in THIRDS])
@@ -224,7 +224,7 @@ def fit_articulation_prior(
     if not len(poses):
         return None
     channels, _ = space.restore(poses, np.zeros_like(poses))
-    measured = measured_articulators(channels, [channel.name for channel in space.channels])
+    measured = measure_articulators(channels, [channel.name for channel in space.channels])
     known = [number for number, name in enumerate(ARTICULATORS) if name in measured]
     columns = np.stack([measured[ARTICULATORS[number]] for number in known], axis=1)
     centred = columns - columns.mean(axis=0)
@@ -258,7 +258,7 @@ def count_contexts(timelines: Iterable[Timeline[Unit]]) -> dict[Context, int]:
     return dict(sorted(counts.items()))
 
 
-def articulation_arrays(prior: ArticulationPrior | None) -> dict[str, NDArray[Any]]:
+def articulation_to_arrays(prior: ArticulationPrior | None) -> dict[str, NDArray[Any]]:
     """Serialise a prior."""
     if prior is None:
         return {}
@@ -299,12 +299,12 @@ def _merged(phone: str) -> str:
 def _spoken(example: Example) -> NDArray[np.bool_]:
     """Return the valid frames within speech [shape=(T,)]."""
     spoken = np.zeros(len(example.valid), bool)
-    for start_s, end_s in speech_intervals(example.speech.units):
+    for start_s, end_s in list_speech_intervals(example.speech.units):
         spoken[int(np.ceil(start_s * FRAME_RATE_HZ)) : int(np.ceil(end_s * FRAME_RATE_HZ))] = True
     return spoken & example.valid
 
 
-def measured_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:
+def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:
     """Return the articulators that can be measured on motion, by name [each shape=(N,)].
 
     motion : values of all channels [shape=(N, P)]

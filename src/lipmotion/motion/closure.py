@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Channel, Example, Motion, Timeline, Unit
-from lipmotion.units import closing_phones
+from lipmotion.units import mark_closing_phones
 
 OPENING = "opening"
 REACH_S = 0.02
@@ -45,7 +45,7 @@ def clip_at_zero(motion: Motion) -> None:
     motion.values[:, bounded] = np.maximum(motion.values[:, bounded], 0)
 
 
-def closable_ranges(
+def find_closable_ranges(
     units: Timeline[Unit], frames: int, closing_units: Container[str] = (), reach_s: float = REACH_S
 ) -> list[slice]:
     """Return, for each p, b and m, the range of frames at 100 Hz in which it may close the lips.
@@ -56,7 +56,7 @@ def closable_ranges(
                     do not; its middle always does
     """
     ranges = []
-    for span, closing in zip(units, closing_phones(units), strict=True):
+    for span, closing in zip(units, mark_closing_phones(units), strict=True):
         label = span.label
         if closing or (not label.phone and label.unit in closing_units):
             inside_s = min(-reach_s, span.duration_s / 2)
@@ -68,7 +68,7 @@ def closable_ranges(
     return ranges
 
 
-def closed_opening(smallest: Sequence[float], *groups: NDArray[np.float64]) -> float:
+def estimate_closed_opening(smallest: Sequence[float], *groups: NDArray[np.float64]) -> float:
     """Return the opening at which a person's lips touch, in the unit of the openings, at least 0.
 
     smallest : smallest opening in each p, b and m; may be empty, and wrong where phones were recognised
@@ -81,7 +81,7 @@ def closed_opening(smallest: Sequence[float], *groups: NDArray[np.float64]) -> f
     return max(min([*middle, *bounds], default=0.0), 0.0)
 
 
-def closure_from_motion(
+def estimate_closure(
     values: Sequence[NDArray[np.float64]],
     valid: Sequence[NDArray[np.bool_]],
     timelines: Sequence[Timeline[Unit]],
@@ -93,28 +93,28 @@ def closure_from_motion(
     valid     : the frames of each that were measured [each shape=(T,)]
     timelines : the phones of each
     column    : of the opening
-    ``closed`` is from ``closed_opening``, of all measured frames.
+    ``closed`` is from ``estimate_closed_opening``, of all measured frames.
     """
     smallest = [
         float(x[frames][known[frames], column].min())
         for x, known, units in zip(values, valid, timelines, strict=True)
-        for frames in closable_ranges(units, len(x))
+        for frames in find_closable_ranges(units, len(x))
         if known[frames].any()
     ]
     poses = np.concatenate([x[known] for x, known in zip(values, valid, strict=True)])
     centred = poses - poses.mean(axis=0)
     opening = centred[:, column]
-    closed = closed_opening(smallest, poses[:, column])
+    closed = estimate_closed_opening(smallest, poses[:, column])
     return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))
 
 
-def frames_to_close(
+def choose_closed_frames(
     closure: Closure, opening: NDArray[np.float64], ranges: Sequence[slice], pinned: Sequence[int]
 ) -> list[int]:
     """Return the frames in which the lips must be made to close: the least open frame of each p, b and m.
 
     opening : generated opening [shape=(T,)]
-    ranges  : the frames of each p, b and m, from ``closable_ranges``
+    ranges  : the frames of each p, b and m, from ``find_closable_ranges``
     pinned  : frames whose opening the user pinned; a range that contains one is left as the user wants it
     Ranges in which the lips close without help are left out.
     """
@@ -137,4 +137,4 @@ def fit_closure(
     if OPENING not in names:
         return None
     masks, timelines = [example.valid for example in examples], [example.speech.units for example in examples]
-    return closure_from_motion(values, masks, timelines, names.index(OPENING))
+    return estimate_closure(values, masks, timelines, names.index(OPENING))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.pca import principal_axes
+from lipmotion.stats.pca import find_principal_axes
 from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
@@ -66,17 +66,19 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     mean = total / count
     covariance = products / count - np.outer(mean, mean)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + LEAST_DEVIATION
-    basis = np.ascontiguousarray(principal_axes(covariance / np.outer(scale, scale), size).T)  # stored in this order
+    basis = np.ascontiguousarray(
+        find_principal_axes(covariance / np.outer(scale, scale), size).T
+    )  # stored in this order
     factor = SCALE / np.sqrt(basis.shape[1])
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 
 
-def acoustic_context_arrays(context: AcousticContext) -> dict[str, NDArray[Any]]:
+def acoustic_context_to_arrays(context: AcousticContext) -> dict[str, NDArray[Any]]:
     """Serialise a context; the basis is stored at half precision."""
     return {"window": np.stack([context.mean, context.scale]), "window_basis": context.basis.astype(np.float16)}
 
 
-def acoustic_context_from(arrays: CheckedArrays) -> AcousticContext:
+def acoustic_context_from_arrays(arrays: CheckedArrays) -> AcousticContext:
     """Deserialise a context from arrays that were checked against ``WINDOW``.
 
     Raises ValueError: a scale that is not positive, or a column of the basis that is zero.

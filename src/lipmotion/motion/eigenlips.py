@@ -104,7 +104,7 @@ def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
     return Eigenlips(mean, basis, explained, (height, width))
 
 
-def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
+def eigenlips_to_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
     """Return eigenlips serialised as arrays (``SIZE``, ``SPACES``)."""
     return {
         "mean": eigenlips.mean,

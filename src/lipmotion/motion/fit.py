@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.limits import limits_of
+from lipmotion.motion.limits import measure_limits
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.types import Example
 
@@ -26,5 +26,5 @@ def fit_motion(examples: Sequence[Example], components: int) -> tuple[LearnedMot
     closure = fit_closure(space.direct_names, values, examples)
     valid = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     return LearnedMotion(
-        space, closure, limits_of(valid), prior=fit_articulation_prior(space, values, examples)
+        space, closure, measure_limits(valid), prior=fit_articulation_prior(space, values, examples)
     ), values

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit, frames_of
-from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone_message
+from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, describe_unknown_phone, is_silent
 
 REST_STATE = -1
 """The number of the one state of the rest pose: silence far from speech."""
@@ -97,7 +97,7 @@ def with_unit_names(spans: Timeline[Unit], units: UnitSet = UNIT_SETS["phone"]) 
     return Timeline(tuple(renamed))
 
 
-def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout) -> list[FullContextState]:
+def label_full_context(units: Timeline[Unit], frames: int, layout: StateLayout) -> list[FullContextState]:
     """Return the full-context state of every frame at 100 Hz [length ``frames``].
 
     Frames in silence (the phone, whatever its unit) further than ``layout.rest_s`` from speech, and frames outside all
@@ -106,9 +106,9 @@ def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout)
     """
     for span in units:
         if span.label.phone not in PHONES:
-            raise InputError(unknown_phone_message(span.label.phone, f" at {span.start_s} s"))
+            raise InputError(describe_unknown_phone(span.label.phone, f" at {span.start_s} s"))
     result = [layout.rest] * frames
-    away = away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), layout.rest_s)
+    away = is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), layout.rest_s)
     for left, span, right in with_neighbours(units):
         first, stop = frames_of(span, frames)
         time_s = np.arange(first, stop) / FRAME_RATE_HZ

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.articulation import ArticulationPrior, strangeness
-from lipmotion.motion.closure import REACH_S, Closure, closable_ranges, frames_to_close, is_never_negative
+from lipmotion.motion.articulation import ArticulationPrior, unseen_share
+from lipmotion.motion.closure import REACH_S, Closure, choose_closed_frames, find_closable_ranges, is_never_negative
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import (
-    closing_reach_s,
-    typical_range,
-    with_breath,
-    with_contrast,
-    with_open_vowels,
+    choose_closing_reach,
+    open_before_speech,
+    open_vowels,
+    raise_contrast,
+    widen_range,
 )
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import (
@@ -75,7 +75,7 @@ class LearnedMotion:
         """
         if self.modulation is None or voice == 1:
             return self
-        strength = np.full(self.space.dimensions, 1 - strangeness(voice))
+        strength = np.full(self.space.dimensions, 1 - unseen_share(voice))
         if "width" in self.space.direct_names:
             strength[self.space.direct_names.index("width")] **= 2
         return replace(self, modulation=self.modulation.of_strength(strength))
@@ -109,18 +109,18 @@ class LearnedMotion:
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
-        pins = resolved_pins(constraints, self.space, frames)
+        pins = resolve_pins(constraints, self.space, frames)
         scaling, reach_s = self.scaling, REACH_S
         if self.prior is not None:
             statistics = self.prior.blended(statistics, units, frames, reliability, voice)
             if voice < 1 and scaling is not None and self.closure is not None:
-                column, reach_s = self.closure.column, closing_reach_s(voice)
-                statistics = with_contrast(statistics, self.prior, units, frames, reliability, voice)
-                statistics = with_open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
-                statistics = with_breath(statistics, self.prior, units, frames, reliability, voice)
-                gain = typical_range(self.prior, self.space, voice, float(np.mean(reliability)))
+                column, reach_s = self.closure.column, choose_closing_reach(voice)
+                statistics = raise_contrast(statistics, self.prior, units, frames, reliability, voice)
+                statistics = open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
+                statistics = open_before_speech(statistics, self.prior, units, frames, reliability, voice)
+                gain = widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
-        ranges = closable_ranges(units, frames, closing_units, reach_s) if close else []
+        ranges = find_closable_ranges(units, frames, closing_units, reach_s) if close else []
         values, variance = self._generated(statistics, frames, ranges, pins, scaling)
         return Motion(values, FRAME_RATE_HZ, self.space.channels), variance
 
@@ -140,7 +140,7 @@ class LearnedMotion:
         precise = np.float32 if frames > DOUBLE_FRAMES else np.float64
         motion = np.empty((frames, len(space.channels)), precise)
         spread = np.empty((frames, space.dimensions), precise)
-        for inner, outer in generation_blocks(frames):
+        for inner, outer in split_into_blocks(frames):
             block_pins = {
                 (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
             }
@@ -163,7 +163,7 @@ class LearnedMotion:
         return motion, ReducedVariance(spread, space.mixing.astype(precise))
 
 
-def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:
+def resolve_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:
     """Return the pinned values by frame and dimension of the motion space; of two pins in one frame the last holds.
 
     frames : length of the recording
@@ -190,7 +190,7 @@ def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: i
     return pins
 
 
-def generation_blocks(frames: int) -> Iterator[tuple[slice, slice]]:
+def split_into_blocks(frames: int) -> Iterator[tuple[slice, slice]]:
     """Yield the frames of every block, and the same with ``MARGIN_FRAMES`` on both sides, cut at the ends."""
     for start in range(0, frames, BLOCK_FRAMES):
         stop = min(start + BLOCK_FRAMES, frames)
@@ -232,7 +232,7 @@ def _close_lips(
     values, variance = result
     column = closure.column
     pinned = [frame for frame, dimension in pins if dimension == column]
-    frames = frames_to_close(closure, values[:, column], ranges, pinned)
+    frames = choose_closed_frames(closure, values[:, column], ranges, pinned)
     if not frames:
         return
     opening_pins = {(frame, 0): closure.closed for frame in frames}

@@ -46,7 +46,7 @@ class MotionLimits(NamedTuple):
         """Largest minus smallest value [shape=(Q,)]."""
         return self.high - self.low
 
-    def extended(self, deviation: NDArray[np.floating]) -> MotionLimits:
+    def extend(self, deviation: NDArray[np.floating]) -> MotionLimits:
         """Return limits extended by ``DEVIATIONS`` standard deviations [shape=(Q,)] on both sides."""
         return MotionLimits(self.low - DEVIATIONS * deviation, self.high + DEVIATIONS * deviation)
 
@@ -73,7 +73,7 @@ class MotionLimits(NamedTuple):
             )
 
 
-def limits_of(poses: NDArray[np.floating]) -> MotionLimits:
+def measure_limits(poses: NDArray[np.floating]) -> MotionLimits:
     """Return the limits of some poses [shape=(N, Q)]."""
     return MotionLimits(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
 

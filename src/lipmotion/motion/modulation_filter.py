@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
-from lipmotion.stats.modulation_spectrum import modulation_spectrum
+from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
+from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule
 
@@ -69,7 +69,7 @@ class ModulationFilter(NamedTuple):
         return values + weight * change
 
 
-def learned_filter(
+def learn_filter(
     strength: float,
     compared: Iterable[tuple[NDArray[Any], NDArray[Any]]],
     examples: Sequence[Example],
@@ -89,19 +89,19 @@ def learned_filter(
     if not pairs:
         return fit_modulation_filter(values, values)
     recorded, generated = zip(*pairs, strict=True)
-    return fit_modulation_filter(recorded, generated, resting_motion(examples, values)).of_strength(strength)
+    return fit_modulation_filter(recorded, generated, select_resting_motion(examples, values)).of_strength(strength)
 
 
-def resting_motion(examples: Sequence[Example], values: Sequence[Array]) -> list[Array]:
+def select_resting_motion(examples: Sequence[Example], values: Sequence[Array]) -> list[Array]:
     """Return recorded motion in silence, further than ``RESTING_MARGIN_S`` from speech [each shape=(N_i, Q)].
 
     values : motion of the examples in the motion space [each shape=(T, Q)]
     """
     found = []
     for example, x in zip(examples, values, strict=True):
-        time_s, speech_s = np.arange(len(x)) / FRAME_RATE_HZ, speech_intervals(example.speech.units)
-        far = example.valid & away_from_speech(time_s, speech_s, RESTING_MARGIN_S)
-        found += [x[start:stop] for start, stop in runs(far)]
+        time_s, speech_s = np.arange(len(x)) / FRAME_RATE_HZ, list_speech_intervals(example.speech.units)
+        far = example.valid & is_away_from_speech(time_s, speech_s, RESTING_MARGIN_S)
+        found += [x[start:stop] for start, stop in find_runs(far)]
     return found
 
 
@@ -129,7 +129,7 @@ def fit_modulation_filter(
 
 
 def _spectrum(clips: Sequence[NDArray[Any]]) -> tuple[Array, Array]:
-    return modulation_spectrum([clip.astype(float) for clip in clips], FRAME_RATE_HZ)
+    return measure_modulation_spectrum([clip.astype(float) for clip in clips], FRAME_RATE_HZ)
 
 
 def _taps(frequencies: Array, log_gains: Array) -> Array:
@@ -147,13 +147,13 @@ MODULATION = {"modulation": ArraySpec(np.float64, "N Q", -2 * LARGEST_GAIN, 2 * 
 """Filters up to twice their strength."""
 
 
-def filter_arrays(modulation: ModulationFilter | None) -> dict[str, NDArray[Any]]:
+def filter_to_arrays(modulation: ModulationFilter | None) -> dict[str, NDArray[Any]]:
     """Serialise a filter; None has no arrays."""
     return {} if modulation is None else {"modulation": modulation.taps}
 
 
 def filter_from_arrays(arrays: Arrays, dimensions: int, *, needed: bool = False) -> ModulationFilter | None:
-    """Deserialise what ``filter_arrays`` returned.
+    """Deserialise what ``filter_to_arrays`` returned.
 
     needed : there must be a filter
     Raises KeyError, ValueError: it is missing, or has a wrong shape, type or range.

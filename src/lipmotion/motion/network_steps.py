@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, initial_network
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, make_network
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.stats.network_training import (
     LinearMap,
     SequenceNetwork,
@@ -20,7 +20,7 @@ from lipmotion.stats.network_training import (
     TrainingSequence,
     fit_network,
 )
-from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, initial_recurrent_network
+from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, make_recurrent_network
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import Progress
 
@@ -38,7 +38,7 @@ LONGEST_STEPS = 250
 """Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
 
 
-def between_steps(steps: Array, frames: int, first: int = 0) -> Array:
+def interpolate_steps(steps: Array, frames: int, first: int = 0) -> Array:
     """Return values at time steps of 40 ms [shape=(N, C)] interpolated to frames of 10 ms [shape=(frames, C)].
 
     first : frame of the first time step; those before it have the same values
@@ -53,20 +53,20 @@ def between_steps(steps: Array, frames: int, first: int = 0) -> Array:
     )
 
 
-def spectrum_steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
+def stack_spectrum(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
     """Return the frames around every time step, concatenated [shape=(ceil(T / 4), 160)]; spectrum [shape=(T, 40)]."""
     centres = np.arange(0, len(spectrum), STEP)
     frames = np.clip(centres[:, None] + np.arange(STEP) - STEP // 2, 0, len(spectrum) - 1)
     return spectrum[frames].reshape(len(centres), -1).astype(np.float32)
 
 
-def standard_poses(training: PredictorTraining) -> tuple[Array, Array]:
+def measure_poses(training: PredictorTraining) -> tuple[Array, Array]:
     """Return mean and standard deviation of the measured motion, which standardise it [each shape=(Q,)]."""
     poses = np.concatenate([x[example.valid] for x, example in zip(training.values, training.examples, strict=True)])
     return poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
 
 
-def error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
+def measure_error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
     """Return the variances of the error of static value, Δ and Δ² in the examples [shape=(3, Q)].
 
     predicted : motion of each example [each shape=(T, Q)]
@@ -74,13 +74,13 @@ def error_variances(training: PredictorTraining, predicted: Iterable[Array], sca
     """
     squares, count = np.zeros((3, len(scale))), 0
     for example, x, motion in zip(training.examples, training.values, predicted, strict=True):
-        frames = dynamics_known(example.valid)
+        frames = mark_known_dynamics(example.valid)
         squares += np.square(with_dynamics(x - motion)[frames]).sum(axis=0)
         count += int(frames.sum())
     return np.maximum(squares / max(count, 1), 1e-4 * np.square(scale) + 1e-12)
 
 
-def random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> TrainingSequence:
+def cut_random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> TrainingSequence:
     """Return a sequence, or a piece of it from a random place where it is long."""
     excess = len(sequence.inputs) - LONGEST_STEPS
     if excess <= 0:
@@ -204,7 +204,7 @@ class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
         return ConvolutionalNetwork(layers, self.dilations, output)
 
     def initial(self, outputs: int, seed: int) -> ConvolutionalNetwork:  # noqa: D102
-        return initial_network(self.inputs, self.hidden_units, outputs, self.dilations, seed)
+        return make_network(self.inputs, self.hidden_units, outputs, self.dilations, seed)
 
 
 @final
@@ -240,10 +240,10 @@ class RecurrentShape(NetworkShape[RecurrentNetwork]):
         return RecurrentNetwork(layers, output)
 
     def initial(self, outputs: int, seed: int) -> RecurrentNetwork:  # noqa: D102
-        return initial_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)
+        return make_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)
 
 
-def checked_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
+def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
     """Return standard deviations of targets, as stored; raise ValueError where one is not more than 0."""
     if not (scale > 0).all():
         raise ValueError(f"{name} with a scale that is not more than 0")

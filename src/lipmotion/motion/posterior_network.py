@@ -17,18 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
-from lipmotion.motion.articulation import strangeness
+from lipmotion.motion.articulation import unseen_share
 from lipmotion.motion.network_steps import (
     LEAST_DEVIATION,
     STEP,
     ConvolutionalShape,
     RecurrentShape,
-    between_steps,
-    checked_scale,
-    error_variances,
-    random_piece,
-    spectrum_steps,
-    standard_poses,
+    check_scale,
+    cut_random_piece,
+    interpolate_steps,
+    measure_error_variances,
+    measure_poses,
+    stack_spectrum,
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.stats.convolution import ConvolutionalNetwork
@@ -125,7 +125,7 @@ class PosteriorNetwork(Predictor):
             raise CorpusError(
                 "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
             )
-        centre, scale = standard_poses(training)
+        centre, scale = measure_poses(training)
         rows = [_limited(posteriors) for posteriors in found]
         mean, basis = _principal_components(rows)
         spectra = _spectra_of(training.examples)
@@ -137,7 +137,7 @@ class PosteriorNetwork(Predictor):
             _outputs(network, shifted, len(values)) * scale + centre
             for shifted, values in zip(inputs, training.values, strict=True)
         )
-        variances = error_variances(training, predicted, scale)
+        variances = measure_error_variances(training, predicted, scale)
         return cls(network, mean, basis, centre, scale, variances, found[0].source, recurrent)
 
     def can_predict(self, speech: Speech) -> bool:
@@ -151,7 +151,7 @@ class PosteriorNetwork(Predictor):
         Raises InputError: speech without posteriors, or with those of another phone recogniser than in training.
         """
         posteriors, frames = self._checked(speech.posteriors), len(speech.features.values)
-        share = 0.0 if speech.spectrum is None else 1 - strangeness(speech.voice)
+        share = 0.0 if speech.spectrum is None else 1 - unseen_share(speech.voice)
         motion = np.zeros((frames, len(self.centre)))
         for spectrum, weight in ((None, 1 - share), (speech.spectrum, share)):
             if weight > 0:
@@ -214,7 +214,7 @@ class PosteriorNetwork(Predictor):
             stored["posterior_mean"],
             stored["posterior_basis"],
             centre,
-            checked_scale(scale, "posterior_targets"),
+            check_scale(scale, "posterior_targets"),
             stored["posterior_variances"],
             str(stored["posterior_source"][0]),
             None if arrays.keys().isdisjoint(RECURRENT.specs) else RECURRENT.from_arrays(arrays, dimensions),
@@ -294,7 +294,7 @@ def _steps(of_second: float, motion_s: float) -> int:
 
 def _drawn(rng: np.random.Generator, shifted: Sequence[TrainingSequence]) -> TrainingSequence:
     """Return one of the shifts of an example, or a piece of it."""
-    return random_piece(shifted[int(rng.integers(len(shifted)))], rng)
+    return cut_random_piece(shifted[int(rng.integers(len(shifted)))], rng)
 
 
 def _sequence(rows: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_], shift: int) -> TrainingSequence:
@@ -305,7 +305,7 @@ def _sequence(rows: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_
 
 def _outputs(network: SequenceNetwork, shifted: Sequence[NDArray[np.float32]], frames: int) -> Array:
     """Return the outputs of a network, the mean over all shifts of its inputs [shape=(frames, Q)]."""
-    outputs = [between_steps(network(x).astype(float), frames, s * ROW_FRAMES) for s, x in enumerate(shifted)]
+    outputs = [interpolate_steps(network(x).astype(float), frames, s * ROW_FRAMES) for s, x in enumerate(shifted)]
     mean: Array = np.mean(outputs, axis=0)
     return mean
 
@@ -346,6 +346,6 @@ def _shifted_inputs(
     result = np.zeros((len(filled) // ROWS, SHAPE.inputs), np.float32)
     result[:, SPECTRUM:] = filled.reshape(len(result), -1)
     if spectrum is not None:
-        steps = spectrum_steps(spectrum[min(shift * ROW_FRAMES, len(spectrum) - 1) :])
+        steps = stack_spectrum(spectrum[min(shift * ROW_FRAMES, len(spectrum) - 1) :])
         result[:, :SPECTRUM] = steps[np.minimum(np.arange(len(result)), len(steps) - 1)]
     return result

@@ -53,7 +53,7 @@ class PredictorTraining:
 class PredictorFit(NamedTuple):
     """A trained predictor.
 
-    held_out : predictions for each example by predictors that were trained on the other ``folds`` [each shape=(T, Q)];
+    held_out : predictions for each example by predictors trained on the other ``split_folds`` [each shape=(T, Q)];
                the trajectory engine then measures how far to rely on the predictor. None: its weight is a constant
     """
 
@@ -140,7 +140,7 @@ PREDICTORS: Registry[type[Predictor]] = Registry(
 )
 
 
-def predictor_class(name: str) -> type[Predictor]:
+def load_predictor(name: str) -> type[Predictor]:
     """Return a predictor by name. Raises InputError: there is none, or a package adds something else by this name."""
     chosen = PREDICTORS.load(name)
     if not (isinstance(chosen, type) and issubclass(chosen, Predictor) and chosen.name == name):
@@ -153,39 +153,39 @@ def predictor_class(name: str) -> type[Predictor]:
 def check_predictor(name: str) -> None:
     """Raise InputError if no predictor can be chosen by a name, which may be ``AUTOMATIC``."""
     if name != AUTOMATIC:
-        predictor_class(name)
+        load_predictor(name)
 
 
-def suitable_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] | None:
+def choose_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] | None:
     """Return the predictor of a name; for ``AUTOMATIC`` the one that suits the examples, None if there is none.
 
     With little motion and another model to stand on, it is a regression; with much motion a network, given acoustic
     conditions; else a network from posteriors, given those.
     """
     if name != AUTOMATIC:
-        return predictor_class(name)
+        return load_predictor(name)
     measured_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
     if measured_s < LEAST_OWN_S and all(example.speech.prior is not None for example in examples):
-        return predictor_class("prior")
-    network = predictor_class("network")
+        return load_predictor("prior")
+    network = load_predictor("network")
     if network.conditions(measured_s, 1) and all(example.condition_spectra for example in examples):
         return network
     if all(example.speech.posteriors is not None for example in examples):
-        return predictor_class("posteriors")
+        return load_predictor("posteriors")
     return None
 
 
-def conditions_of(name: str, motion_s: float, most: int) -> int:
+def count_conditions(name: str, motion_s: float, most: int) -> int:
     """Return in how many acoustic conditions training takes each example, for a predictor of a name.
 
     motion_s : seconds of measured motion
     most     : as many as the configuration allows
     """
     names = ("network", "posteriors") if name == AUTOMATIC else (name,)
-    return max(predictor_class(each).conditions(motion_s, most) for each in names)
+    return max(load_predictor(each).conditions(motion_s, most) for each in names)
 
 
-def folds(count: int) -> Iterator[tuple[list[int], list[int]]]:
+def split_folds(count: int) -> Iterator[tuple[list[int], list[int]]]:
     """Yield the numbers of the examples inside and outside of each fold; a single example is both."""
     if count == 1:
         yield [0], [0]
@@ -199,7 +199,7 @@ ADDED = "predictor."
 """Arrays of added predictors are stored as ``predictor.NAME.ARRAY``, those of built-in ones under their own names."""
 
 
-def predictor_arrays(predictor: Predictor | None) -> dict[str, NDArray[Any]]:
+def predictor_to_arrays(predictor: Predictor | None) -> dict[str, NDArray[Any]]:
     """Serialise a predictor; no array where there is none."""
     if predictor is None:
         return {}
@@ -207,9 +207,9 @@ def predictor_arrays(predictor: Predictor | None) -> dict[str, NDArray[Any]]:
     return {prefix + name: array for name, array in predictor.arrays().items()}
 
 
-def names_of_predictors(arrays: Arrays) -> set[str]:
+def list_predictor_arrays(arrays: Arrays) -> set[str]:
     """Return the names of those arrays that are a predictor's."""
-    built_in = {name for known in PREDICTORS.built_in for name in predictor_class(known).ARRAYS}
+    built_in = {name for known in PREDICTORS.built_in for name in load_predictor(known).ARRAYS}
     return {name for name in arrays if name in built_in or name.startswith(ADDED)}
 
 
@@ -222,8 +222,8 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     """
     names = {name.rpartition(".")[0] for name in arrays_under(arrays, ADDED)}
     added = {name: arrays_under(arrays, f"{ADDED}{name}.") for name in sorted(names)}
-    found = [name for name in PREDICTORS.built_in if arrays.keys() & predictor_class(name).ARRAYS]
-    inside = {part for name in found for part in predictor_class(name).CONTAINS}
+    found = [name for name in PREDICTORS.built_in if arrays.keys() & load_predictor(name).ARRAYS]
+    inside = {part for name in found for part in load_predictor(name).CONTAINS}
     stored = {name: arrays for name in found if name not in inside} | added
     if len(stored) > 1:
         raise ValueError(f"the predictors {' and '.join(stored)}, required one of them")
@@ -233,7 +233,7 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     if name not in PREDICTORS.names:
         known = ", ".join(PREDICTORS.names)
         raise ModelFormatError(f"no predictor {name!r}; there are: {known}; install the package that adds it")
-    chosen = predictor_class(name)
+    chosen = load_predictor(name)
     if name in added:
         refuse_undeclared(own, chosen.ARRAYS)
     return chosen.from_arrays(own, dimensions)

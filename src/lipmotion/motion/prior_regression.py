@@ -9,10 +9,10 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.articulation import ARTICULATORS, articulators
-from lipmotion.motion.network_steps import STEP, between_steps, checked_scale
-from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, folds
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
+from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps
+from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import SPECTRUM_BANDS, Example, Speech
 
@@ -84,11 +84,11 @@ class PriorRegression(Predictor):
         spread = np.maximum(np.concatenate([each.motion for each in data]).std(axis=0), 1e-6)
         penalty = np.repeat(_chosen_ridges(data, sizes, (1 / spread**2)[: training.direct]), sizes)
         predictions: list[Array] = [np.zeros(0)] * len(data)
-        for inside, outside in folds(len(data)):
+        for inside, outside in split_folds(len(data)):
             coefficients, centre = _solved([data[n] for n in inside], penalty)
             for number in outside:
                 steps = (everything[number] - mean) / scale @ coefficients + centre
-                predictions[number] = between_steps(steps, len(values[number]))
+                predictions[number] = interpolate_steps(steps, len(values[number]))
         coefficients, centre = _solved(data, penalty)
         mean_32, scale_32, coefficients_32 = (x.astype(np.float32) for x in (mean, scale, coefficients))
         variances = _variances(predictions, values, examples)
@@ -107,7 +107,7 @@ class PriorRegression(Predictor):
         steps = (regressors @ self.coefficients).astype(float) + self.centre
         frames = len(speech.features.values)
         distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
-        outputs = between_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
+        outputs = interpolate_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
         return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
 
     def _known(self, kinds: Sequence[Array]) -> Array:
@@ -139,7 +139,7 @@ class PriorRegression(Predictor):
         if sum(sizes) != stored.sizes["R"] or sizes[2:] != (len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS):
             raise ValueError(f"prior_sizes {sizes}, whose sum is not {stored.sizes['R']}, or of another version")
         mean, scale = stored["prior_inputs"]
-        scale = checked_scale(scale, "prior_inputs")
+        scale = check_scale(scale, "prior_inputs")
         return cls(sizes, mean, scale, stored["prior_coefficients"], stored["prior_centre"], stored["prior_variances"])
 
 
@@ -158,7 +158,7 @@ def _regressors(speech: Speech) -> list[Array]:
     padded = np.concatenate([spectrum, np.repeat(spectrum[-1:], count * STEP - frames, axis=0)])
     bands = padded.reshape(count, STEP, SPECTRUM_BANDS).mean(axis=1)
     around = np.clip(np.arange(count)[:, None] + np.arange(-WINDOW, WINDOW + 1), 0, count - 1)
-    table = articulators(speech.units, frames)[::STEP]
+    table = trace_articulators(speech.units, frames)[::STEP]
     prior = speech.prior
     motion, hidden = (prior.articulators, prior.hidden) if prior is not None else (np.zeros((count, 0)),) * 2
     return [np.asarray(x, float) for x in (motion, hidden, table, bands[around].reshape(count, -1))]
@@ -189,7 +189,7 @@ def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) 
 
     def error(candidate: Array) -> float:
         total = 0.0
-        for inside, outside in folds(len(data)):
+        for inside, outside in split_folds(len(data)):
             coefficients, centre = _solved([data[n] for n in inside], np.repeat(candidate, sizes))
             for number in outside:
                 missed = data[number].regressors @ coefficients + centre - data[number].motion
@@ -208,7 +208,7 @@ def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) 
 def _variances(predictions: Sequence[Array], values: Sequence[Array], examples: Sequence[Example]) -> Array:
     """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)]."""
     errors = [
-        with_dynamics(x - predicted)[dynamics_known(example.valid)]
+        with_dynamics(x - predicted)[mark_known_dynamics(example.valid)]
         for predicted, x, example in zip(predictions, values, examples, strict=True)
     ]
     return np.square(np.concatenate(errors)).mean(axis=0) + 1e-12

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.rest import speech_intervals
+from lipmotion.motion.rest import list_speech_intervals
 from lipmotion.types import FRAME_RATE_HZ, Speech
 
 Array = NDArray[np.float64]
@@ -17,18 +17,18 @@ DISTORTION_S = 1.0
 """Seconds before and after a frame over which the distortion is averaged."""
 
 
-def phone_reliability(speech: Speech, distortion: Array | None, frames: int) -> Array:
+def rate_phones(speech: Speech, distortion: Array | None, frames: int) -> Array:
     """Return how far the phones of speech can be relied on, 0 to 1 [shape=(frames,)].
 
     distortion : 0 to 1, of the sound in every frame, as a predictor finds it (None: there is none)
     Fully, where they are known; also where there are none: noise alone moves no mouth.
     """
-    if speech.units_known or distortion is None or not speech_intervals(speech.units):
+    if speech.units_known or distortion is None or not list_speech_intervals(speech.units):
         return np.ones(frames)
-    return np.maximum(clearness(distortion), speech.confidence)
+    return np.maximum(rate_clearness(distortion), speech.confidence)
 
 
-def clearness(distortion: Array) -> Array:
+def rate_clearness(distortion: Array) -> Array:
     """Return how far a recording is free of noise and room around each frame, 0 to 1 [shape=(T,)]: ``DISTORTIONS``.
 
     distortion : of the sound in every frame [shape=(T,)]

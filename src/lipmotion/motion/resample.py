@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.types import FRAME_RATE_HZ, Motion, Track
 
 
-def to_model_frames(
+def resample_to_model(
     values: NDArray[np.float64], seen: NDArray[np.bool_], rate_hz: float, frames: int, frame_rate_hz: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return curves at the rate of a model by a cubic spline, and the frames that are valid.
@@ -33,10 +33,10 @@ def to_model_frames(
     return curves, valid
 
 
-def model_motion(track: Track, frames: int) -> tuple[Motion, NDArray[np.bool_]]:
+def resample_track(track: Track, frames: int) -> tuple[Motion, NDArray[np.bool_]]:
     """Return tracked motion in ``frames`` frames at 100 Hz, and the frames in which it is valid [shape=(frames,)]."""
     motion = track.motion
-    values, valid = to_model_frames(
+    values, valid = resample_to_model(
         np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames, FRAME_RATE_HZ
     )
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid

@@ -16,7 +16,7 @@ BEFORE_SPEECH_S = 0.05
 LEAST_SILENCE_S, FLOOR_MARGIN = 0.05, 1e-4
 
 
-def away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
+def is_away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
     """Return which times are further than ``margin_s`` seconds from all speech, before and after it [shape=(T,)].
 
     time_s   : times in seconds [shape=(T,)]
@@ -29,7 +29,7 @@ def away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], mar
     return (time_s > ends_s[last] + margin_s) & (time_s < starts_s[last + 1] - margin_s)
 
 
-def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+def find_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return first frame and the one after the last of each run of frames in which a mask is True [shape=(R, 2)].
 
     mask : bool array [shape=(T,)]
@@ -38,12 +38,12 @@ def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
     return edges.reshape(-1, 2)
 
 
-def speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
+def list_speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of every phone that is not silence."""
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]
 
 
-def digital_silence(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
+def find_digital_silence(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
     """Return the frames of digital silence, in which the mouth rests: without even a breath [shape=(T,)].
 
     features : acoustic features [shape=(T, D)]
@@ -52,7 +52,7 @@ def digital_silence(features: NDArray[np.floating], units: Timeline[Unit]) -> ND
     energy = features[:, ENERGY_FEATURE]
     at_floor = energy <= energy.min() + FLOOR_MARGIN
     silent = np.zeros(len(energy), bool)
-    for first, stop in runs(at_floor):
+    for first, stop in find_runs(at_floor):
         silent[first:stop] = stop - first >= LEAST_SILENCE_S * FRAME_RATE_HZ
     time_s = np.arange(len(energy)) / FRAME_RATE_HZ
-    return silent & away_from_speech(time_s, speech_intervals(units), BEFORE_SPEECH_S)
+    return silent & is_away_from_speech(time_s, list_speech_intervals(units), BEFORE_SPEECH_S)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError
-from lipmotion.stats.delta_windows import dynamics_known
+from lipmotion.stats.delta_windows import mark_known_dynamics
 from lipmotion.stats.pca import Pca, fit_pca
 from lipmotion.types import Channel, Example
 
@@ -89,7 +89,7 @@ def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[Mo
     components : principal components that all point channels are reduced to
     Raises CorpusError: no example has valid motion, or the examples have different channels.
     """
-    if not any(dynamics_known(example.valid).any() for example in examples):
+    if not any(mark_known_dynamics(example.valid).any() for example in examples):
         raise CorpusError(f"none of {len(examples)} examples has motion to learn from; prepare a corpus with faces")
     channels = {example.motion.channels for example in examples}
     if len(channels) > 1:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.closure import OPENING, closable_ranges, closed_opening
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.closure import OPENING, estimate_closed_opening, find_closable_ranges
+from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES
@@ -65,7 +65,7 @@ class SpeakerMap:
         """Return by how much the mean person's poses are changed by this person's habits [shape=(T, P)].
 
         values  : all channels of the mean person [shape=(T, P)]
-        visemes : from ``viseme_weights`` [shape=(T, V)]
+        visemes : from ``weigh_visemes`` [shape=(T, V)]
         Lips that are closed stay closed.
         """
         moved: Array = visemes @ self.habits
@@ -79,7 +79,7 @@ class SpeakerMap:
         """Return the motion of this person, of the mean person's.
 
         values  : all channels [shape=(T, P)]
-        restful : from ``restfulness`` [shape=(T,)]
+        restful : from ``measure_restfulness`` [shape=(T,)]
         """
         return self.offset + self.gain * values + restful[:, None] * self.rest
 
@@ -136,10 +136,10 @@ class SpeakerMaps:
         return SpeakerMaps(self.channels, tuple(names), *parts, self.lips)
 
 
-def restfulness(units: Timeline[Unit], frames: int) -> Array:
+def measure_restfulness(units: Timeline[Unit], frames: int) -> Array:
     """Return how far into silence each frame at 100 Hz lies, from 0 near speech to 1 away from it [shape=(frames,)]."""
     time_s = np.arange(frames) / FRAME_RATE_HZ
-    speech_s = np.array(speech_intervals(units)).reshape(-1, 2)
+    speech_s = np.array(list_speech_intervals(units)).reshape(-1, 2)
     starts_s, ends_s = np.append(speech_s[:, 0], np.inf), np.append(-np.inf, speech_s[:, 1])
     following = np.searchsorted(speech_s[:, 0], time_s, side="right")  # the first interval that begins after a time
     distance_s = np.maximum(np.minimum(starts_s[following] - time_s, time_s - ends_s[following]), 0)
@@ -147,7 +147,7 @@ def restfulness(units: Timeline[Unit], frames: int) -> Array:
     return share * share * (3 - 2 * share)
 
 
-def viseme_weights(units: Timeline[Unit], frames: int) -> Array:
+def weigh_visemes(units: Timeline[Unit], frames: int) -> Array:
     """Return how much of each viseme is in each frame at 100 Hz [shape=(frames, V)].
 
     Visemes fade into each other over ``FADE_FRAMES``; in silence away from speech, and where no phone is known, all
@@ -163,15 +163,15 @@ def viseme_weights(units: Timeline[Unit], frames: int) -> Array:
     if frames:
         window = np.hanning(FADE_FRAMES + 2)[1:-1]
         weights = convolve1d(weights, window / window.sum(), axis=0, mode="nearest")
-    return weights * (1 - restfulness(units, frames))[:, None]
+    return weights * (1 - measure_restfulness(units, frames))[:, None]
 
 
-def with_habits(
+def add_habits(
     maps: SpeakerMaps, examples: Sequence[Example], speakers: Sequence[str], generated: Iterable[NDArray[Any]]
 ) -> SpeakerMaps:
     """Return maps with the habits of each person: what is left of their motion in each viseme, on average.
 
-    examples  : from ``mean_person_examples``
+    examples  : from ``map_to_mean_person``
     speakers  : the name of each example's speaker
     generated : the mean person's motion of each, as the engine generates it [each shape=(T, P)]
     Averages are drawn towards 0 with the weight of ``HABIT_PRIOR_FRAMES``.
@@ -180,14 +180,14 @@ def with_habits(
     counts = np.full(maps.habits.shape[:2], HABIT_PRIOR_FRAMES)
     for example, speaker, values in zip(examples, speakers, generated, strict=True):
         if speaker in maps.names:
-            weights = viseme_weights(example.speech.units, len(values)) * example.valid[:, None]
+            weights = weigh_visemes(example.speech.units, len(values)) * example.valid[:, None]
             number = maps.names.index(speaker)
             sums[number] += weights.T @ np.where(example.valid[:, None], example.motion.values - values, 0)
             counts[number] += weights.sum(axis=0)
     return replace(maps, habits=sums / counts[:, :, None])
 
 
-def mean_person_examples(examples: Sequence[Example], speakers: Sequence[str]) -> tuple[list[Example], SpeakerMaps]:
+def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> tuple[list[Example], SpeakerMaps]:
     """Return examples with the motion of the mean person, and the maps of all people who have a name.
 
     examples : with the same channels
@@ -200,13 +200,13 @@ def mean_person_examples(examples: Sequence[Example], speakers: Sequence[str]) -
     mapped = []
     for example, speaker in zip(examples, speakers, strict=True):
         motion = example.motion
-        restful = restfulness(example.speech.units, len(motion.values))
+        restful = measure_restfulness(example.speech.units, len(motion.values))
         values = maps.of(speaker).to_mean(motion.values, restful)
         mapped.append(replace(example, motion=replace(motion, values=values)))
     return mapped, maps.selected([name for name in maps.names if name])
 
 
-def speaker_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
+def speakers_to_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
     """Serialise maps."""
     return {
         "channels": np.array([(channel.name, channel.unit) for channel in maps.channels]),
@@ -265,12 +265,12 @@ def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMa
     channels = examples[0].motion.channels
     column = examples[0].motion.names.index(OPENING) if OPENING in examples[0].motion.names else None
     groups = [[e for e, speaker in zip(examples, speakers, strict=True) if speaker == name] for name in names]
-    people = [measured_person(group, column) for group in groups]
-    rests, follow = rest_poses(people), np.mean([person.follow for person in people], axis=0)
+    people = [measure_person(group, column) for group in groups]
+    rests, follow = estimate_rest_poses(people), np.mean([person.follow for person in people], axis=0)
     closed = np.array([person.closed for person in people])
     parted = rests[:, column] - closed if column is not None else np.zeros(len(people))
     anchors = rests - parted[:, None] * follow  # the rest poses, but with lips that touch
-    gain = person_gains(people, channels)
+    gain = estimate_gains(people, channels)
     offset = anchors - gain * anchors.mean(axis=0)
     rest = rests - offset - gain * rests.mean(axis=0)
     shut = float(closed.mean())
@@ -279,7 +279,7 @@ def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMa
     return SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + FULL_HABIT_SHARE * wide))
 
 
-def measured_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
+def measure_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
     """Return the statistics of one person's motion.
 
     column : of the opening (None: there is no such channel)
@@ -288,13 +288,13 @@ def measured_person(examples: Sequence[Example], column: int | None) -> PersonSt
     for example in examples:
         values, valid = np.asarray(example.motion.values, float), example.valid
         time_s = np.arange(len(values)) / FRAME_RATE_HZ
-        speech_s = speech_intervals(example.speech.units)
-        silent.append(values[valid & away_from_speech(time_s, speech_s, FAR_FROM_SPEECH_S)])
-        silence.append(values[valid & away_from_speech(time_s, speech_s, NEAR_SPEECH_S)])
+        speech_s = list_speech_intervals(example.speech.units)
+        silent.append(values[valid & is_away_from_speech(time_s, speech_s, FAR_FROM_SPEECH_S)])
+        silence.append(values[valid & is_away_from_speech(time_s, speech_s, NEAR_SPEECH_S)])
         measured.append(values[valid])
-        spoken.append(values[valid & np.logical_not(away_from_speech(time_s, speech_s, 0.0))])
+        spoken.append(values[valid & np.logical_not(is_away_from_speech(time_s, speech_s, 0.0))])
         if column is not None:
-            ranges = closable_ranges(example.speech.units, len(values))
+            ranges = find_closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
     resting, speech = np.concatenate(silent), np.concatenate(spoken)
     quiet = next((each for each in (resting, np.concatenate(silence)) if len(each) >= LEAST_FRAMES), None)
@@ -308,13 +308,13 @@ def measured_person(examples: Sequence[Example], column: int | None) -> PersonSt
         centred = speech - speech.mean(axis=0)
         follow = centred[:, column] @ centred / max(float(centred[:, column] @ centred[:, column]), 1e-12)
         follow[column] = 1
-        closed = closed_opening(smallest, speech[:, column], np.concatenate(measured)[:, column])
+        closed = estimate_closed_opening(smallest, speech[:, column], np.concatenate(measured)[:, column])
     rest = np.median(quiet, axis=0) if quiet is not None else np.full(speech.shape[1], np.nan)
     seconds = [len(frames) / FRAME_RATE_HZ for frames in (resting, speech)]
     return PersonStatistics(rest, seconds[0], np.median(speech, axis=0), high - low, follow, closed, seconds[1])
 
 
-def rest_poses(people: Sequence[PersonStatistics]) -> Array:
+def estimate_rest_poses(people: Sequence[PersonStatistics]) -> Array:
     """Return the rest poses of all people [shape=(S, P)].
 
     Whoever is never silent rests as far from their median pose in speech as the others do.
@@ -325,7 +325,7 @@ def rest_poses(people: Sequence[PersonStatistics]) -> Array:
     return np.where(known[:, None], rests, spoken + usual)
 
 
-def person_gains(
+def estimate_gains(
     people: Sequence[PersonStatistics], channels: Sequence[Channel], most_gain: float = MOST_GAIN
 ) -> Array:
     """Return the range of each person as a multiple of the mean person's [shape=(S, P)].

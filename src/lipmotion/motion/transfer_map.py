@@ -11,14 +11,14 @@ import numpy as np
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.speaker_maps import (
     MOST_GAIN,
     VISEME_NAMES,
     SpeakerMap,
-    measured_person,
-    person_gains,
-    rest_poses,
+    estimate_gains,
+    estimate_rest_poses,
+    measure_person,
 )
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion
 
@@ -26,7 +26,7 @@ REST_PRIOR_S = 0.5
 """Seconds of silence that count as much as the assumption that the map of speech is right in silence, too."""
 
 
-def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
+def fit_transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
     """Return the map from the motion of a source person to that of a target person, fitted in the same speech.
 
     source : generated motion of the source, for the speech of the target
@@ -43,8 +43,8 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
     channels = source[0].motion.channels
     names = [channel.name for channel in channels]
     column = names.index(OPENING) if OPENING in names else None
-    people = [measured_person(examples, column) for examples in (source, target)]
-    gains, rests = person_gains(people, channels, float(np.sqrt(MOST_GAIN))), rest_poses(people)
+    people = [measure_person(examples, column) for examples in (source, target)]
+    gains, rests = estimate_gains(people, channels, float(np.sqrt(MOST_GAIN))), estimate_rest_poses(people)
     gain = gains[1] / gains[0]
     offset = people[1].spoken - gain * people[0].spoken
     closed = people[0].closed
@@ -55,7 +55,7 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
     return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))
 
 
-def composed(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
+def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
     """Return the map that applies ``first`` and then ``second``, which must not have habits.
 
     first : from a model's mean person to one of its people; None: the model has one person, or the mean one is meant
@@ -70,7 +70,7 @@ def composed(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
     return SpeakerMap(second.channels, gain, offset, rest, first.habits, first.lips)
 
 
-def with_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Motion:
+def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Motion:
     """Return the motion of a person in the channels of a model, in their order.
 
     where : name of the recording, for the message
@@ -87,11 +87,11 @@ def with_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Mo
     return Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, tuple(channels))
 
 
-def measured_speech_s(examples: Sequence[Example]) -> float:
+def count_speech_s(examples: Sequence[Example]) -> float:
     """Return the seconds of speech in which the motion of some examples was measured."""
     frames = 0
     for example in examples:
         time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
-        spoken = ~away_from_speech(time_s, speech_intervals(example.speech.units), 0.0)
+        spoken = ~is_away_from_speech(time_s, list_speech_intervals(example.speech.units), 0.0)
         frames += int((example.valid & spoken).sum())
     return frames / FRAME_RATE_HZ

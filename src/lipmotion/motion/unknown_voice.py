@@ -13,10 +13,10 @@ from lipmotion.motion.articulation import (
     TYPICAL_DEVIATIONS,
     ArticulationPrior,
     Statistics,
-    class_means,
-    dynamics_of,
-    smoothed,
-    strangeness,
+    average_classes,
+    slice_dynamics,
+    smooth_steps,
+    unseen_share,
 )
 from lipmotion.motion.closure import OPENING, REACH_S
 from lipmotion.motion.space import MotionSpace
@@ -47,7 +47,7 @@ RETAINED = (0.52, 0.62)
 where phones cannot be relied on at all, and where they can. The more there is doubt, the closer motion is to a mean."""
 
 
-def with_open_vowels(
+def open_vowels(
     statistics: Callable[[slice], Statistics],
     prior: ArticulationPrior,
     column: int,
@@ -72,18 +72,18 @@ def with_open_vowels(
     for span in units:
         if span.label.phone in VOWELS:
             vowels[slice(*frames_of(span, frames))] = 1
-    least = LEAST_OPENING_SHARE * strangeness(voice) * vowels * np.maximum(opening, 0)
+    least = LEAST_OPENING_SHARE * unseen_share(voice) * vowels * np.maximum(opening, 0)
 
     def opened(chosen: slice) -> Statistics:
         means, precisions = statistics(chosen)
         shut = means[:, 0, column]
         share = np.clip((least[chosen] - shut) / np.maximum(opening[chosen] - shut, 1e-9), 0, 1)
-        return means + share[:, None, None] * (dynamics_of(values, chosen) - means), precisions
+        return means + share[:, None, None] * (slice_dynamics(values, chosen) - means), precisions
 
     return opened
 
 
-def with_contrast(
+def raise_contrast(
     statistics: Callable[[slice], Statistics],
     prior: ArticulationPrior,
     units: Timeline[Unit],
@@ -93,7 +93,7 @@ def with_contrast(
 ) -> Callable[[slice], Statistics]:
     """Return means and precisions of ranges of frames, with consonants less open, and vowels by their duration.
 
-    The arguments are those of ``with_open_vowels``; at ``voice`` 1 nothing changes. All articulators move as from the
+    The arguments are those of ``open_vowels``; at ``voice`` 1 nothing changes. All articulators move as from the
     mean consonant to the mean vowel of the table. Precisions stay those of the model.
     Source: Lindblom 1963 (vowel reduction): the shorter a vowel, the more it misses its target.
     """
@@ -104,19 +104,19 @@ def with_contrast(
             wider[inside] = OPENING_BY_DURATION * np.log(max(span.duration_s, 1 / FRAME_RATE_HZ) / VOWEL_S)
         elif phone and not is_silent(phone):
             wider[inside] = -CONSONANT_CLOSING
-    more_open = (class_means()[True] - class_means()[False]).mean(axis=0)
+    more_open = (average_classes()[True] - average_classes()[False]).mean(axis=0)
     more_open /= more_open[ARTICULATORS.index(OPENING)]
-    gain = strangeness(voice) * np.broadcast_to(reliability, frames)[:, None]
-    change = gain * smoothed(wider) * more_open @ prior.matrix
+    gain = unseen_share(voice) * np.broadcast_to(reliability, frames)[:, None]
+    change = gain * smooth_steps(wider) * more_open @ prior.matrix
 
     def changed(chosen: slice) -> Statistics:
         means, precisions = statistics(chosen)
-        return means + dynamics_of(change, chosen), precisions
+        return means + slice_dynamics(change, chosen), precisions
 
     return changed
 
 
-def with_breath(
+def open_before_speech(
     statistics: Callable[[slice], Statistics],
     prior: ArticulationPrior,
     units: Timeline[Unit],
@@ -126,7 +126,7 @@ def with_breath(
 ) -> Callable[[slice], Statistics]:
     """Return means and precisions of ranges of frames, with the mouth open before speech begins.
 
-    The arguments are those of ``with_open_vowels``; at ``voice`` 1 and 0 nothing changes. All dimensions are drawn
+    The arguments are those of ``open_vowels``; at ``voice`` 1 and 0 nothing changes. All dimensions are drawn
     towards their median in speech. Precisions stay those of the model. A voice of which nothing is known may be a known
     one in noise, and its recording may begin anywhere. A model of few phones half knows its own speaker's voice, too:
     the fewer it was trained on, the less changes.
@@ -135,8 +135,8 @@ def with_breath(
     first_s = next((span.start_s for span in units if not is_silent(span.label.phone)), 0.0)
     time_s = np.arange(frames) / FRAME_RATE_HZ
     before = (time_s >= first_s - BREATH_S) & (time_s < first_s)
-    half_known = 2 * np.sqrt(voice) * strangeness(voice) * min(sum(prior.contexts.values()) / SURE_PHONES, 1)
-    share = half_known * np.broadcast_to(reliability, frames)[:, None] * smoothed(before[:, None].astype(float))
+    half_known = 2 * np.sqrt(voice) * unseen_share(voice) * min(sum(prior.contexts.values()) / SURE_PHONES, 1)
+    share = half_known * np.broadcast_to(reliability, frames)[:, None] * smooth_steps(before[:, None].astype(float))
     pose = np.stack([prior.centre, *np.zeros((2, len(prior.centre)))])
 
     def parted(chosen: slice) -> Statistics:
@@ -146,15 +146,15 @@ def with_breath(
     return parted
 
 
-def closing_reach_s(voice: float) -> float:
+def choose_closing_reach(voice: float) -> float:
     """Return how many seconds before and after a p, b or m the lips may close; negative: seconds within it.
 
     voice : how well training knows the voice, 0 to 1
     """
-    return REACH_S - strangeness(voice) * (REACH_S + INSET_S)
+    return REACH_S - unseen_share(voice) * (REACH_S + INSET_S)
 
 
-def typical_range(prior: ArticulationPrior, space: MotionSpace, voice: float, reliability: float) -> float:
+def widen_range(prior: ArticulationPrior, space: MotionSpace, voice: float, reliability: float) -> float:
     """Return the factor by which movements reach the range of typical talkers, at least 1.
 
     prior       : the table of articulation, which knows the range of the model's speaker

@@ -18,7 +18,7 @@ LARGEST_FACTOR = 2.0
 LEAST_DEVIATION = 1e-6
 
 
-def scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Array]) -> Array:
+def fit_scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Array]) -> Array:
     """Return the factors by which generated movements are scaled to vary as much as recorded ones [shape=(Q,)].
 
     recorded, generated : motion of each clip [each shape=(T_i, Q)]; at least one clip
@@ -33,7 +33,7 @@ def scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Array]
 class VarianceScaling(NamedTuple):
     """Factors by which movements away from the rest pose are scaled, dimension by dimension.
 
-    factors : from ``scaling_factors`` [shape=(Q,)]
+    factors : from ``fit_scaling_factors`` [shape=(Q,)]
     rest    : the rest pose [shape=(Q,)]
     """
 

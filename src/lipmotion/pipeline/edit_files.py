@@ -26,7 +26,7 @@ from lipmotion.storage.files import (
 )
 from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
-from lipmotion.types.values import described, items, number, optional, require, text, tupled, value_of
+from lipmotion.types.values import as_tuple, describe_value, items, number, optional, require, text, value_of
 
 LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
@@ -38,7 +38,7 @@ HELD = ("recording", "model", "lexicon", "language", "recogniser", "speaker", "p
 
 
 _SHARE, _TEXT = number(0, 1), text(1000)
-_OF_OUTLOOK = {"words": _TEXT, "confidence": _SHARE, "range_db": number(), "advice": tupled(items(_TEXT))}
+_OF_OUTLOOK = {"words": _TEXT, "confidence": _SHARE, "range_db": number(), "advice": as_tuple(items(_TEXT))}
 _OUTLOOK = optional(value_of(partial(Outlook, voice=None), _OF_OUTLOOK | {"voice": _SHARE}, _OF_OUTLOOK))
 
 
@@ -166,7 +166,7 @@ def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
     if not isinstance(members, dict) or members.get("format") != FORMAT:
         raise InputError(f'{path}: not a file of edits; it must begin with "format": "{FORMAT}"')
     if members.get("version") != VERSION:
-        found = described(members.get("version"))
+        found = describe_value(members.get("version"))
         raise InputError(f"{path}: edits of version {found}, required {VERSION}; update lipmotion")
     if not phones:
         members.pop("units", None)

@@ -12,10 +12,10 @@ from typing import Any, ClassVar, get_type_hints
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery
-from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
+from lipmotion.types.moods import MoodKey, format_moods, parse_moods, sort_moods
 from lipmotion.types.staging import Staging
-from lipmotion.types.values import described, number_of, whole_of
-from lipmotion.units import PHONES, is_silent, unknown_phone_message
+from lipmotion.types.values import describe_value, parse_number, parse_whole
+from lipmotion.units import PHONES, describe_unknown_phone, is_silent
 
 LEAST_PHONE_S = 0.01
 """Shortest phone that an edit may leave."""
@@ -30,11 +30,11 @@ class Text(str):
 _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 Numbers = tuple[float, ...]
 _READ: dict[Any, tuple[str, Any]] = {
-    int: (r"[0-9]+", whole_of),
-    float: (_NUMBER, number_of),
+    int: (r"[0-9]+", parse_whole),
+    float: (_NUMBER, parse_number),
     str: (r"\S+", str),
     Text: (r"\S.*?", lambda text: Text(" ".join(text.split()))),
-    Numbers: (rf"{_NUMBER}(?:\s+{_NUMBER})*", lambda text: tuple(map(number_of, text.split()))),
+    Numbers: (rf"{_NUMBER}(?:\s+{_NUMBER})*", lambda text: tuple(map(parse_number, text.split()))),
 }
 """How the values of fields are written, and what reads them."""
 
@@ -93,7 +93,7 @@ class PhoneStep(Step):
 def _known(phone: str, word: str = "") -> Unit:
     """Return the label of a phone that a user gives. Raises InputError: there is no such phone."""
     if phone not in PHONES:
-        raise InputError(unknown_phone_message(phone))
+        raise InputError(describe_unknown_phone(phone))
     return Unit(phone, word=word)
 
 
@@ -466,9 +466,9 @@ class SetStep(Step):
         if isinstance(usual, str):
             return self.value
         return (
-            whole_of(self.value, f"{self.name} is")
+            parse_whole(self.value, f"{self.name} is")
             if isinstance(usual, int)
-            else number_of(self.value, f"{self.name} is")
+            else parse_number(self.value, f"{self.name} is")
         )
 
 
@@ -485,8 +485,8 @@ class MoodStep(Step):
 
     @property
     def key(self) -> MoodKey:
-        """The mood, its strength, and its time. Raises InputError: as ``moods_of``."""
-        keys = moods_of(f"{self.mood} at {self.time_s!r}")
+        """The mood, its strength, and its time. Raises InputError: as ``parse_moods``."""
+        keys = parse_moods(f"{self.mood} at {self.time_s!r}")
         if len(keys) != 1:
             raise InputError(f"{str(self)!r}: required one mood, as happy:0.7")
         return keys[0]
@@ -517,7 +517,7 @@ def step_of(sentence: str) -> Step:
     'pin jawOpen 0.2 at 1.0'
     """
     if not isinstance(sentence, str):
-        raise InputError(f"an edit is {described(sentence)}, required a sentence: {FORMS[0]!r}")
+        raise InputError(f"an edit is {describe_value(sentence)}, required a sentence: {FORMS[0]!r}")
     for kind in STEPS:
         step = kind.parsed(sentence)
         if step is not None:
@@ -559,8 +559,8 @@ class Edits:
     def delivery(self, asked: Delivery = Delivery()) -> Delivery:  # noqa: B008 # a frozen value
         """Return how the motion is delivered: as is asked for, and where nothing is, as these edits set it."""
         found = replace(asked, **self._set(asked, Delivery()))
-        keys = in_time([*found.moods, *(step.key for step in self.steps if isinstance(step, MoodStep))])
-        return replace(found, mood=text_of(keys)) if keys != found.moods else found
+        keys = sort_moods([*found.moods, *(step.key for step in self.steps if isinstance(step, MoodStep))])
+        return replace(found, mood=format_moods(keys)) if keys != found.moods else found
 
     def staging(self, asked: Staging = Staging()) -> Staging:  # noqa: B008 # a frozen value
         """Return how a drawn face is shown: as is asked for, and where nothing is, as these edits set it."""

@@ -19,7 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.extensions import provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES
-from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, measure_restfulness, weigh_visemes
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.understand.read_request import lexicon_of
@@ -51,8 +51,8 @@ from lipmotion.types import (
 )
 from lipmotion.types.generation import SURE_CONFIDENCE
 from lipmotion.types.languages import ENGLISH
-from lipmotion.units import SILENCE, words_in_time
-from lipmotion.units.mood_tags import moods_in_time
+from lipmotion.units import SILENCE, group_words
+from lipmotion.units.mood_tags import time_moods
 
 ModelT = TypeVar("ModelT")
 TRANSCRIPT = "the words that are spoken (--transcript)"
@@ -95,7 +95,7 @@ def generation_of(
     speech, fit = understood.speech, understood.fit
     fits = fit.of_frames(len(speech.features.values)) if fit else 1.0
     knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits)
-    moods = moods_in_time(understood.tags, speech.units)
+    moods = time_moods(understood.tags, speech.units)
     told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
     return replace(told, outlook=outlook_of(request, understood))
 
@@ -130,12 +130,12 @@ def person_of(model: Model, request: Request) -> SpeakerMap | None:
                 "the name out"
             )
         return person
-    from lipmotion.motion.transfer_map import composed
+    from lipmotion.motion.transfer_map import compose_maps
 
     onto = provided("map_onto")(
         model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request
     )
-    return composed(person, onto)
+    return compose_maps(person, onto)
 
 
 def generate_for(
@@ -171,11 +171,11 @@ def _generate_one(
     """Return the motion of one passage."""
     if person is None:
         return engine.generate(learned, speech, constraints)
-    restful = restfulness(speech.units, len(speech.features.values))
+    restful = measure_restfulness(speech.units, len(speech.features.values))
     pins = constraints.pins if constraints is not None else ()
     mean = engine.generate(learned, speech, Constraints(tuple(_mean_pin(person, restful, pin) for pin in pins)))
     fitted = person.ordered(mean.motion.channels)
-    visemes = viseme_weights(speech.units, len(restful))
+    visemes = weigh_visemes(speech.units, len(restful))
     values = np.empty_like(mean.motion.values)
     for start in range(0, len(values), BLOCK_FRAMES):
         block = slice(start, start + BLOCK_FRAMES)
@@ -200,8 +200,8 @@ def explanation_for(person: SpeakerMap | None, explanation: Explanation, speech:
     channels = tuple(channel for channel in person.channels if channel.name in explanation.motion)
     fitted = person.ordered(channels)
     poses = np.array([[explanation.motion[channel.name].value for channel in channels]])
-    shift = fitted.shift(poses, viseme_weights(speech.units, frames)[frame])
-    added = fitted.to_person(shift, restfulness(speech.units, frames)[frame])[0]
+    shift = fitted.shift(poses, weigh_visemes(speech.units, frames)[frame])
+    added = fitted.to_person(shift, measure_restfulness(speech.units, frames)[frame])[0]
     numbers = {channel.name: number for number, channel in enumerate(channels)}
 
     def mapped(values: Mapping[str, ChannelValue]) -> dict[str, ChannelValue]:
@@ -260,7 +260,7 @@ def _known_share(request: Request, understood: UnderstoodSpeech) -> float:
     """Return how sure the phones of a transcript are, 0 to 1: 1 for English, less for what is mapped to English."""
     if request.language != ENGLISH:
         return MAPPED_CONFIDENCE
-    said, lexicon = [span.label for span in words_in_time(understood.speech.units)], lexicon_of(request)
+    said, lexicon = [span.label for span in group_words(understood.speech.units)], lexicon_of(request)
     words = [word for word in said if word]
     return sum(map(lexicon.known, words)) / len(words) if is_other_language(words, lexicon) else 1.0
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
-from lipmotion.motion.articulation import ARTICULATORS, measured_articulators
-from lipmotion.motion.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
+from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays
+from lipmotion.motion.articulation import ARTICULATORS, measure_articulators
+from lipmotion.motion.eigenlips import Eigenlips, eigenlips_from_arrays, eigenlips_to_arrays
 from lipmotion.motion.network_steps import STEP
-from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speaker_arrays, speakers_from_arrays
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speakers_from_arrays, speakers_to_arrays
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
@@ -80,14 +80,14 @@ def save_model(model: Model, path: str | Path) -> None:
     ...     lipmotion.load_model(Path(folder) / "copy.lipmotion").engine.name
     'trajectory'
     """
-    arrays = {f"phones/{key}": array for key, array in hmm_arrays(model.phones).items()}
+    arrays = {f"phones/{key}": array for key, array in hmm_to_arrays(model.phones).items()}
     arrays |= {f"engine/{key}": array for key, array in model.engine.to_arrays(model.learned).items()}
     if model.adaptation is not None:
         arrays |= {f"adaptation/{key}": array for key, array in adaptation_arrays(model.adaptation).items()}
     if model.eigenlips is not None:
-        arrays |= {f"eigenlips/{key}": array for key, array in eigenlips_arrays(model.eigenlips).items()}
+        arrays |= {f"eigenlips/{key}": array for key, array in eigenlips_to_arrays(model.eigenlips).items()}
     if model.speakers is not None:
-        arrays |= {f"speakers/{key}": array for key, array in speaker_arrays(model.speakers).items()}
+        arrays |= {f"speakers/{key}": array for key, array in speakers_to_arrays(model.speakers).items()}
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -265,7 +265,7 @@ def with_prior(prior: Model | None, speech: Speech) -> Speech:
         speech = replace(speech, parts=parts)
     whole = speech.with_arrays()
     motion = prior.engine.without_closures().generate(prior.learned, whole).motion
-    measured = measured_articulators(motion.values, motion.names)
+    measured = measure_articulators(motion.values, motion.names)
     chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]
     steps = len(motion.values[::STEP])
     nothing = np.zeros((steps, 0), np.float32), np.zeros(steps)

@@ -82,7 +82,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
-from lipmotion.units import Pronunciation, words_in_time, words_of
+from lipmotion.units import Pronunciation, group_words, split_words
 
 ResultT = TypeVar("ResultT")
 
@@ -287,7 +287,7 @@ class Session:
             start_s, end_s, said = step.start_s, min(step.end_s, units[-1].end_s), step.words
             where = f"{start_s:.2f} to {end_s:.2f} s"
         else:
-            words = [span for span in words_in_time(units) if span.label]
+            words = [span for span in group_words(units) if span.label]
             if not 1 <= step.number <= len(words):
                 found = f"1 to {len(words)}" if words else "words: give a transcript, or edit phones"
                 raise InputError(f"{str(step)!r}: there is no word {step.number}, required {found}")
@@ -461,4 +461,4 @@ class Session:
 def own_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
     own = step.own if isinstance(step, WordSaid | WordsSaidSo) else {}
-    return {word: (phones,) for given, phones in own.items() for word in words_of(given)}
+    return {word: (phones,) for given, phones in own.items() for word in split_words(given)}

@@ -71,7 +71,7 @@ def log_determinant(transform: Array) -> float:
     return float(np.linalg.slogdet(transform[:, :-1])[1])
 
 
-def transform_statistics(
+def collect_transform_statistics(
     mixtures: Mixtures, features: NDArray[np.float32], densities: NDArray[np.intp], transform: Array
 ) -> TransformStatistics:
     """Return the statistics of frames whose densities are known, with posteriors under the transform so far.
@@ -114,7 +114,7 @@ def prior_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineS
     return AffineStatistics(float(weights.sum()), quadratic, (precision * means).T @ extended)
 
 
-def improved_transform(
+def improve_transform(
     transform: Array, statistics: AffineStatistics, free: NDArray[np.bool_], sweeps: int = SWEEPS
 ) -> Array:
     """Return a transform [shape=(D, D + 1)] whose expected log likelihood (Gales 1998, Eq. 25) is at least as high.

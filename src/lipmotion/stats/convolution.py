@@ -95,9 +95,7 @@ class ConvolutionalNetwork(SequenceNetwork):
         return gradients[::-1]
 
 
-def initial_network(
-    inputs: int, hidden: int, outputs: int, dilations: Sequence[int], seed: int
-) -> ConvolutionalNetwork:
+def make_network(inputs: int, hidden: int, outputs: int, dilations: Sequence[int], seed: int) -> ConvolutionalNetwork:
     """Return an untrained network with random weights (He et al. 2015); those of residual layers are halved."""
     rng = np.random.default_rng(seed)
 

@@ -20,7 +20,7 @@ def with_dynamics(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return dynamics
 
 
-def dynamics_known(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def mark_known_dynamics(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return where Δ and Δ² are known [shape=(T,)]: in frames that are known with both neighbours.
 
     mask : where the static values are known [shape=(T,)]

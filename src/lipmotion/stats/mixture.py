@@ -77,11 +77,11 @@ class Mixtures:
             np.concatenate([self.variances, self.variances], axis=1),
         )
 
-    def selected(self, chosen: NDArray[np.intp]) -> Mixtures:
+    def select(self, chosen: NDArray[np.intp]) -> Mixtures:
         """Return copies of the chosen densities, in the given order."""
         return Mixtures(self.log_weights[chosen], self.means[chosen], self.variances[chosen])
 
-    def concatenated(self, other: Mixtures) -> Mixtures:
+    def concatenate(self, other: Mixtures) -> Mixtures:
         """Return both sets of densities as one; they have equal numbers of components."""
         return Mixtures(
             np.concatenate([self.log_weights, other.log_weights]),
@@ -229,7 +229,7 @@ def with_squares(x: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.concatenate([x, x * x, np.ones((len(x), 1), np.float32)], axis=1)
 
 
-def equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
+def make_equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
     """Return ``count`` equal Gaussians with the mean and variance of ``x`` [shape=(T, D)] (the flat start)."""
     mean, variance = x.mean(axis=0), np.maximum(x.var(axis=0), 1e-4)
     return Mixtures(

@@ -21,7 +21,7 @@ def window_frames(rate_hz: float) -> int:
     return max(2 * round(WINDOW_S * rate_hz / 2), 4)
 
 
-def modulation_spectrum(clips: Sequence[Array], rate_hz: float) -> tuple[Array, Array]:
+def measure_modulation_spectrum(clips: Sequence[Array], rate_hz: float) -> tuple[Array, Array]:
     """Return frequencies in Hz [shape=(F,)] and the mean power of curves at each of them [shape=(F, P)].
 
     clips : curves [each shape=(T_i, P)]

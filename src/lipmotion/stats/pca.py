@@ -60,11 +60,11 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
         basis = _of_rows(values - mean, components, least)
     else:
         centred = values - mean
-        basis = principal_axes(centred.T @ centred, components, least)
+        basis = find_principal_axes(centred.T @ centred, components, least)
     return Pca(mean, _with_signs(basis))
 
 
-def principal_axes(products: NDArray[np.float64], components: int, least: float = 0.0) -> NDArray[np.float64]:
+def find_principal_axes(products: NDArray[np.float64], components: int, least: float = 0.0) -> NDArray[np.float64]:
     """Return the first principal components [shape=(K, D)] of centred values X, given XᵀX or their covariance.
 
     products : [shape=(D, D)];  least : largest eigenvalue that rounding alone may produce
@@ -109,7 +109,7 @@ def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -
     Source: Halko, Martinsson & Tropp 2011, §4.5 (subspace iteration) and §5.1; Rayleigh-Ritz at its end.
     """
     size = min(components + SPARE_DIRECTIONS, *values.shape)
-    start = values[evenly_spaced(size, len(values))] - mean
+    start = values[choose_evenly(size, len(values))] - mean
     directions = np.linalg.qr(start.T.astype(np.float32))[0]
     variance = 0.0
     for _ in range(MOST_PASSES):
@@ -133,7 +133,7 @@ def _covariance_times(
     return total
 
 
-def evenly_spaced(count: int, total: int) -> NDArray[np.intp]:
+def choose_evenly(count: int, total: int) -> NDArray[np.intp]:
     """Return ``count`` of ``total`` indices, evenly spaced [shape=(min(count, total),)]."""
     count = min(count, total)
     return ((np.arange(count) + 0.5) * total / max(count, 1)).astype(np.intp)

@@ -116,7 +116,7 @@ class RecurrentNetwork(SequenceNetwork):
         return gradients
 
 
-def initial_recurrent_network(inputs: int, cells: int, outputs: int, layers: int, seed: int) -> RecurrentNetwork:
+def make_recurrent_network(inputs: int, cells: int, outputs: int, layers: int, seed: int) -> RecurrentNetwork:
     """Return an untrained network with random weights, uniform between ± 1 / √cells.
 
     cells : of every layer, in either direction

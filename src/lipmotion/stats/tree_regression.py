@@ -50,7 +50,7 @@ def ridge(moments: RegressionStatistics, prior: Array, strength: float) -> Array
     return prior + np.linalg.solve(system, moments.targets - moments.products @ prior).astype(float)
 
 
-def regression_node(tree: Tree, path: list[int], least: float) -> int:
+def fit_regression_node(tree: Tree, path: list[int], least: float) -> int:
     """Return the last node of a path that has at least ``least`` frames, enough for its own regression; or the root."""
     return next((node for node in reversed(path) if tree.frames[node] >= least), 0)
 
@@ -60,7 +60,7 @@ def fit_tree_regressions(
 ) -> dict[int, Array]:
     """Return the coefficients of every node in ``moments`` [shape=(F, P)]; each has those of the node above as prior.
 
-    moments : by node, the statistics of the leaves whose regression is that of the node (``regression_node``)
+    moments : by node, the statistics of the leaves whose regression is that of the node (``fit_regression_node``)
     shared  : the prior of the root
     """
     regressions: dict[int, Array] = {}

@@ -209,7 +209,7 @@ def _best_question(answers: Array, statistics: Array, log_likelihood: Likelihood
     return int(allowed[best]) if gain[best] > price else -1
 
 
-def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
+def trees_to_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
     """Serialise trees that share their questions, by name; only questions that are asked are stored."""
     questions = next(iter(trees.values())).questions
     asked = np.concatenate([tree.asked for tree in trees.values()])

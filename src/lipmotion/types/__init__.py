@@ -7,7 +7,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from lipmotion.types.audio import Audio, from_sixteen_bits, sixteen_bits
+    from lipmotion.types.audio import Audio, from_sixteen_bits, to_sixteen_bits
     from lipmotion.types.confidence import SpeechKnowledge
     from lipmotion.types.configuration import Configuration, Rule, option
     from lipmotion.types.delivery import Delivery
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from lipmotion.types.prosody import Prosody
     from lipmotion.types.staging import Staging
     from lipmotion.types.timeline import Span, Timeline, Unit
-    from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, in_order
+    from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, sort_lines
     from lipmotion.types.utterance import Track, Utterance
     from lipmotion.types.voice_event import VoiceEvent
 
@@ -118,11 +118,11 @@ __all__ = [
     "frame_of",
     "frames_of",
     "from_sixteen_bits",
-    "in_order",
     "option",
     "silent_monitor",
-    "sixteen_bits",
+    "sort_lines",
     "sub_monitor",
+    "to_sixteen_bits",
     "with_progress",
 ]
 

@@ -32,7 +32,7 @@ class Audio:
         return len(self.samples) / self.rate_hz
 
 
-def sixteen_bits(samples: NDArray[np.float32]) -> NDArray[np.int16]:
+def to_sixteen_bits(samples: NDArray[np.float32]) -> NDArray[np.int16]:
     """Return samples in 16 bits, as files hold them; what is beyond full scale is clipped."""
     return np.clip(np.rint(samples * FULL_SCALE), -FULL_SCALE, FULL_SCALE - 1).astype(np.int16)
 

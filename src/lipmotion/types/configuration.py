@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from lipmotion.errors import InputError
-from lipmotion.types.values import described, is_path, number_of, whole_of
+from lipmotion.types.values import describe_value, is_path, parse_number, parse_whole
 
 ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
 LARGEST_NUMBER = 1e6
@@ -189,15 +189,15 @@ def check_value(option_field: Field[Any], value: Any) -> None:
     in_range = not fits or kind not in (int, float) or -LARGEST_NUMBER <= value <= LARGEST_NUMBER
     if fits and rule.most is not None and not (in_range and rule.allows(value)):
         what = option_field.metadata.get("what", option_field.name)
-        found = described(value) if type(value) is int else f"{value:g}"
+        found = describe_value(value) if type(value) is int else f"{value:g}"
         raise InputError(f"the {what} is {found}{rule.unit}, required {rule.words}")
     if not in_range:
-        raise InputError(f"{option_field.name} is {described(value)}, required at most {LARGEST_NUMBER:g} in size")
+        raise InputError(f"{option_field.name} is {describe_value(value)}, required at most {LARGEST_NUMBER:g} in size")
     if not fits or not rule.allows(value):
         is_complete = rule.odd or rule.power_of_two or bool(rule.choices) or rule.most is not None
         words = _WORDS.get(kind, "a table of options")
         required = rule.words if is_complete and fits else words + ("" if is_complete else rule.words)
-        found = described(str(value) if isinstance(value, Path) else value)
+        found = describe_value(str(value) if isinstance(value, Path) else value)
         raise InputError(f"{option_field.name} is {found}, required {required}")
 
 
@@ -221,9 +221,9 @@ def _from_text(option_field: Field[Any], text: str) -> Any:
     """Return the value of an option that a text holds. Raises InputError: a text of another type."""
     kind, name = kind_of(option_field), option_field.name
     if kind is int:
-        return whole_of(text, f"{name} is")
+        return parse_whole(text, f"{name} is")
     if kind is float:
-        return number_of(text, f"{name} is", "a number", finite=False)
+        return parse_number(text, f"{name} is", "a number", finite=False)
     if kind is bool and text.lower() not in _BOOLEANS:
-        raise InputError(f"{name} is {described(text)}, required {_WORDS[kind]}")
+        raise InputError(f"{name} is {describe_value(text)}, required {_WORDS[kind]}")
     return _BOOLEANS[text.lower()] if kind is bool else kind(text)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from lipmotion.types.configuration import Configuration, Rule, option
-from lipmotion.types.moods import MoodKey, moods_of
+from lipmotion.types.moods import MoodKey, parse_moods
 
 MOST_INTENSITY = 3.0
 MOST_ANTICIPATION_MS = 1000.0
@@ -26,7 +26,7 @@ class Delivery(Configuration):
     offset_ms       : the sound begins so many milliseconds after time 0 of the timeline; negative: before it, and what
                       would be before time 0 is left out. For files that are put beside a sound; videos have their own
     min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
-    mood            : what the face expresses, and the manner of speaking, over time (``types.moods.moods_of``):
+    mood            : what the face expresses, and the manner of speaking, over time (``types.moods.parse_moods``):
                       ``happy``, ``sad:0.6, whisper``, ``happy:0.7, neutral at 2.5``; empty: what the words or the
                       motion say, else nothing
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
@@ -85,8 +85,8 @@ class Delivery(Configuration):
 
     @property
     def moods(self) -> tuple[MoodKey, ...]:
-        """The moods over time. Raises InputError: as ``moods_of``."""
-        return moods_of(self.mood)
+        """The moods over time. Raises InputError: as ``parse_moods``."""
+        return parse_moods(self.mood)
 
     @property
     def hold_ms(self) -> float:

@@ -16,7 +16,7 @@ from lipmotion.types.audio import Audio
 from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
 from lipmotion.types.moods import MoodKey
-from lipmotion.types.motion import Motion, between_frames
+from lipmotion.types.motion import Motion, interpolate_rows
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.voice_event import VoiceEvent
 
@@ -460,7 +460,7 @@ class Generation:
         Raises InputError: the rate is not more than 0.
         """
         motion = self.motion.resampled(rate_hz)
-        spread = self.changed_spread(lambda rows: between_frames(rows, self.motion.rate_hz, motion.time_s))
+        spread = self.changed_spread(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
         return replace(
             self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])

@@ -74,13 +74,13 @@ class MoodTag:
     strength: float = 1.0
 
 
-def moods_of(text: str) -> tuple[MoodKey, ...]:
+def parse_moods(text: str) -> tuple[MoodKey, ...]:
     """Return the moods that a text states, in the order of their times; none for an empty text.
 
     text : ``MOOD``, ``MOOD:STRENGTH``, or several with their times in seconds: ``happy:0.7, sad at 2.5``
     Raises InputError: another form, or as ``MoodKey``.
 
-    >>> moods_of("sad at 2.5, happy:0.7")
+    >>> parse_moods("sad at 2.5, happy:0.7")
     (MoodKey(time_s=0.0, mood='happy', strength=0.7), MoodKey(time_s=2.5, mood='sad', strength=1.0))
     """
     found = []
@@ -92,15 +92,15 @@ def moods_of(text: str) -> tuple[MoodKey, ...]:
                 "as happy:0.7 at 2.5; several with commas"
             )
         found.append(MoodKey(float(key[3] or 0.0), key[1].lower(), float(key[2] or 1.0)))
-    return in_time(found)
+    return sort_moods(found)
 
 
-def text_of(keys: Iterable[MoodKey]) -> str:
-    """Return moods as the text that ``moods_of`` reads."""
+def format_moods(keys: Iterable[MoodKey]) -> str:
+    """Return moods as the text that ``parse_moods`` reads."""
     return ", ".join(map(str, keys))
 
 
-def in_time(keys: Sequence[MoodKey]) -> tuple[MoodKey, ...]:
+def sort_moods(keys: Sequence[MoodKey]) -> tuple[MoodKey, ...]:
     """Return moods and manners in the order of their times; of several of a kind at one time the last."""
     latest = {(key.time_s, key.is_manner): key for key in keys}
     return tuple(latest[place] for place in sorted(latest))

@@ -99,7 +99,7 @@ class Motion:
 
         Linear interpolation between frames, as for every figure in docs/measures.md; constant beyond both ends.
         """
-        return between_frames(self.values, self.rate_hz, time_s)
+        return interpolate_rows(self.values, self.rate_hz, time_s)
 
     def resampled(self, rate_hz: float) -> Motion:
         """Return the motion at another frame rate, over the same duration, by linear interpolation.
@@ -112,7 +112,9 @@ class Motion:
         return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)
 
 
-def between_frames(rows: NDArray[np.floating[Any]], rate_hz: float, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def interpolate_rows(
+    rows: NDArray[np.floating[Any]], rate_hz: float, time_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return rows at some times in seconds, by linear interpolation [shape=(len(time_s), N)].
 
     rows : one a frame, at ``rate_hz`` [shape=(T, N)]; constant beyond both ends

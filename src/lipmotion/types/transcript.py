@@ -80,7 +80,7 @@ class TimedTranscript:
         return any(span.start_s is not None or span.end_s is not None for span in spans)
 
 
-def in_order(lines: list[TranscriptLine]) -> TimedTranscript:
+def sort_lines(lines: list[TranscriptLine]) -> TimedTranscript:
     """Return the transcript of lines in any order, those without words left out.
 
     Lines are sorted by their start; one without a start stays behind the line before it.

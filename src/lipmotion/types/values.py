@@ -45,7 +45,7 @@ def require(schema: Schema, value: Any, what: str) -> Any:
         raise InputError(f"{what}{error.place} is {error.found}, required {error.required}") from error
 
 
-def number_of(
+def parse_number(
     text: str, what: str = "the number is", required: str = "a number, as 1.24", *, finite: bool = True
 ) -> float:
     """Return the number that a text states in the digits 0 to 9, with a point.
@@ -53,16 +53,16 @@ def number_of(
     finite : whether ``nan`` and ``inf`` are refused here; else the range that is required says it
     Raises InputError: another text, as ``1_0`` or digits of other scripts.
 
-    >>> number_of(" -1.5e3")
+    >>> parse_number(" -1.5e3")
     -1500.0
     """
     found = float(text) if _NUMBER.fullmatch(text.strip()) else None
     if found is None or (finite and not math.isfinite(found)):
-        raise InputError(f"{what} {described(text)}, required {required}")
+        raise InputError(f"{what} {describe_value(text)}, required {required}")
     return found
 
 
-def clock_seconds(text: str, frames_per_s: float = 0) -> float:
+def parse_clock(text: str, frames_per_s: float = 0) -> float:
     """Return the seconds of a time as 1:02:03.5, 2:03,5 or, if frames have a rate, 00:02:03:12; NaN: it is none."""
     found = re.fullmatch(rf"{_CLOCK}(?::(\d+(?:\.\d+)?))?", text.strip())
     if found is None or (found[4] and not frames_per_s):
@@ -71,10 +71,10 @@ def clock_seconds(text: str, frames_per_s: float = 0) -> float:
     return int(found[1] or 0) * 3600 + int(found[2]) * 60 + seconds
 
 
-def whole_of(text: str, what: str = "the number is", required: str = "a whole number") -> int:
+def parse_whole(text: str, what: str = "the number is", required: str = "a whole number") -> int:
     """Return the whole number that a text states in the digits 0 to 9, 18 at most. Raises InputError: another text."""
     if not _WHOLE.fullmatch(text.strip()):
-        raise InputError(f"{what} {described(text)}, required {required}")
+        raise InputError(f"{what} {describe_value(text)}, required {required}")
     return int(text)
 
 
@@ -91,7 +91,7 @@ def whole(least: int, most: int) -> Schema:
 
     def checked(value: Any) -> int:
         if type(value) is not int or not least <= value <= most:
-            raise SchemaError(described(value), required)
+            raise SchemaError(describe_value(value), required)
         return value
 
     return checked
@@ -107,7 +107,7 @@ def number(least: float = -math.inf, most: float = math.inf) -> Schema:
         except OverflowError:
             found = math.inf
         if not (math.isfinite(found) and least <= value <= most):
-            raise SchemaError(described(value), required)
+            raise SchemaError(describe_value(value), required)
         return found
 
     return checked
@@ -116,7 +116,7 @@ def number(least: float = -math.inf, most: float = math.inf) -> Schema:
 def truth(value: Any) -> bool:
     """Return a truth value. Raises SchemaError: another one."""
     if type(value) is not bool:
-        raise SchemaError(described(value), "true or false")
+        raise SchemaError(describe_value(value), "true or false")
     return value
 
 
@@ -125,7 +125,7 @@ def text(most: int) -> Schema:
 
     def checked(value: Any) -> str:
         if type(value) is not str or len(value) > most or _HALVES.search(value):
-            raise SchemaError(described(value), f"a text of at most {most} letters")
+            raise SchemaError(describe_value(value), f"a text of at most {most} letters")
         return value
 
     return checked
@@ -134,7 +134,7 @@ def text(most: int) -> Schema:
 def path(value: Any) -> str:
     """Return the text of a path; an empty one is none. Raises SchemaError: no file can have it."""
     if type(value) is not str or not is_path(value):
-        raise SchemaError(described(value), f"a path, of names of at most {NAME_BYTES} bytes")
+        raise SchemaError(describe_value(value), f"a path, of names of at most {NAME_BYTES} bytes")
     return value
 
 
@@ -149,7 +149,7 @@ def one_of(values: Collection[int | str]) -> Schema:
 
     def checked(value: Any) -> int | str:
         if type(value) not in (int, str) or (type(value), value) not in known:
-            raise SchemaError(described(value), f"one of {', '.join(map(str, values))}")
+            raise SchemaError(describe_value(value), f"one of {', '.join(map(str, values))}")
         return value
 
     return checked
@@ -161,7 +161,7 @@ def items(schema: Schema, least: int = 0, most: int | None = None) -> Schema:
 
     def checked(value: Any) -> list[Any]:
         if type(value) is not list:
-            raise SchemaError(described(value), "a list")
+            raise SchemaError(describe_value(value), "a list")
         if len(value) < least or (most is not None and len(value) > most):
             raise SchemaError(f"a list of {len(value)}", required if most is not None else f"at least {least} items")
         kept = []
@@ -185,7 +185,7 @@ def members(table: Mapping[str, Schema], needed: Collection[str] = (), *, alone:
 
     def checked(value: Any) -> dict[str, Any]:
         if type(value) is not dict:
-            raise SchemaError(described(value), "an object")
+            raise SchemaError(describe_value(value), "an object")
         for name in needed:
             if name not in value:
                 raise SchemaError("missing", "a value", f".{name}")
@@ -203,12 +203,12 @@ def value_of(kind: Callable[..., Any], table: Mapping[str, Schema], needed: Coll
     return lambda value: kind(**schema(value))
 
 
-def stated(read: Callable[[str], Any], schema: Schema) -> Schema:
+def number_or_text(read: Callable[[str], Any], schema: Schema) -> Schema:
     """Return the schema of a number that may also be stated as a text, of which a function returns it."""
     return lambda value: schema(read(value) if isinstance(value, str) else value)
 
 
-def tupled(schema: Schema) -> Schema:
+def as_tuple(schema: Schema) -> Schema:
     """Return the schema of a list that becomes a tuple."""
     return lambda value: tuple(schema(value))
 
@@ -218,7 +218,7 @@ def any_members(schema: Schema) -> Schema:
 
     def checked(value: Any) -> dict[str, Any]:
         if type(value) is not dict:
-            raise SchemaError(described(value), "an object")
+            raise SchemaError(describe_value(value), "an object")
         return _checked(value, lambda _: schema)
 
     return checked
@@ -248,7 +248,7 @@ def _checked(content: Mapping[str, Any], schema_of: Callable[[str], Schema]) -> 
     return kept
 
 
-def described(value: Any) -> str:
+def describe_value(value: Any) -> str:
     """Return a value in a few words, for a message: whatever it is, however deep or long."""
     if isinstance(value, Mapping | list | tuple):
         return "an object" if isinstance(value, Mapping) else "a list"

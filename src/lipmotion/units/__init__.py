@@ -1,8 +1,8 @@
 """Phones, visemes, unit sets, and words with their pronunciations. Data and look-ups, no audio."""
 
-from lipmotion.units.classes import phone_classes
+from lipmotion.units.classes import list_phone_classes
 from lipmotion.units.length_limits import check_phones, check_text, check_words
-from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
+from lipmotion.units.lexicon import Lexicon, Pronunciation, find_phone, reduce_vowels
 from lipmotion.units.phones import (
     LIP_CLOSING,
     PAUSE,
@@ -10,18 +10,24 @@ from lipmotion.units.phones import (
     SILENCE,
     SIMILAR_PHONES,
     UNKNOWN_PHONES,
-    closing_phones,
+    describe_unknown_phone,
+    find_similar_lips,
+    find_similar_phone,
     is_silent,
-    most_similar_lips,
-    most_similar_phone,
-    unknown_phone_message,
+    mark_closing_phones,
 )
-from lipmotion.units.recognised import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences, without_gaps
-from lipmotion.units.text_normalisation import words_in, words_of
+from lipmotion.units.recognised import (
+    RECOGNISED,
+    RecognisedPhone,
+    close_gaps,
+    list_recognised_phones,
+    restore_confidences,
+)
+from lipmotion.units.text_normalisation import find_words, split_words
 from lipmotion.units.unit_set import UnitSet
-from lipmotion.units.unit_sets import UNIT_SETS, unit_set
+from lipmotion.units.unit_sets import UNIT_SETS, load_unit_set
 from lipmotion.units.visemes import VISEME_OF, VISEMES, VOWELS
-from lipmotion.units.word_spans import words_in_time
+from lipmotion.units.word_spans import group_words
 
 __all__ = [
     "LIP_CLOSING",
@@ -42,19 +48,19 @@ __all__ = [
     "check_phones",
     "check_text",
     "check_words",
-    "closing_phones",
+    "close_gaps",
+    "describe_unknown_phone",
+    "find_phone",
+    "find_similar_lips",
+    "find_similar_phone",
+    "find_words",
+    "group_words",
     "is_silent",
-    "most_similar_lips",
-    "most_similar_phone",
-    "phone_classes",
-    "phone_named",
-    "recognised_phones",
-    "unit_set",
-    "unknown_phone_message",
-    "with_confidences",
-    "with_reduced_vowels",
-    "without_gaps",
-    "words_in",
-    "words_in_time",
-    "words_of",
+    "list_phone_classes",
+    "list_recognised_phones",
+    "load_unit_set",
+    "mark_closing_phones",
+    "reduce_vowels",
+    "restore_confidences",
+    "split_words",
 ]

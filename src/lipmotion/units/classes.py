@@ -28,10 +28,10 @@ CLASSES: dict[str, tuple[str, ...]] = {
         "rounded": "w uw uh ow ao oy aw",
     }.items()
 }
-"""Classes by articulation, as in any textbook of phonetics; ``phone_classes`` adds visemes and single phones."""
+"""Classes by articulation, as in any textbook of phonetics; ``list_phone_classes`` adds visemes and single phones."""
 
 
-def phone_classes() -> dict[str, frozenset[str]]:
+def list_phone_classes() -> dict[str, frozenset[str]]:
     """Return the phones of all classes, by name: articulatory classes, visemes, and each phone alone; each set once."""
     named = CLASSES | {f"viseme {name}": phones for name, phones in VISEMES.items()}
     distinct: dict[frozenset[str], str] = {}

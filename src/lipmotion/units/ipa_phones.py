@@ -87,12 +87,12 @@ UNKNOWN = ("ax",)
 
 
 @cache
-def xsampa_as_ipa(label: str) -> str:
+def xsampa_to_ipa(label: str) -> str:
     """Return a phone in X-SAMPA in IPA; empty: it is no single phone in X-SAMPA.
 
     A phone is one consonant or vowel with its marks, a stop with the fricative that it opens to, or a diphthong.
 
-    >>> xsampa_as_ipa("@U"), xsampa_as_ipa("t_h"), xsampa_as_ipa("4"), xsampa_as_ipa("word")
+    >>> xsampa_to_ipa("@U"), xsampa_to_ipa("t_h"), xsampa_to_ipa("4"), xsampa_to_ipa("word")
     ('əʊ', 't', 'ɾ', '')
     """
     found, at = [], 0
@@ -110,26 +110,26 @@ def xsampa_as_ipa(label: str) -> str:
 
 
 @cache
-def ipa_phones(label: str) -> tuple[tuple[str, ...], str]:
+def read_ipa(label: str) -> tuple[tuple[str, ...], str]:
     """Return the phones of the inventory for a phone in IPA, and those of its letters that are in no table.
 
     A letter with marks that is in no table is the letter without them; any other becomes ax. A token of a recogniser
     that is no sound (``<blank>``), and a change of language (``(en)``), have no phone.
 
-    >>> ipa_phones("ˈyː"), ipa_phones("p͡f"), ipa_phones("t͡ʃ")
+    >>> read_ipa("ˈyː"), read_ipa("p͡f"), read_ipa("t͡ʃ")
     ((('uw',), ''), (('p', 'f'), ''), (('ch',), ''))
     """
     phones, unknown = _read([label])
     return tuple(phone for phone, _ in phones), unknown
 
 
-def token_phones(tokens: Sequence[str]) -> list[tuple[str, int]]:
+def read_tokens(tokens: Sequence[str]) -> list[tuple[str, int]]:
     """Return the phones of the tokens of a recogniser, in order, each with the number of the token that it begins in.
 
     Tokens that are one sound together are one: ``t``, ``͡``, ``ʃ``; ``a``, ``ɪ``; but not beyond a token that is no
     sound, as ``<wb>``. Marks belong to the token before.
 
-    >>> token_phones(["t", "͡", "ʃ", "a", "<wb>", "ɪ"])
+    >>> read_tokens(["t", "͡", "ʃ", "a", "<wb>", "ɪ"])
     [('ch', 0), ('aa', 3), ('ih', 5)]
     """
     return _read(tokens)[0]

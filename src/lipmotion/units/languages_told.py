@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 
 from lipmotion.types.languages import ENGLISH, LANGUAGES, script_of
-from lipmotion.units.lexicon import Lexicon, Pronunciation, english_data
+from lipmotion.units.lexicon import Lexicon, Pronunciation, find_english_data
 
 COMMON_WORDS = {
     "en": "the and of to is that it was you for with this",
@@ -31,10 +31,10 @@ NOT_ENGLISH, IS_ENGLISH = 0.2, 0.5
 _ALIKE = {"ax": "ah", "axr": "er", "ix": "ih", "ao": "aa", "uh": "uw"}
 
 
-def language_of_text(words: Sequence[str]) -> str:
+def detect_language(words: Sequence[str]) -> str:
     """Return the code of the language of a text; empty: not known.
 
-    >>> language_of_text("der hund und die katze und das".split()), language_of_text(["밥을"]), language_of_text(["ok"])
+    >>> detect_language("der hund und die katze und das".split()), detect_language(["밥을"]), detect_language(["ok"])
     ('de', 'ko', '')
     """
     scripts = Counter(script_of(letter) for word in words for letter in word) - Counter([""])
@@ -65,5 +65,5 @@ def _alike(phones: Iterable[str]) -> Pronunciation:
 @cache
 def _pronunciations() -> frozenset[Pronunciation]:
     """Return the pronunciations of all words of the dictionary."""
-    text = (english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8").lower()
+    text = (find_english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8").lower()
     return frozenset(_alike(line.split()[1:]) for line in text.splitlines())

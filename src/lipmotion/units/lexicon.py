@@ -13,22 +13,22 @@ from typing import Any
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
-from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
-from lipmotion.units.spelling import guess_pronunciation, normalised_text, without_accents
-from lipmotion.units.written_forms import readings
+from lipmotion.units.spelling import guess_pronunciation, normalise_text, remove_accents
+from lipmotion.units.written_forms import list_readings
 
 LONGEST_WORD = 30
 """Letters of the longest word that is read by the network: longer ones are web addresses and noise."""
 
 
 @lru_cache(maxsize=4096)
-def network_pronunciation(word: str) -> tuple[str, ...]:
+def pronounce_by_network(word: str) -> tuple[str, ...]:
     """Return the phones of a lower-case word in plain letters; empty: ``hama`` is not installed, or has no phones."""
     network = _network() if len(word) <= LONGEST_WORD else None
     if network is None:
         return ()
-    return tuple(phone for phone, _ in token_phones([each.phoneme for each in network.predict(word).alignments]))
+    return tuple(phone for phone, _ in read_tokens([each.phoneme for each in network.predict(word).alignments]))
 
 
 @cache
@@ -70,7 +70,7 @@ six."""
 
 
 @lru_cache(maxsize=4096)
-def phone_named(label: str) -> str | None:
+def find_phone(label: str) -> str | None:
     """Return the phone that a label names, or None.
 
     A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in the word as in Kaldi (``hh_B``), or
@@ -113,8 +113,8 @@ class Lexicon:
 
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
-        said = (each in self.user or in_dictionary(each) for each in readings(word)[0])
-        return word in self.user or all(said) or bool(lengthened(word) or SOUNDED.fullmatch(word))
+        said = (each in self.user or in_dictionary(each) for each in list_readings(word)[0])
+        return word in self.user or all(said) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
         """Return every pronunciation of a lower-case word, or of a written form (``1995``) in all its readings.
@@ -129,9 +129,9 @@ class Lexicon:
 
     def spoken_forms(self, word: str) -> tuple[SpokenForm, ...]:
         """Return every way to say a word or a written form, the usual one first. Raises as ``pronunciations``."""
-        said = readings(word)
+        said = list_readings(word)
         if said == ((word,),) and word not in self.user:
-            said = lengthened(word) or said
+            said = expand_lengthened(word) or said
         own = tuple(reading for reading in said if len(reading) == 1 and reading[0] in self.user)
         forms: list[SpokenForm] = []
         for reading in ((word,),) if word in self.user else own or said:
@@ -149,29 +149,29 @@ class Lexicon:
         """Return the pronunciations of one word."""
         if word in self.user:
             return self.user[word]
-        entries = _dictionary_entries(word) or _dictionary_entries(without_accents(word))
-        variants = [with_reduced_vowels(word, entry) for entry in entries]
+        entries = _dictionary_entries(word) or _dictionary_entries(remove_accents(word))
+        variants = [reduce_vowels(word, entry) for entry in entries]
         if variants:
             return tuple(dict.fromkeys(variants))
         by_rules = guess_pronunciation(word)
         if SOUNDED.fullmatch(word):
             return (by_rules,)
-        return (with_reduced_vowels(word, network_pronunciation(without_accents(word)) or by_rules),)
+        return (reduce_vowels(word, pronounce_by_network(remove_accents(word)) or by_rules),)
 
 
 def in_dictionary(word: str) -> bool:
     """Return whether the dictionary has a word, perhaps without accents."""
-    return bool(_dictionary_entries(word) or _dictionary_entries(without_accents(word)))
+    return bool(_dictionary_entries(word) or _dictionary_entries(remove_accents(word)))
 
 
 @cache
-def lengthened(word: str) -> tuple[tuple[str, ...], ...]:
+def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     """Return the words of the dictionary that a lengthened word stands for, the likeliest first; none of any other.
 
     Letters that stand there three times and more are meant once or twice: ``nooo``, ``boooom``. Else the word may be a
     part that is repeated: ``hahaha``.
     """
-    plain = without_accents(word)
+    plain = remove_accents(word)
     if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or in_dictionary(word):
         return ()
     runs = [found[0] for found in re.finditer(r"(.)\1*", plain)]
@@ -196,7 +196,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
     word, *phones = line.split("#", maxsplit=1)[0].split() or [""]
     if not word:
         return
-    word = VARIANT_NUMBER.sub("", normalised_text(word)).strip("'")  # as in ``words_of``
+    word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
     variants = user.setdefault(word, [])
     if len(variants) == MOST_VARIANTS:
         raise InputError(f"more than {MOST_VARIANTS} pronunciations of {shortened(word)!r}; keep those that are said")
@@ -228,11 +228,11 @@ def _user_phones(phones: list[str]) -> Pronunciation:
 
 @lru_cache(maxsize=4096)
 def _spoken_phone(label: str) -> str | None:
-    name = phone_named(label)
+    name = find_phone(label)
     return None if name is None or is_silent(name) else name
 
 
-def english_data() -> Path:
+def find_english_data() -> Path:
     """Return the folder of pocketsphinx's dictionary and models. Raises MissingDependencyError: it is not installed."""
     spec = find_spec("pocketsphinx")  # its data files are read, the package itself is not imported
     if spec is None or not spec.submodule_search_locations:
@@ -245,7 +245,7 @@ def english_data() -> Path:
 
 @cache
 def _dictionary() -> bytes:
-    return b"\n" + (english_data() / "cmudict-en-us.dict").read_bytes()
+    return b"\n" + (find_english_data() / "cmudict-en-us.dict").read_bytes()
 
 
 @cache
@@ -274,7 +274,7 @@ def _head(text: bytes, line_break: int) -> bytes:
     return text[line_break + 1 : text.index(b" ", line_break)].partition(b"(")[0]
 
 
-def with_reduced_vowels(word: str, phones: Pronunciation) -> Pronunciation:
+def reduce_vowels(word: str, phones: Pronunciation) -> Pronunciation:
     """Return phones with the unstressed AH, ER and IH reduced. The dictionary has no stress, so a rule decides.
 
     A word of one syllable keeps its vowel unless it is a weak word. In a longer word these three are

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from lipmotion.errors import shortened
 from lipmotion.types import Timeline, Unit
-from lipmotion.types.moods import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, in_time
-from lipmotion.units.spoken_text import speaker_names, without_speakers
-from lipmotion.units.text_normalisation import words_in
-from lipmotion.units.word_spans import words_in_time
+from lipmotion.types.moods import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
+from lipmotion.units.spoken_text import find_speaker_names, remove_speakers
+from lipmotion.units.text_normalisation import find_words
+from lipmotion.units.word_spans import group_words
 
 LOG = logging.getLogger("lipmotion")
 TAG = re.compile(
@@ -58,18 +58,18 @@ class TaggedText(NamedTuple):
     tags: tuple[MoodTag, ...]
 
 
-def tagged_text(text: str, words: Callable[[str], Sequence[str]] = words_in) -> TaggedText:
+def parse_tagged_text(text: str, words: Callable[[str], Sequence[str]] = find_words) -> TaggedText:
     """Return what is spoken of a text, and its tags; a text without tags is returned as it is.
 
     words : returns the words of a text
     A tag holds until the next one of its kind, mood or manner; ``</smile>`` ends in a neutral face. What else is not
     spoken, other tags and the names of speakers before what they say, is named in a warning.
 
-    >>> tagged_text("[sad:0.5] I know. <smile>But</smile> so what")
+    >>> parse_tagged_text("[sad:0.5] I know. <smile>But</smile> so what")
     TaggedText(text='  I know.  But  so what', tags=(MoodTag(share=0.0, mood='sad', strength=0.5), \
 MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral', strength=1.0)))
     """
-    text, unknown = without_speakers(LINK.sub(r"\1", text), speaker_names([text]))
+    text, unknown = remove_speakers(LINK.sub(r"\1", text), find_speaker_names([text]))
     spoken, found, last = "", [], 0
     for tag in TAG.finditer(text):
         meaning = _meaning(tag)
@@ -92,17 +92,17 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
     return TaggedText(spoken, tuple(MoodTag(before / count, mood, strength) for before, mood, strength in found))
 
 
-def without_known_tags(text: str) -> str:
+def remove_known_tags(text: str) -> str:
     """Return a text without the tags that are understood."""
     return TAG.sub(lambda tag: " " if _meaning(tag) else tag[0], text)
 
 
-def moods_in_time(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey, ...]:
+def time_moods(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey, ...]:
     """Return the moods of tags at the times of the words that they stand before; the last ones at the end of speech.
 
     units : phones in time, with the words that they are of; without words the phones count instead
     """
-    words = [(span.start_s, span.end_s) for span in words_in_time(units) if span.label]
+    words = [(span.start_s, span.end_s) for span in group_words(units) if span.label]
     spans = words or [(span.start_s, span.end_s) for span in units]
     if not tags or not spans:
         return ()
@@ -111,7 +111,7 @@ def moods_in_time(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodK
         place = round(tag.share * len(spans))
         time_s = 0.0 if place == 0 else spans[place][0] if place < len(spans) else spans[-1][1]
         keys.append(MoodKey(max(time_s, 0.0), tag.mood, tag.strength))
-    return in_time(keys)
+    return sort_moods(keys)
 
 
 def _meaning(tag: re.Match[str]) -> tuple[str, float] | None:

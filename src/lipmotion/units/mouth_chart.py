@@ -47,6 +47,6 @@ BLAIR = {shape.blair.lower(): name for name, shape in SHAPES.items()} | {"wq": "
 """Shapes by Preston Blair's names; his E is another shape than the letter."""
 
 
-def drawn_shape(shape: str, drawn: str) -> str:
+def choose_drawn_shape(shape: str, drawn: str) -> str:
     """Return the shape itself if it is drawn, else its fallback."""
     return shape if shape in drawn else SHAPES[shape].fallback

@@ -94,13 +94,13 @@ SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
 }
 
 
-def phone_edits(wanted: Sequence[str], found: Sequence[str]) -> int:
+def count_phone_edits(wanted: Sequence[str], found: Sequence[str]) -> int:
     """Return the fewest substitutions, insertions and deletions that make one sequence of phones of another.
 
     Full and reduced forms of a phone count as the same.
     Source: Wagner & Fischer 1974.
 
-    >>> phone_edits(["ax", "b", "el"], ["ah", "b", "l"])
+    >>> count_phone_edits(["ax", "b", "el"], ["ah", "b", "l"])
     0
     """
     row = list(range(len(found) + 1))
@@ -117,7 +117,7 @@ def is_silent(phone: str) -> bool:
     return phone in (SILENCE, PAUSE)
 
 
-def closing_phones(units: Timeline[Unit]) -> list[bool]:
+def mark_closing_phones(units: Timeline[Unit]) -> list[bool]:
     """Return for each phone in time whether the lips meet in it. The rule of every part that closes lips:
 
     contact (``articulation.contact``), lips and tongue by phones (``articulation.phone_targets``), breaths in pauses,
@@ -126,7 +126,7 @@ def closing_phones(units: Timeline[Unit]) -> list[bool]:
     return [span.label.phone in LIP_CLOSING for span in units]
 
 
-def unknown_phone_message(phone: str, where: str = "") -> str:
+def describe_unknown_phone(phone: str, where: str = "") -> str:
     """Return the error message for a phone that is not in the inventory.
 
     phone : empty if a model recognised a unit of several phones
@@ -137,7 +137,7 @@ def unknown_phone_message(phone: str, where: str = "") -> str:
     return f"unknown phone {shortened(repr(phone))}{where}; the phones: {' '.join(PHONES)}"
 
 
-def most_similar_phone(phone: str, known: Collection[str]) -> str:
+def find_similar_phone(phone: str, known: Collection[str]) -> str:
     """Return the phone itself if it is known, else the most similar known phone.
 
     Its similar phones (``SIMILAR_PHONES``) come first, then the similar phones of those, then its viseme, then any.
@@ -151,13 +151,13 @@ def most_similar_phone(phone: str, known: Collection[str]) -> str:
     return same_viseme[0] if same_viseme else min(known)
 
 
-def most_similar_lips(phone: str, known: Collection[str]) -> str:
+def find_similar_lips(phone: str, known: Collection[str]) -> str:
     """Return the phone itself if it is known, else the known phone whose lips look most alike.
 
-    A phone of the same viseme comes first, of several the most similar one; else it is ``most_similar_phone``.
+    A phone of the same viseme comes first, of several the most similar one; else it is ``find_similar_phone``.
 
-    >>> most_similar_lips("m", ["n", "p"]), most_similar_lips("m", ["n", "t"])
+    >>> find_similar_lips("m", ["n", "p"]), find_similar_lips("m", ["n", "t"])
     ('p', 'n')
     """
     same_viseme = [other for other in VISEMES[VISEME_OF[phone]] if other in known]
-    return most_similar_phone(phone, same_viseme or known)
+    return find_similar_phone(phone, same_viseme or known)

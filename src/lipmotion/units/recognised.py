@@ -15,7 +15,7 @@ from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units.phones import SILENCE
 
 
-def without_gaps(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
+def close_gaps(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
     """Return phones in time that follow each other from the start to the end of a recording.
 
     units      : a last end may be infinite: it becomes the end of the recording
@@ -57,7 +57,7 @@ class RecognisedPhone(NamedTuple):
     confidence: float
 
 
-def recognised_phones(units: Timeline[Unit]) -> list[RecognisedPhone]:
+def list_recognised_phones(units: Timeline[Unit]) -> list[RecognisedPhone]:
     """Return the phones in time that are recognised, not known."""
     return [
         RecognisedPhone(float(span.start_s), float(span.end_s), _name(span.label), float(span.label.confidence))
@@ -66,10 +66,10 @@ def recognised_phones(units: Timeline[Unit]) -> list[RecognisedPhone]:
     ]
 
 
-def with_confidences(units: Timeline[Unit], recognised: Iterable[RecognisedPhone]) -> Timeline[Unit]:
+def restore_confidences(units: Timeline[Unit], recognised: Iterable[RecognisedPhone]) -> Timeline[Unit]:
     """Return phones in time in which those that are as they were recognised have their confidence.
 
-    recognised : of ``recognised_phones``, when the phones were written
+    recognised : of ``list_recognised_phones``, when the phones were written
     """
     confidence_of = {phone[:3]: phone.confidence for phone in recognised}
     return Timeline(

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Iterator
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.units.text_normalisation import words_in
+from lipmotion.units.text_normalisation import find_words
 
 MOST_CHARACTERS = 50_000
 """Most characters of a text: about an hour of speech."""
@@ -36,13 +36,13 @@ def clean_text(text: str) -> str:
     )
 
 
-def sentences_of(text: str) -> list[str]:
+def split_sentences(text: str) -> list[str]:
     """Return the sentences of a text, in order, each with a word in it and of at most ``LONGEST_SENTENCE`` characters.
 
     What stands between two sentences without a word, such as a row of dots, is left out.
     Raises InputError: more than ``MOST_CHARACTERS``, no word, or a word of more than ``LONGEST_WORD`` characters.
 
-    >>> sentences_of("Dr. Smith said: wait! Then he left...")
+    >>> split_sentences("Dr. Smith said: wait! Then he left...")
     ['Dr. Smith said: wait!', 'Then he left...']
     """
     if len(text) > MOST_CHARACTERS:
@@ -57,7 +57,7 @@ def sentences_of(text: str) -> list[str]:
             f"a word of {len(longest)} characters ({shortened(longest)!r}), required at most {LONGEST_WORD}; "
             "write words with blanks between them"
         )
-    found = [part for sentence in _ended(plain) for part in _short(sentence) if words_in(part)]
+    found = [part for sentence in _ended(plain) for part in _short(sentence) if find_words(part)]
     if not found:
         raise InputError(f"the text {shortened(plain)!r} holds no word; give the words to be spoken")
     return found

@@ -8,12 +8,12 @@ import unicodedata
 from lipmotion.errors import InputError, shortened
 
 
-def table(rows: str) -> dict[str, str]:
+def parse_table(rows: str) -> dict[str, str]:
     """Return a table of ``key=value`` between blanks; an underscore in a value is a blank."""
     return {key: value.replace("_", " ") for key, _, value in (row.partition("=") for row in rows.split())}
 
 
-SPELLINGS = table(
+SPELLINGS = parse_table(
     "tion=sh_ah_n sion=zh_ah_n ture=ch_er ough=ao augh=ao eigh=ey igh=ay tch=ch dge=jh sch=sh ee=iy ea=iy ie=iy "
     "ei=ey ai=ey ay=ey ey=iy oa=ow oo=uw ou=aw ow=ow oi=oy oy=oy au=ao aw=ao ew=uw ue=uw ar=aa_r er=er ir=er "
     "or=ao_r ur=er ch=ch ck=k gh=g kn=n ng=ng ph=f qu=k_w rh=r sh=sh th=th wh=w wr=r ce=s_eh ci=s_ih cy=s_iy "
@@ -54,7 +54,7 @@ def plain_text(text: str) -> str:
     return text.replace("`", "'")
 
 
-def normalised_text(text: str) -> str:
+def normalise_text(text: str) -> str:
     """Return a text as ``plain_text`` does, in lower case."""
     return plain_text(text).lower()
 
@@ -68,7 +68,7 @@ def _few_marks(text: str) -> str:
     return re.sub(f"([{marks}]{{{MOST_MARKS}}})[{marks}]+", r"\1", text) if marks else text
 
 
-def without_accents(word: str) -> str:
+def remove_accents(word: str) -> str:
     """Return a lower-case word in plain letters, as far as its letters are Latin: ``café`` as ``cafe``."""
     if word.isascii():
         return word
@@ -82,8 +82,8 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
     Accents are left out: ``é`` is read as ``e``.
     Raises InputError: a character is not a letter of the Latin alphabet.
     """
-    plain = without_accents(word)
-    foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", without_accents(letter)))
+    plain = remove_accents(word)
+    foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", remove_accents(letter)))
     if foreign or not plain.strip("'"):
         raise InputError(
             f"cannot guess how {shortened(word)!r} is said ({shortened(' '.join(foreign)) or 'no letters'}): "

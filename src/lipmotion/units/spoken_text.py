@@ -10,8 +10,8 @@ from enum import Enum
 
 from lipmotion.errors import InputError
 from lipmotion.types import TimedWord
-from lipmotion.units.text_normalisation import tokens_in
-from lipmotion.units.written_forms import readings
+from lipmotion.units.text_normalisation import tokenise
+from lipmotion.units.written_forms import list_readings
 
 TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
 """Tags of SubRip and WebVTT (``<i>``, ``<v Anna>``, ``<00:01.500>``), of SubStation (``{\\an8}``), and ``<unk>``."""
@@ -64,10 +64,10 @@ IN_BRACKETS = re.compile(r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\
 UNKNOWN_SPEECH = re.compile(r"unknown|unintelligible|inaudible|indistinct|garbage|spoken.?noise", re.IGNORECASE)
 
 
-def spoken_as(label: str) -> SpokenAs:
+def classify_label(label: str) -> SpokenAs:
     """Return whether a whole label stands for silence or a sound, speech of unknown words, or speech.
 
-    >>> spoken_as("[laughs]"), spoken_as("<unk>"), spoken_as("hello")
+    >>> classify_label("[laughs]"), classify_label("<unk>"), classify_label("hello")
     (<SpokenAs.SILENCE: 'silence'>, <SpokenAs.UNKNOWN: 'unknown'>, <SpokenAs.SPEECH: 'speech'>)
     """
     name = "sil" if label.strip() == LAUGHTER else label.strip().lower()
@@ -78,13 +78,13 @@ def spoken_as(label: str) -> SpokenAs:
     return SpokenAs.SILENCE if bracketed or name in SILENCES else SpokenAs.SPEECH
 
 
-def spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
-    """Return what is spoken of a text; ``names``: of speakers, as ``speaker_names`` returns them."""
+def extract_spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
+    """Return what is spoken of a text; ``names``: of speakers, as ``find_speaker_names`` returns them."""
     text = SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text))))
-    return without_speakers(SYMBOLS.sub(" ", text), names)[0]
+    return remove_speakers(SYMBOLS.sub(" ", text), names)[0]
 
 
-def without_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str, list[str]]:
+def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str, list[str]]:
     """Return a text without the names of speakers, and what was left out.
 
     Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
@@ -115,7 +115,7 @@ def without_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[st
     return text, [name for name in left_out if name]
 
 
-def speaker_names(texts: Iterable[str]) -> frozenset[str]:
+def find_speaker_names(texts: Iterable[str]) -> frozenset[str]:
     """Return the names before a colon at the start of several lines, or of every one of two lines and more."""
     lines = [line for text in texts for line in text.splitlines() if line.strip()]
     found = [match[2] for match in map(SPEAKER.match, lines) if match and match[2] and match[2].istitle()]
@@ -124,24 +124,24 @@ def speaker_names(texts: Iterable[str]) -> frozenset[str]:
     return frozenset(name for name, count in names.items() if in_all or count >= SPEAKER_NAME_LINES)
 
 
-def line_words(text: str, where: str) -> tuple[str, ...]:
+def read_line_words(text: str, where: str) -> tuple[str, ...]:
     """Return the words of one line; ``where``: its place, for messages. Raises InputError: it is too long."""
     if len(text) > LONGEST_LINE:
         raise InputError(f"{where}: a line of {len(text)} characters, required at most {LONGEST_LINE}")
-    return tokens_in(text)
+    return tokenise(text)
 
 
-def timed_words(
+def time_words(
     text: str, start_s: float | None = None, end_s: float | None = None, where: str = "the transcript"
 ) -> list[TimedWord]:
     """Return the words of a line with the times of the whole: several words share them by their letters.
 
-    Raises InputError: as ``line_words``.
+    Raises InputError: as ``read_line_words``.
     """
-    words = line_words(text, where)
+    words = read_line_words(text, where)
     if len(words) < 2 or start_s is None or end_s is None:
         return [TimedWord(word, start_s, end_s) for word in words]
-    said = ["".join(readings(word)[0]) for word in words]
+    said = ["".join(list_readings(word)[0]) for word in words]
     letters, done = sum(map(len, said)), 0
     timed = []
     for word, usual in zip(words, said, strict=True):

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from lipmotion.types import Timeline, Unit
-from lipmotion.units.classes import phone_classes
+from lipmotion.units.classes import list_phone_classes
 from lipmotion.units.lexicon import WEAK_WORDS, Lexicon
 from lipmotion.units.phones import FULL_FORMS, is_silent
 
 REDUCED = frozenset(FULL_FORMS)
 """Vowels, and consonants in the place of a vowel, that are not stressed in a word with a full vowel."""
-NUCLEI = phone_classes()["vowel"] | REDUCED
+NUCLEI = list_phone_classes()["vowel"] | REDUCED
 """The phones that make a syllable."""
 UNSTRESSED_WORDS = WEAK_WORDS | frozenset(
     "am are as at be been by can could did do does had has have he him his i me my or our shall she should so some "
@@ -45,7 +45,7 @@ GLIDES = frozenset("l r w y".split())
 """A sound of ``GLIDES`` begins a syllable together with one of ``LEADS`` before it."""
 
 
-def stress_of(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[int | None, ...]:
+def find_stress(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[int | None, ...]:
     """Return for each unit whether its syllable is stressed: 1 yes, 0 no, None where it is not known.
 
     units   : phones in time, recognised, aligned or given
@@ -62,7 +62,7 @@ def stress_of(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[in
 
     >>> from lipmotion.types import Span
     >>> phones = [Unit(phone, word="again") for phone in "ax g eh n".split()]
-    >>> stress_of(Timeline(tuple(Span(n / 10, (n + 1) / 10, unit) for n, unit in enumerate(phones))))
+    >>> find_stress(Timeline(tuple(Span(n / 10, (n + 1) / 10, unit) for n, unit in enumerate(phones))))
     (0, 1, 1, 1)
     """
     labels = [span.label for span in units]
@@ -73,13 +73,13 @@ def stress_of(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[in
     return tuple(stresses)
 
 
-def stressed_vowel(word: str, vowels: Sequence[str]) -> int | None:
-    """Return the number of the stressed vowel of a word, by the rule of ``stress_of``; None: none is stressed.
+def find_stressed_vowel(word: str, vowels: Sequence[str]) -> int | None:
+    """Return the number of the stressed vowel of a word, by the rule of ``find_stress``; None: none is stressed.
 
     word   : in lower case
     vowels : its vowels and syllabic consonants, in order
 
-    >>> stressed_vowel("television", ["eh", "ax", "ih", "ax"]), stressed_vowel("the", ["ax"])
+    >>> find_stressed_vowel("television", ["eh", "ax", "ih", "ax"]), find_stressed_vowel("the", ["ax"])
     (2, None)
     """
     full = [number for number, vowel in enumerate(vowels) if vowel not in REDUCED]
@@ -125,7 +125,7 @@ def _length_once(word: str, phones: list[str], lexicon: Lexicon) -> int:
 def _stress_of_phones(word: str, phones: Sequence[str]) -> list[int | None]:
     """Return the stress of each phone of a word."""
     nuclei = [place for place, phone in enumerate(phones) if phone in NUCLEI]
-    stressed = stressed_vowel(word, [phones[place] for place in nuclei])
+    stressed = find_stressed_vowel(word, [phones[place] for place in nuclei])
     if not nuclei:
         return [None] * len(phones)
     starts = [0, *(_onset(phones, before, here) for before, here in pairwise(nuclei)), len(phones)]

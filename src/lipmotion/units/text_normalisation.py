@@ -8,9 +8,9 @@ import unicodedata
 from functools import cache
 
 from lipmotion.errors import InputError
-from lipmotion.units.lexicon import SOUNDED, in_dictionary, lengthened
-from lipmotion.units.spelling import normalised_text, plain_text
-from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, readings
+from lipmotion.units.lexicon import SOUNDED, expand_lengthened, in_dictionary
+from lipmotion.units.spelling import normalise_text, plain_text
+from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
 """A Chinese character."""
@@ -28,30 +28,30 @@ SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[
 REFERENCE = re.compile(r"&(?:[a-zA-Z]{2,8}|#\d{1,6}|#x[\da-fA-F]{1,5});")
 
 
-def words_of(text: str) -> tuple[str, ...]:
+def split_words(text: str) -> tuple[str, ...]:
     """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money as they are said.
 
     Of what may be said in several ways, the usual one. Raises InputError: there is no word in it.
     """
-    return tuple(word for token in checked_tokens(text) for word in readings(token)[0])
+    return tuple(word for token in require_tokens(text) for word in list_readings(token)[0])
 
 
-def words_in(text: str) -> tuple[str, ...]:
-    """Return the words of a text as ``words_of`` does; none where there is none."""
-    return tuple(word for token in tokens_in(text) for word in readings(token)[0])
+def find_words(text: str) -> tuple[str, ...]:
+    """Return the words of a text as ``split_words`` does; none where there is none."""
+    return tuple(word for token in tokenise(text) for word in list_readings(token)[0])
 
 
-def checked_tokens(text: str) -> tuple[str, ...]:
-    """Return the words of a text as ``tokens_in`` does. Raises InputError: there is no word in it."""
-    return _some(tokens_in(text), text)
+def require_tokens(text: str) -> tuple[str, ...]:
+    """Return the words of a text as ``tokenise`` does. Raises InputError: there is no word in it."""
+    return _some(tokenise(text), text)
 
 
-def tokens_in(text: str) -> tuple[str, ...]:
+def tokenise(text: str) -> tuple[str, ...]:
     """Return the words of a text in lower case, and what is said as other words as it is written.
 
     A lexicon pronounces these in all their readings (``units.written_forms``).
 
-    >>> tokens_in("Dr. Brown met Henry VIII at 5:00, in May 1995!")
+    >>> tokenise("Dr. Brown met Henry VIII at 5:00, in May 1995!")
     ('Dr.', 'brown', 'met', 'Henry VIII', 'at', '5:00', 'in', 'may', '1995')
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda found: html.unescape(found[0]), text))
@@ -62,7 +62,7 @@ def tokens_in(text: str) -> tuple[str, ...]:
     for token in (found[0] for found in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
         is_short = not shouted and INITIALS.fullmatch(token) and not in_dictionary(token.lower())
-        is_short = is_short and not (lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
+        is_short = is_short and not (expand_lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
         tokens.append(token.lower() if is_word and not is_short else token)
     return tuple(tokens)
 
@@ -80,13 +80,13 @@ def _scanner() -> re.Pattern[str]:
     return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)
 
 
-def written_words(text: str) -> tuple[str, ...]:
+def split_written_words(text: str) -> tuple[str, ...]:
     """Return the lower-case words of a text in any language, as they are written: numbers in digits.
 
     A Chinese character is a word of its own, as no blanks divide them.
     Raises InputError: there is no word in it.
     """
-    spaced = re.sub(CHINESE, r" \g<0> ", normalised_text(text))
+    spaced = re.sub(CHINESE, r" \g<0> ", normalise_text(text))
     kept = "".join(letter if letter == "'" or unicodedata.category(letter)[0] in "LMN" else " " for letter in spaced)
     return _some(tuple(word.strip("'") for word in kept.split() if word.strip("'")), text)
 

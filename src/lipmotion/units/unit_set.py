@@ -10,8 +10,8 @@ from pathlib import Path
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Unit
-from lipmotion.units.classes import phone_classes
-from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone_message
+from lipmotion.units.classes import list_phone_classes
+from lipmotion.units.phones import PHONES, SILENCE, describe_unknown_phone, is_silent
 
 LARGEST_TABLE_BYTES = 1 << 18
 """The most bytes of a table file; one of 47 phones has a few hundred."""
@@ -76,7 +76,7 @@ class UnitSet:
     def unit(self, phone: str) -> str:
         """Return the unit of a phone. Raises InputError: it is not in the inventory."""
         if phone not in self.unit_of_phone:
-            raise InputError(unknown_phone_message(phone))
+            raise InputError(describe_unknown_phone(phone))
         return self.unit_of_phone[phone]
 
     def unit_of(self, label: Unit) -> str:
@@ -111,11 +111,11 @@ class UnitSet:
         """Return the sets of units that decision trees may ask about, by name, each set once.
 
         A class of phones becomes the set of the units all of whose phones are in the class; every unit alone is a set,
-        too. Sets of no unit or of all units are left out. Where every phone is a unit these are ``phone_classes``.
+        too. Sets of no unit or of all units are left out. Where every phone is a unit these are ``list_phone_classes``.
         """
         members = {unit: frozenset(self.phones(unit)) for unit in self.units}
         names: dict[frozenset[str], str] = {}
-        for name, phones in phone_classes().items():
+        for name, phones in list_phone_classes().items():
             inside = frozenset(unit for unit in self.units if members[unit] <= phones)
             if 1 < len(inside) < len(self.units):
                 names.setdefault(inside, f"class {name}" if name in self.units else name)

@@ -114,7 +114,7 @@ VISEME_SET = UnitSet("viseme", VISEME_OF)
 """The 13 visemes of Xie & Liu 2007, Table 1; not one of the five."""
 
 
-def unit_set(name_or_path: str | Path) -> UnitSet:
+def load_unit_set(name_or_path: str | Path) -> UnitSet:
     """Return a unit set of the papers by its name, or read one from a table file (docs/unit-sets.md).
 
     Raises InputError: neither a name nor a file, or a table that is wrong (with its line).

@@ -10,14 +10,14 @@ from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units.lexicon import Lexicon, Pronunciation
 
 
-def words_in_time(units: Timeline[Unit]) -> Timeline[str]:
+def group_words(units: Timeline[Unit]) -> Timeline[str]:
     """Return the words of phones in time; phones without a word, silence among them, are spans of the empty text.
 
     Neighbours of the same word are one word, unless one is known to begin it ``again``, or their phones are those of
     the word said several times: ``b ih g b ih g`` is ``big big``, while ``t uw t uw`` is one ``tutu``.
 
     >>> big = [Span(n / 10, (n + 1) / 10, Unit(phone, word="big")) for n, phone in enumerate("b ih g b ih g".split())]
-    >>> [word.label for word in words_in_time(Timeline(tuple(big)))]
+    >>> [word.label for word in group_words(Timeline(tuple(big)))]
     ['big', 'big']
     """
     found = []

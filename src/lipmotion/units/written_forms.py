@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Iterator
 from functools import cache
 
-from lipmotion.units.spelling import table
+from lipmotion.units.spelling import parse_table
 
 Reading = tuple[str, ...]
 Forms = tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...]
@@ -25,16 +25,16 @@ SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hun
 MONTHS = "january february march april may june july august september october november december".split()
 
 
-ORDINALS = table("one=first two=second three=third five=fifth eight=eighth nine=ninth twelve=twelfth")
+ORDINALS = parse_table("one=first two=second three=third five=fifth eight=eighth nine=ninth twelve=twelfth")
 """The ordinals that do not end in ``th`` after the cardinal."""
-CURRENCIES = table(
+CURRENCIES = parse_table(
     "$=dollars_cents_bucks £=pounds_pence_quid €=euros_cents_euro ¥=yen_sen_yen ₹=rupees_paise_rupees ₩=won_jeon_won "
     "¢=cents_cents_cents"
 )
 """Many of each, of its parts, and how it is also called."""
 MAGNITUDES = {"h": "hundred", "k": "thousand", "m": "million", "b": "billion", "t": "trillion"}
 """By the first letter, which the whole names begin with, too: ``mn``, ``bn``, ``million``."""
-UNITS = table(
+UNITS = parse_table(
     "km=kilometers cm=centimeters mm=millimeters m=meters kg=kilograms mg=milligrams g=grams lb=pounds lbs=pounds "
     "oz=ounces km/h=kilometers_per_hour kph=kilometers_per_hour m/s=meters_per_second mi=miles yd=yards ft=feet "
     "in=inches ml=milliliters l=liters hz=hertz khz=kilohertz mhz=megahertz ghz=gigahertz kb=kilobytes tb=terabytes "
@@ -42,7 +42,7 @@ UNITS = table(
     "secs=seconds min=minutes mins=minutes hr=hours hrs=hours h=hours yrs=years px=pixels fps=frames_per_second "
     "db=decibels °=degrees mph=miles_per_hour %=percent"
 )
-ABBREVIATIONS = table(
+ABBREVIATIONS = parse_table(
     "Dr=doctor|drive Mr=mister Mrs=missus Ms=miz Prof=professor Gov=governor Sen=senator Rep=representative "
     "Gen=general Col=colonel Lt=lieutenant Sgt=sergeant Capt=captain Rev=reverend Hon=honorable Mt=mount Ft=fort "
     "jr=junior sr=senior vs=versus|v_s etc=et_cetera e.g=for_example|e_g i.e=that_is|i_e a.k.a=a_k_a|also_known_as "
@@ -51,7 +51,7 @@ ABBREVIATIONS = table(
     "dec=december tues=tuesday thurs=thursday"
 )
 """Without the full stop; those with a capital stand before a name."""
-SIGNS = table(
+SIGNS = parse_table(
     "&=and @=at +=plus|and ×=times|by ÷=divided_by #=hashtag|number|hash ~=about -=minus|negative −=minus|negative "
     "–=to w/=with w/o=without .=dot /=slash _=underscore :=colon"
 ) | {"=": "equals"}
@@ -60,7 +60,7 @@ PARTS = "War|Part|Chapter|Act|Scene|Volume|Book|Episode|Section|Phase|Type|Level
 """What is counted by cardinals: ``Chapter IV``, but ``Henry VIII``."""
 
 
-def number_words(digits: str) -> list[str]:
+def spell_number(digits: str) -> list[str]:
     """Return the words of a whole number; from a trillion on, or with leading zeros, digit by digit."""
     if len(digits) > 12 or (len(digits) > 1 and digits[0] == "0"):
         return [ONES[int(digit)] for digit in digits]
@@ -70,11 +70,11 @@ def number_words(digits: str) -> list[str]:
     if number < 100:
         return [TENS[number // 10], *([ONES[number % 10]] if number % 10 else [])]
     scale, name = next((scale, name) for scale, name in SCALES if number >= scale)
-    rest = number_words(str(number % scale)) if number % scale else []
-    return [*number_words(str(number // scale)), name, *rest]
+    rest = spell_number(str(number % scale)) if number % scale else []
+    return [*spell_number(str(number // scale)), name, *rest]
 
 
-def ordinal_word(word: str) -> str:
+def spell_ordinal(word: str) -> str:
     """Return the ordinal of the last word of a number: ``third`` of ``three``, ``twentieth`` of ``twenty``."""
     if word in ORDINALS:
         return ORDINALS[word]
@@ -82,10 +82,10 @@ def ordinal_word(word: str) -> str:
 
 
 @cache
-def readings(token: str) -> tuple[Reading, ...]:
+def list_readings(token: str) -> tuple[Reading, ...]:
     """Return the readings of a written form, the usual one first; of any other word, the word in lower case.
 
-    >>> readings("1995")[:2]
+    >>> list_readings("1995")[:2]
     (('nineteen', 'ninety', 'five'), ('one', 'thousand', 'nine', 'hundred', 'ninety', 'five'))
     """
     found = {tuple(_COUNTED.sub(_singular, each).split()): None for each in _readings(token)}
@@ -107,7 +107,7 @@ def _readings(token: str) -> Iterator[str]:
     parts = ["", *map(_FormPart, match.groups(""))]
     for template in said.split("|"):
         each = re.search(r"{(\d):\*}", template)
-        for reading in map(" ".join, readings(parts[int(each[1])])) if each else ("",):
+        for reading in map(" ".join, list_readings(parts[int(each[1])])) if each else ("",):
             yield (template.replace(each[0], reading) if each else template).format(*parts)
 
 
@@ -157,7 +157,7 @@ def _decimal(digits: str) -> Iterator[str]:
 
 
 def _cardinal(digits: str) -> str:
-    return " ".join(number_words(digits.replace(",", "")))
+    return " ".join(spell_number(digits.replace(",", "")))
 
 
 def _plain(digits: str) -> str:
@@ -169,8 +169,8 @@ def _spelled(digits: str, zero: str = "zero") -> str:
 
 
 def _ordinal(digits: str) -> str:
-    *before, last = number_words(digits.replace(",", "").lstrip("0"))
-    return " ".join((*before, ordinal_word(last)))
+    *before, last = spell_number(digits.replace(",", "").lstrip("0"))
+    return " ".join((*before, spell_ordinal(last)))
 
 
 def _pair(digits: str) -> str:
@@ -211,7 +211,7 @@ def _hundreds(digits: str) -> str:
 
 
 def _usual(text: str) -> str:
-    return " ".join(readings(text)[0])
+    return " ".join(list_readings(text)[0])
 
 
 def _decade(digits: str) -> str:
@@ -404,4 +404,4 @@ else may stand there is in ``SAID``.
 
 def _singular(found: re.Match[str]) -> str:
     name = found[2]
-    return found[1] + (table("pence=penny feet=foot inches=inch").get(name) or name.removesuffix("s"))
+    return found[1] + (parse_table("pence=penny feet=foot inches=inch").get(name) or name.removesuffix("s"))

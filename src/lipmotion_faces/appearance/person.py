@@ -18,13 +18,13 @@ from lipmotion.motion.eigenlips import (
     COLOURS,
     COMPONENTS,
     Eigenlips,
-    eigenlips_arrays,
     eigenlips_from_arrays,
+    eigenlips_to_arrays,
     fit_eigenlips,
 )
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.coded_video import decode_pictures, encode_pictures
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
@@ -259,7 +259,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     """
     pictures, light, reference = _equalise_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
-    training = evenly_spaced(TRAINING_PICTURES, len(pictures))
+    training = choose_evenly(TRAINING_PICTURES, len(pictures))
     mouth = fit_eigenlips(mouths[training], COMPONENTS)
     codes = mouth.project(mouths)
     around = pictures[training].mean(axis=0, dtype=np.float32)
@@ -379,8 +379,8 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
     Pictures are coded (``storage.coded_video``), which changes them by about one grey level.
     """
     parts = {
-        "mouth": eigenlips_arrays(appearance.mouth),
-        "jaw": eigenlips_arrays(appearance.jaw),
+        "mouth": eigenlips_to_arrays(appearance.mouth),
+        "jaw": eigenlips_to_arrays(appearance.jaw),
         "from_motion": motion_map_arrays(appearance.from_motion),
         "noise": camera_noise_arrays(appearance.noise),
     }

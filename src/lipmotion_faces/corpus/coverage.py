@@ -15,7 +15,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
 from lipmotion.pipeline.training.phone_sequences import pronounced_sentences, recorded_phones
 from lipmotion.printable import printable
-from lipmotion.units import PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, Lexicon, most_similar_lips
+from lipmotion.units import PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, Lexicon, find_similar_lips
 from lipmotion.units.classes import CLASSES
 
 KINDS = ("phones", "diphones", "triphones")
@@ -88,7 +88,7 @@ def coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon: Lexicon
     corpus  : its labelled phones count, else the phones of its words (the first pronunciation of each)
     text    : a file with a sentence a line; None: the list in the package
     lexicon : pronunciations of words, ahead of those of the dictionary
-    For a phone, the nearest one is that of ``most_similar_lips``, which the engines take; for sequences it is the one
+    For a phone, the nearest one is that of ``find_similar_lips``, which the engines take; for sequences it is the one
     with the least sum of distances of phones (``phone_distances``), the most recorded one of several.
     Raises InputError: no such file, or no sentence that can be used. Raises CorpusError: no utterance has words or
     phones.
@@ -176,7 +176,7 @@ def _find_nearest(missing: Sequence[Phones], recorded: Counter[Phones]) -> list[
     """Return for each sequence the nearest one that is recorded."""
     if missing and len(missing[0]) == 1:
         known = {phone for (phone,) in recorded}
-        return [(most_similar_lips(phone, known),) for (phone,) in missing]
+        return [(find_similar_lips(phone, known),) for (phone,) in missing]
     number = {phone: n for n, phone in enumerate(PHONES)}
     candidates = sorted(recorded, key=lambda unit: (-recorded[unit], unit))  # of equal distance, the most recorded
     columns = np.array([[number[phone] for phone in unit] for unit in candidates])

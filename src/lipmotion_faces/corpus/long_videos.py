@@ -23,7 +23,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
-from lipmotion.units.written_forms import readings
+from lipmotion.units.written_forms import list_readings
 from lipmotion_faces.corpus.supplied import align_sound, separate_sound
 from lipmotion_faces.tracking.video_scan import VideoScan, scan_video
 
@@ -211,7 +211,7 @@ def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
     parts: list[SpokenPart] = []
     for n, line in enumerate(transcript.lines):
         words = [
-            SpokenPart(word.start_s, word.end_s, readings(word.word)[0])
+            SpokenPart(word.start_s, word.end_s, list_readings(word.word)[0])
             for word in line.words
             if word.start_s is not None and word.end_s is not None and word.end_s > word.start_s
         ]
@@ -221,7 +221,7 @@ def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
             following_s = next((start_s for start_s in starts_s[n + 1 :] if start_s is not None), None)
             end_s = following_s if line.end_s is None else line.end_s
             if line.start_s is not None and end_s is not None and end_s > line.start_s and line.words:
-                text = tuple(spoken for word in line.words for spoken in readings(word.word)[0])
+                text = tuple(spoken for word in line.words for spoken in list_readings(word.word)[0])
                 parts.append(SpokenPart(line.start_s, end_s, text))
     return parts
 

@@ -12,7 +12,7 @@ from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.offset import Offset, best_offset, pooled_offset, shift_scores
-from lipmotion.motion.resample import to_model_frames
+from lipmotion.motion.resample import resample_to_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.lip_speed import measured_opening_speed, predicted_opening_speed
 from lipmotion.speech.features.mfcc import WINDOW
@@ -72,7 +72,7 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
     """Return the agreement of sound and motion at every shift of up to ``REACH_S`` seconds [shape=(81,)]."""
     motion = utterance.track.motion
     predicted = predicted_opening_speed(utterance.features)
-    opening, valid = to_model_frames(
+    opening, valid = resample_to_model(
         np.asarray(motion[OPENING], float)[:, None],
         np.asarray(utterance.track.seen),
         motion.rate_hz,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.coded_video import encode_video
 from lipmotion.storage.frame_groups import FrameGroups
 from lipmotion_faces.appearance.looping import (
@@ -166,7 +166,7 @@ def choose_parts(footages: Sequence[Footage]) -> list[_Part]:
     parts = [part for part in parts if (part[0].size, part[0].rate_hz) == most_common]
     least_s = COMPARED_SHARE * min(SHORT_S, max(map(_duration_s, parts)))
     parts = [part for part in parts if _duration_s(part) >= least_s]
-    return [parts[number] for number in evenly_spaced(MOST_PARTS, len(parts))]
+    return [parts[number] for number in choose_evenly(MOST_PARTS, len(parts))]
 
 
 def _spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:

@@ -21,7 +21,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
@@ -102,7 +102,7 @@ def _select_evenly(takes: Sequence[Take]) -> list[Take]:
 
     A take that cannot be read may be among them: where it is tracked, the reason is reported.
     """
-    durations_s = [_duration_s(takes[index]) for index in evenly_spaced(MOST_MEASURED_RECORDINGS, len(takes))]
+    durations_s = [_duration_s(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
     longest_s = left_s = MOST_FOOTAGE_S
     for number, duration_s in enumerate(sorted(durations_s)):
         share_s = left_s / (len(durations_s) - number)
@@ -111,7 +111,7 @@ def _select_evenly(takes: Sequence[Take]) -> list[Take]:
             break
         left_s -= duration_s
     mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
-    chosen = evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
+    chosen = choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
     used = [takes[index] for index in chosen]
     if max(durations_s) <= longest_s:
         return used

@@ -7,14 +7,14 @@ from dataclasses import asdict
 from typing import Any, Protocol
 
 import numpy as np
+from lipmotion.measures.bootstrap import bootstrap_interval
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closure_figures, phone_closures
-from lipmotion.measures.curves import bootstrap_interval
-from lipmotion.motion.rest import away_from_speech
+from lipmotion.motion.rest import is_away_from_speech
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.json_text import nan_as_null
@@ -130,7 +130,11 @@ def _silence(clips: Sequence[ComparedClip], values: curves.Clips) -> dict[str, f
     """Return mean and standard deviation of the opening in silence away from speech, and the number of its frames."""
     quiet = np.concatenate(
         [
-            v[away_from_speech(clip.time_s, [(start_s, end_s) for start_s, end_s, _ in clip.spoken], SILENCE_MARGIN_S)]
+            v[
+                is_away_from_speech(
+                    clip.time_s, [(start_s, end_s) for start_s, end_s, _ in clip.spoken], SILENCE_MARGIN_S
+                )
+            ]
             for clip, v in zip(clips, values, strict=True)
         ]
     )

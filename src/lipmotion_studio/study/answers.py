@@ -11,7 +11,7 @@ from pathlib import Path
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.text_table import as_field, from_field
-from lipmotion.types.values import number_of, whole_of
+from lipmotion.types.values import parse_number, parse_whole
 
 PAIRED, MOS, RANKING = "paired", "mos", "ranking"
 KINDS = (PAIRED, MOS, RANKING)
@@ -115,10 +115,10 @@ def read_answers(path: Path) -> list[Answer]:
                         name: from_field(row[name])
                         for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")
                     },
-                    trial=whole_of(row["trial"], "trial is"),
-                    seconds=number_of(row["seconds"], "seconds is"),
-                    plays=whole_of(row["plays"], "plays is"),
-                    practice=bool(whole_of(row["practice"], "practice is")),
+                    trial=parse_whole(row["trial"], "trial is"),
+                    seconds=parse_number(row["seconds"], "seconds is"),
+                    plays=parse_whole(row["plays"], "plays is"),
+                    practice=bool(parse_whole(row["practice"], "practice is")),
                     expected=row["expected"],
                 )
             )

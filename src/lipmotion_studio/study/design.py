@@ -22,7 +22,7 @@ from lipmotion_studio.study.sources import (
     condition_of,
     encode_shown,
     named_conditions,
-    sentences_of,
+    read_sentences,
 )
 from lipmotion_studio.study.trials import (
     anchor_trials,
@@ -59,7 +59,7 @@ def design_study(
         raise InputError(f"a study of the kind {kind!r}, required one of {', '.join(KINDS)}")
     if output.exists():
         raise ExportError(f"{output}: exists; give the name of a new folder")
-    sources, spoken = named_conditions(conditions), sentences_of(sentences)
+    sources, spoken = named_conditions(conditions), read_sentences(sentences)
     drawn = Job(Request(recogniser=settings.recogniser), Outputs(face=settings.face, fps=settings.fps))
     makers = {name: condition_of(source, spoken, drawn) for name, source in sources.items()}
     base = RECORDING if RECORDING in sources else next(iter(sources))

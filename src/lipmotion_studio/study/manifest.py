@@ -10,7 +10,7 @@ from pathlib import Path
 from lipmotion.errors import InputError
 from lipmotion.storage.files import read_text_file, sha256_of
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.types.values import any_members, items, number, text, truth, tupled, value_of, whole
+from lipmotion.types.values import any_members, as_tuple, items, number, text, truth, value_of, whole
 from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, is_possible
 from lipmotion_studio.study.settings import SCALES
 
@@ -146,16 +146,16 @@ def check_videos(study: Study, folder: Path) -> dict[str, Path]:
     return paths
 
 
-_TEXT, _NUMBERS = text(1 << 20), tupled(items(whole(0, 1 << 31)))
+_TEXT, _NUMBERS = text(1 << 20), as_tuple(items(whole(0, 1 << 31)))
 _VIDEO = {"seconds": number(0, 1e6), "made": any_members(_TEXT)} | dict.fromkeys(
     ("file", "sentence", "condition", "sha256"), _TEXT
 )
 _TRIAL = {"videos": _NUMBERS, "practice": truth, "expected": _TEXT, "note": _TEXT}
 _MEMBERS = {
     **dict.fromkeys(("kind", "title", "consent", "instructions"), _TEXT),
-    **{"scales": tupled(items(_TEXT)), "seed": whole(-(1 << 63), 1 << 63), "conditions": any_members(_TEXT)},
+    **{"scales": as_tuple(items(_TEXT)), "seed": whole(-(1 << 63), 1 << 63), "conditions": any_members(_TEXT)},
     **{"sentences": any_members(any_members(_TEXT)), "made_by": any_members(_TEXT)},
-    "videos": tupled(items(value_of(StudyVideo, _VIDEO, _VIDEO))),
-    "trials": tupled(items(value_of(StudyTrial, _TRIAL, ("videos",)))),
+    "videos": as_tuple(items(value_of(StudyVideo, _VIDEO, _VIDEO))),
+    "trials": as_tuple(items(value_of(StudyTrial, _TRIAL, ("videos",)))),
 }
 _STUDY = value_of(Study, _MEMBERS, _MEMBERS)

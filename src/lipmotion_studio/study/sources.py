@@ -54,7 +54,7 @@ Condition = Callable[[StudySentence, Path], MadeVideo]
 """Gives the video of a sentence; where it has to be made, as the file of the path."""
 
 
-def sentences_of(given: Sequence[Path]) -> list[StudySentence]:
+def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
     """Return the sentences of files and folders of recordings, by the names of the files without suffix.
 
     Raises InputError: none, two of one name, or a folder without recordings.

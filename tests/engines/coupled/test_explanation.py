@@ -152,7 +152,7 @@ def test_shares_of_regressions_are_posteriors_of_the_visual_chain():
 
 def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
     model, inference = fitted("ph-vi-CHMM")
-    assert model.away_from_speech(inference.posteriors.chains[0])[5]
+    assert model.is_away_from_speech(inference.posteriors.chains[0])[5]
     (found,) = explanation("ph-vi-CHMM", 5).regressions
     assert found.shares == (NamedProbability("rest", 1.0),)
     assert found.channels["opening"].value == pytest.approx(model.rest_pose[0])

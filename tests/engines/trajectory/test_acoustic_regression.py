@@ -8,8 +8,8 @@ import pytest
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
-from lipmotion.motion.frame_labels import full_context_states
-from lipmotion.stats.tree_regression import fit_tree_regressions, regression_node, ridge, zero_statistics
+from lipmotion.motion.frame_labels import label_full_context
+from lipmotion.stats.tree_regression import fit_regression_node, fit_tree_regressions, ridge, zero_statistics
 from lipmotion.stats.trees import Question, Tree
 from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor
@@ -53,8 +53,8 @@ def test_the_owner_is_the_last_node_with_enough_frames():
     tree = small_tree()
     paths = [tree.path_to(leaf) for leaf in (1, 3, 4)]
     assert paths == [[0, 1], [0, 2, 3], [0, 2, 4]]
-    assert [regression_node(tree, path, 45) for path in paths] == [0, 3, 2]
-    assert [regression_node(tree, path, 1000) for path in paths] == [0, 0, 0]
+    assert [fit_regression_node(tree, path, 45) for path in paths] == [0, 3, 2]
+    assert [fit_regression_node(tree, path, 1000) for path in paths] == [0, 0, 0]
 
 
 def test_each_node_is_drawn_towards_the_one_above():
@@ -110,7 +110,7 @@ def error(model, corpus):
         rows = np.array(
             [
                 model.emission.row(p, OPTIONS.layout)
-                for p in full_context_states(one.speech.units, len(one.valid), OPTIONS.layout)
+                for p in label_full_context(one.speech.units, len(one.valid), OPTIONS.layout)
             ]
         )
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))

@@ -5,7 +5,7 @@ import pytest
 
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit_trajectory
-from lipmotion.motion.frame_labels import FullContextState, full_context_states
+from lipmotion.motion.frame_labels import FullContextState, label_full_context
 from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor
 
@@ -22,7 +22,7 @@ def frames_by_density(corpus, emission):
     found: dict[int, list[list[float]]] = {}
     for example in corpus:
         x = example.motion["opening"]
-        for t, state in list(enumerate(full_context_states(example.speech.units, len(x), LAYOUT)))[1:-1]:
+        for t, state in list(enumerate(label_full_context(example.speech.units, len(x), LAYOUT)))[1:-1]:
             row = [x[t], (x[t + 1] - x[t - 1]) / 2, x[t + 1] - 2 * x[t] + x[t - 1]]
             found.setdefault(emission.row(state, LAYOUT), []).append(row)
     return {density: np.array(rows) for density, rows in found.items()}
@@ -67,7 +67,7 @@ def test_a_channel_that_never_moves_keeps_a_variance():
         example.motion.values[:, 1] = 0.0
     emission = fit(corpus, acoustic_regression=True, acoustic_components=20).emission
     assert (emission.variances >= LEAST_VARIANCE / 1e4).all()
-    rows = np.array([emission.row(state, LAYOUT) for state in full_context_states(corpus[0].speech.units, 99, LAYOUT)])
+    rows = np.array([emission.row(state, LAYOUT) for state in label_full_context(corpus[0].speech.units, 99, LAYOUT)])
     for statistic in emission.statistics(rows, corpus[0].speech.features.values, slice(0, 99)):
         assert np.isfinite(statistic).all()
 

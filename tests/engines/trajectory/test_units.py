@@ -8,12 +8,12 @@ import pytest
 
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.closure import closable_ranges
-from lipmotion.motion.frame_labels import StateLayout, full_context_states
+from lipmotion.motion.closure import find_closable_ranges
+from lipmotion.motion.frame_labels import StateLayout, label_full_context
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
-from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set
+from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, load_unit_set
 
 PLAIN = {"articulation": False, "acoustic_regression": False, "silent_states": 7}
 SPOKEN = speech(timeline(("t", "aa", "p", "iy", "zh", "m", "uw", "sp", "s", "aa")))
@@ -53,14 +53,14 @@ def test_phones_by_another_name_move_the_same_to_the_bit(tmp_path, acoustic_regr
 @named
 def test_trees_ask_about_units_of_the_set(name):
     _, model = trained(name)
-    classes = set(unit_set(name).classes().values())
+    classes = set(load_unit_set(name).classes().values())
     for tree in model.emission.forest.values():
         assert {question.members for question in tree.questions} == classes
 
 
 @named
 def test_the_timeline_names_units_in_context(name):
-    units = unit_set(name)
+    units = load_unit_set(name)
     phones = ["sil", *(span.label.phone for span in SPOKEN.units), "sil"]
     of = [units.unit_of_phone[phone] for phone in phones]
     wanted = [f"{left}-{unit}+{right}" for left, unit, right in zip(of, of[1:], of[2:], strict=False)]
@@ -73,7 +73,7 @@ def test_the_timeline_names_units_in_context(name):
 def test_phones_of_one_unit_move_alike():
     for name in [name for name in UNIT_SETS if name != "phone"]:
         engine, model = trained(name)
-        units = unit_set(name)
+        units = load_unit_set(name)
         for one, two in (("t", "d"), ("iy", "ih"), ("aa", "ah"), ("f", "v")):
             assert units.unit_of_phone[one] == units.unit_of_phone[two]
             pair = [engine.generate(model, speech(timeline(("s", phone, "s")))).motion.values for phone in (one, two)]
@@ -83,15 +83,15 @@ def test_phones_of_one_unit_move_alike():
 @named
 def test_lips_meet_on_p_b_m_whatever_their_unit(name):
     result, (_, model) = generated(name), trained(name)
-    spans = closable_ranges(SPOKEN.units, len(result.motion.values))
+    spans = find_closable_ranges(SPOKEN.units, len(result.motion.values))
     assert len(spans) == sum(span.label.phone in LIP_CLOSING for span in SPOKEN.units) == 2
     for span in spans:
         assert result.motion["opening"][span].min() <= model.closure.closed + 1e-9
 
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
-    layout = StateLayout(3, 7, 0.1, unit_set("2vis"))
-    states = full_context_states(timeline(("p", "aa")), 141, layout)
+    layout = StateLayout(3, 7, 0.1, load_unit_set("2vis"))
+    states = label_full_context(timeline(("p", "aa")), 141, layout)
     assert {state.unit for state in states} == {"open", "closed"}
     assert {layout.name(state) for state in states if state != layout.rest} == {"speech.0", "speech.1", "speech.2"}
     assert states[0] == states[-1] == layout.rest
@@ -100,8 +100,8 @@ def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
 
 def test_lips_that_meet_between_others_do_not_rest():
     """All three are units of silence, too, and the part may have the number of silence's middle one."""
-    layout = StateLayout(5, 5, 0.1, unit_set("2vis"))
-    assert layout.rest not in full_context_states(timeline(("p", "b", "m")), 150, layout)[60:90]
+    layout = StateLayout(5, 5, 0.1, load_unit_set("2vis"))
+    assert layout.rest not in label_full_context(timeline(("p", "b", "m")), 150, layout)[60:90]
 
 
 def table_model(folder: Path) -> tuple[Engine, dict]:

@@ -3,10 +3,10 @@ import pytest
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.multistream.align import align, measured_durations
+from lipmotion.hmm.multistream.align import align, measure_durations
 from lipmotion.hmm.multistream.multistream_training import train_joint
 from lipmotion.hmm.multistream.streams import StreamWeights
-from lipmotion.hmm.multistream.unit_states import triphone_states
+from lipmotion.hmm.multistream.unit_states import expand_triphones
 from oracles import joint as slow
 from oracles.sequences import segmentations
 
@@ -15,7 +15,7 @@ WEIGHTS = StreamWeights(1, 0.5, 0.2, 1, 0.7)
 
 def slow_scores(hmm, data, units, weights):
     """Give the score (emissions and transitions) and the durations of every segmentation."""
-    states = triphone_states(hmm.inventory, units)
+    states = expand_triphones(hmm.inventory, units)
     density = np.array(
         [[slow.log_density(hmm, data, state, t, weights) for state in states.triphones] for t in range(data.frames)]
     )
@@ -60,7 +60,7 @@ def test_short_units_have_some_of_their_states():
 def test_durations_are_those_of_the_alignment():
     data = utterances(12)
     hmm = train_joint(data, inventory(), CLASSES, config(mixtures=1))
-    durations = measured_durations(hmm, [(u.observed, u.units) for u in data])
+    durations = measure_durations(hmm, [(u.observed, u.units) for u in data])
     assert np.array_equal(durations, hmm.durations)
     rows = [hmm.inventory.monophones["a", state] for state in range(3)]
     assert 6 <= durations[rows, 0].sum() <= 12

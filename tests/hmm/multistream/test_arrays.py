@@ -4,28 +4,28 @@ import pytest
 from hmm.multistream.synthetic import observed, random_joint
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.multistream.align import align
-from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
-from lipmotion.hmm.multistream.generate import densities_of_path, generate
+from lipmotion.hmm.multistream.generate import select_densities, solve_trajectory
+from lipmotion.hmm.multistream.model import joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 
 HMM = random_joint(1, ("a", "b", "c"))
 
 
 def test_a_model_comes_back_as_it_was():
-    arrays = joint_arrays(HMM, np.float32)
+    arrays = joint_to_arrays(HMM, np.float32)
     again = joint_from_arrays(arrays, HMM.config)
     data = observed(np.random.default_rng(2), 30)
     assert JointRecogniser(again).recognise(data) == JointRecogniser(HMM).recognise(data)
-    found, wanted = (generate(densities_of_path(m, align(m, data, ("sil", "a", "sil")))) for m in (again, HMM))
+    found, wanted = (solve_trajectory(select_densities(m, align(m, data, ("sil", "a", "sil")))) for m in (again, HMM))
     assert np.array_equal(found.values, wanted.values)
-    for key, array in joint_arrays(again, np.float32).items():
+    for key, array in joint_to_arrays(again, np.float32).items():
         assert array.dtype == arrays[key].dtype
         assert np.array_equal(array, arrays[key]), key
     assert again.text() == HMM.text()
 
 
 def changed(**changes):
-    arrays = joint_arrays(HMM)
+    arrays = joint_to_arrays(HMM)
     for key, change in changes.items():
         name = key.replace("__", "/")
         if change is None:
@@ -44,7 +44,7 @@ def put(value, where=(0,)):
 
 
 DAMAGED = [
-    *({name.replace("/", "__"): None} for name in sorted(joint_arrays(HMM))[::3]),
+    *({name.replace("/", "__"): None} for name in sorted(joint_to_arrays(HMM))[::3]),
     {"log_stay": lambda a: a[:-1]},
     {"log_stay": put(0.0)},
     {"log_stay": put(np.nan)},
@@ -79,4 +79,4 @@ def test_damaged_arrays_are_refused():
         with pytest.raises(ModelFormatError, match="damaged"):
             joint_from_arrays(changed(**changes), HMM.config)
     with pytest.raises(ModelFormatError):
-        joint_from_arrays(joint_arrays(HMM), random_joint(1, states=2).config)
+        joint_from_arrays(joint_to_arrays(HMM), random_joint(1, states=2).config)

@@ -7,7 +7,7 @@ from lipmotion.hmm.multistream.densities import (
     StreamScale,
     TiedDensities,
     fit_scale,
-    standard_normal_densities,
+    make_standard_normals,
 )
 from lipmotion.hmm.multistream.streams import STREAMS, Stream, StreamWeights
 from lipmotion.stats.mixture import Mixtures
@@ -63,14 +63,14 @@ def sums_of(values, share):
 
 def test_one_gaussian_takes_the_mean_and_variance_of_its_frames():
     values, share = np.random.default_rng(0).normal(1, 2, (50, 3)), np.random.default_rng(1).random(50)
-    better = standard_normal_densities(1, 3, False).reestimated(sums_of(values, share), 1e-3).mixtures
+    better = make_standard_normals(1, 3, False).reestimate(sums_of(values, share), 1e-3).mixtures
     mean = np.average(values, axis=0, weights=share)
     assert better.means[0, 0] == pytest.approx(mean, abs=1e-5)
     assert better.variances[0, 0] == pytest.approx(np.average((values - mean) ** 2, axis=0, weights=share), rel=1e-4)
 
 
 def test_variances_have_a_floor_and_voicing_is_never_certain():
-    after = standard_normal_densities(1, 2, True).reestimated(sums_of(np.ones((50, 2)), np.ones(50)), 0.02)
+    after = make_standard_normals(1, 2, True).reestimate(sums_of(np.ones((50, 2)), np.ones(50)), 0.02)
     assert after.mixtures.variances[0, 0] == pytest.approx([0.02, 0.02])
     assert 0 < after.voiced[0] < 1
 

@@ -6,9 +6,9 @@ import pytest
 from hmm.multistream.synthetic import CLASSES, NAMES, inventory, random_joint
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import GaussianStatistics
-from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest, positions_asked, unit_forest
+from lipmotion.hmm.multistream.forest import TreeCosts, choose_positions, context_questions, grow_forest, unit_forest
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS
-from lipmotion.hmm.multistream.unit_states import Inventory, triphone_states
+from lipmotion.hmm.multistream.unit_states import Inventory, expand_triphones
 
 KNOWN = inventory()
 SIDES = [name for name in NAMES if name != "sp"]
@@ -80,13 +80,13 @@ def test_the_grid_of_leaves_is_the_leaf_beside_each_pair_of_neighbours():
 
 def test_an_even_count_has_no_middle():
     known = inventory(4)
-    assert [positions_asked("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
+    assert [choose_positions("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
 
 
 def test_silence_stands_for_pauses_beside_other_units():
     contexts = KNOWN.contexts(("sil", "a", "sp", "b"))
     assert contexts == [("sil", "sil", "a"), ("sil", "a", "sil"), ("a", "sp", "b"), ("sil", "b", "sil")]
-    states = triphone_states(KNOWN, ("a", "sp"))
+    states = expand_triphones(KNOWN, ("a", "sp"))
     assert states.positions.tolist() == [0, 0, 0, 1]
     assert [KNOWN.monophones[context[1], state] for context, state in states.triphones] == states.monophones.tolist()
 
@@ -102,7 +102,7 @@ def test_an_inventory_that_is_none_and_an_unknown_unit_are_refused():
         with pytest.raises(InputError):
             Inventory(*given)
     with pytest.raises(InputError, match="unknown unit 'q'"):
-        triphone_states(KNOWN, ("a", "q"))
+        expand_triphones(KNOWN, ("a", "q"))
 
 
 def test_classes_of_other_units_are_left_out():

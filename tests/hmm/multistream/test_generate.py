@@ -10,10 +10,10 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.generate import (
     FrameDensities,
-    densities_of_path,
-    densities_of_paths,
-    densities_of_posterior,
-    generate,
+    average_densities,
+    average_path_densities,
+    select_densities,
+    solve_trajectory,
 )
 from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.multistream_training import train_joint
@@ -38,7 +38,7 @@ def random_densities(seed, frames, components, dimensions=2):
 def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
     densities = random_densities(seed, frames, 1)
     pins = {(frames // 2, 0): 1.5, (frames // 2, 1): -0.5, (0, 1): 0.25} if pinned else {}
-    found = generate(densities, pins)
+    found = solve_trajectory(densities, pins)
     for channel in range(2):
         mine = [(frame, value) for (frame, c), value in pins.items() if c == channel]
         mean, precision = densities.means[:, 0, :, channel], densities.precisions[:, 0, :, channel]
@@ -53,8 +53,10 @@ def test_many_steps_over_one_gaussian_change_nothing():
     twins = FrameDensities(
         np.full((15, 2), np.log(0.5)), densities.means.repeat(2, axis=1), densities.precisions.repeat(2, axis=1)
     )
-    assert generate(twins).values == pytest.approx(generate(densities).values, abs=1e-9)
-    assert generate(twins).log_likelihoods[-1] == pytest.approx(generate(densities).log_likelihoods[0], abs=1e-9)
+    assert solve_trajectory(twins).values == pytest.approx(solve_trajectory(densities).values, abs=1e-9)
+    assert solve_trajectory(twins).log_likelihoods[-1] == pytest.approx(
+        solve_trajectory(densities).log_likelihoods[0], abs=1e-9
+    )
 
 
 @settings(max_examples=30)
@@ -62,7 +64,7 @@ def test_many_steps_over_one_gaussian_change_nothing():
 def test_the_likelihood_of_the_trajectory_never_falls(frames, components, seed, pinned):
     densities = random_densities(seed, frames, components)
     pins = {(frames - 1, 0): 0.3} if pinned else {}
-    found = generate(densities, pins, iterations=50)
+    found = solve_trajectory(densities, pins, iterations=50)
     assert (np.diff(found.log_likelihoods) > -1e-9 * frames).all()
     assert found.log_likelihoods[-1] == pytest.approx(slow_log_likelihood(densities, found.values), abs=1e-8)
     for (frame, channel), value in pins.items():
@@ -86,16 +88,18 @@ def test_mixtures_take_sides():
     means[:, 0, 0], means[:, 1, 0] = 1.0, -1.0
     precisions = np.full((30, 2, 3, 1), 50.0)
     weights = np.log(np.tile([0.6, 0.4], (30, 1)))
-    found = generate(FrameDensities(weights, means, precisions))
+    found = solve_trajectory(FrameDensities(weights, means, precisions))
     assert found.values == pytest.approx(np.ones((30, 1)), abs=0.05)
-    assert generate(FrameDensities(weights, means, precisions), iterations=1).values == pytest.approx(0.2, abs=0.05)
+    assert solve_trajectory(FrameDensities(weights, means, precisions), iterations=1).values == pytest.approx(
+        0.2, abs=0.05
+    )
 
 
 def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion():
     components = 3
     hmm = random_joint(1, components=components, states=2)
     path = align(hmm, observed(np.random.default_rng(2), 9), ("sil", "a", "b"))
-    found, model = densities_of_path(hmm, path), hmm.models[MOTION]
+    found, model = select_densities(hmm, path), hmm.models[MOTION]
     leaves = model.forest.leaves(path.states.triphones)[path.frames]
     middle = 4
     wanted = model.tied.mixtures.means[leaves[middle]] * model.scale.deviation + model.scale.mean
@@ -110,7 +114,7 @@ def test_all_paths_together_maximise_the_expected_density():
     draw = np.random.default_rng(6)
     leaves = np.array([0, 1, 1, 2])
     posterior = draw.dirichlet(np.ones(4), 10)
-    found = generate(densities_of_posterior(hmm, leaves, posterior)).values
+    found = solve_trajectory(average_densities(hmm, leaves, posterior)).values
     mixtures, scale = hmm.models[MOTION].tied.mixtures, hmm.models[MOTION].scale
     for channel in range(2):
         means = (mixtures.means[leaves, 0] * scale.deviation + scale.mean).reshape(4, 3, 2)[:, :, channel]
@@ -128,10 +132,12 @@ def test_several_paths_count_as_often_as_they_are_given():
     posterior = np.concatenate(
         [0.75 * np.eye(len(leaves[0]))[one.frames], 0.25 * np.eye(len(leaves[1]))[other.frames]], axis=1
     )
-    wanted = generate(densities_of_posterior(hmm, np.concatenate(leaves), posterior)).values
-    assert generate(densities_of_paths(hmm, [one, other, one, one])).values == pytest.approx(wanted, abs=1e-9)
+    wanted = solve_trajectory(average_densities(hmm, np.concatenate(leaves), posterior)).values
+    assert solve_trajectory(average_path_densities(hmm, [one, other, one, one])).values == pytest.approx(
+        wanted, abs=1e-9
+    )
     with pytest.raises(InputError, match="of the same length"):
-        densities_of_paths(hmm, [])
+        average_path_densities(hmm, [])
 
 
 def test_what_was_learned_comes_back():
@@ -139,7 +145,9 @@ def test_what_was_learned_comes_back():
     hmm = train_joint(data, inventory(), CLASSES, config())
     for utterance in utterances(4, seed=9):
         motion = utterance.observed.streams[MOTION]
-        found = generate(densities_of_path(hmm, align(hmm, utterance.observed, utterance.units, utterance.bounds)))
+        found = solve_trajectory(
+            select_densities(hmm, align(hmm, utterance.observed, utterance.units, utterance.bounds))
+        )
         off = found.values - motion.values[:, :2]
         assert np.sqrt((off[motion.known] ** 2).mean(axis=0)) == pytest.approx([0.06, 0.03], abs=0.05)
 
@@ -149,9 +157,9 @@ def test_what_cannot_be_generated():
     data = observed(np.random.default_rng(9), 9)
     for model in (deaf, hmm):
         with pytest.raises(InputError, match="no motion, or it is switched off"):
-            densities_of_path(model, align(model, data, ("a",)))
+            select_densities(model, align(model, data, ("a",)))
     hmm = replace(hmm, config=config())
     with pytest.raises(InputError, match="one of each state"):
-        densities_of_posterior(hmm, np.array([0, 1]), np.ones((9, 3)))
+        average_densities(hmm, np.array([0, 1]), np.ones((9, 3)))
     with pytest.raises(InputError, match="a pin at"):
-        generate(random_densities(0, 5, 1), {(5, 0): 1.0})
+        solve_trajectory(random_densities(0, 5, 1), {(5, 0): 1.0})

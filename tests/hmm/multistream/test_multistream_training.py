@@ -12,9 +12,9 @@ from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.model import MOTION_ONLY
 from lipmotion.hmm.multistream.multistream_baum_welch import (
     accumulate_statistics,
+    iterate_posteriors,
     prepare_utterances,
-    reestimated_hmm,
-    state_posteriors,
+    reestimate_hmm,
 )
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, mean_log_likelihood, train_joint
 from lipmotion.hmm.multistream.recognise import JointRecogniser
@@ -65,7 +65,7 @@ def test_posteriors_are_those_of_all_paths():
         observed = StreamObservations({name: s for name, s in noise(draw, 7).streams.items() if name != "f0_slope"})
         units = ("a", "sp", "b")
         prepared = prepare_utterances(hmm, [(observed, units)])
-        (found,) = state_posteriors(hmm, prepared)
+        (found,) = iterate_posteriors(hmm, prepared)
         triphones = [prepared.triphones[i] for i in prepared.items[0].triphones]
         density = [
             [slow.log_density(hmm, observed, state, t, hmm.config.training) for state in triphones] for t in range(7)
@@ -105,7 +105,7 @@ def test_a_step_improves_on_what_was_found():
     for _ in range(4):
         expected = accumulate_statistics(hmm, prepared)
         figures.append(expected.mean_log_likelihood)
-        hmm = reestimated_hmm(hmm, expected)
+        hmm = reestimate_hmm(hmm, expected)
     assert (np.diff(figures) > 0).all()
 
 

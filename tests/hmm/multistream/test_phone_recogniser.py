@@ -66,7 +66,7 @@ def test_digital_silence_and_long_recordings_are_left_to_the_shared_recogniser(r
 
 
 def test_a_recogniser_is_deserialised(recogniser):
-    arrays = module.recogniser_arrays(recogniser)
+    arrays = module.recogniser_to_arrays(recogniser)
     again = module.recogniser_from_arrays(arrays)
     assert again.training_score == recogniser.training_score
     spoken = speech(timeline(SENTENCE), seed=3)
@@ -84,10 +84,10 @@ def test_a_trained_recogniser_is_kept_in_the_checkpoint(corpus, recogniser, tmp_
     monkeypatch.setattr(module, "train_joint", lambda *_: pytest.fail("trained again"))
     again = fitted(corpus, checkpoint)
     for one, two in zip(
-        module.recogniser_arrays(first).values(), module.recogniser_arrays(again).values(), strict=True
+        module.recogniser_to_arrays(first).values(), module.recogniser_to_arrays(again).values(), strict=True
     ):
         assert one.tobytes() == two.tobytes()
-    assert module.recogniser_arrays(first)["joint_typical"] == recogniser.training_score
+    assert module.recogniser_to_arrays(first)["joint_typical"] == recogniser.training_score
 
 
 @pytest.mark.long

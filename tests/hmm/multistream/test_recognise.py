@@ -6,13 +6,12 @@ import pytest
 from hmm.multistream.synthetic import observed, random_joint, utterances
 from kernels.networks import network_posteriors
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.decode import decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import log_likelihoods_of
-from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.hmm.multistream.recognise import JointRecogniser, context_loop
+from lipmotion.hmm.decode import build_unit_loop, decode_units
+from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
+from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm
+from lipmotion.hmm.multistream.recognise import JointRecogniser, build_context_loop
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
-from lipmotion.hmm.multistream.unit_states import triphone_states
-from lipmotion.hmm.states import StateTable
+from lipmotion.hmm.multistream.unit_states import expand_triphones
 from oracles import joint as slow
 from oracles.sequences import sequences
 
@@ -31,9 +30,9 @@ def slow_densities(hmm, data, weights):
 
 def state_posteriors(recogniser, data):
     """Return the posterior of every state without context in every frame [shape=(T, R)]."""
-    loop = context_loop(recogniser.hmm)
+    loop = build_context_loop(recogniser.hmm)
     log_density = recogniser._log_likelihoods(data).log_density(0, data.frames, None)
-    posteriors, _, _ = network_posteriors(log_density, *loop.network.network.arrays)
+    posteriors, _, _ = network_posteriors(log_density, *loop.network.network)
     result = np.zeros((data.frames, len(recogniser.hmm.inventory.monophones)))
     np.add.at(result.T, loop.monophones, posteriors.T.astype(float))
     return result
@@ -42,7 +41,7 @@ def state_posteriors(recogniser, data):
 def sampled_units(recogniser, data, count, seed):
     """Return the units of sampled paths, each with its first frame."""
     sequences = []
-    for path in recogniser.sampled_paths(data, count, seed):
+    for path in recogniser.draw_paths(data, count, seed):
         units = [context[1] for (context, state) in path.states.triphones if state == 0]
         sequences.append(tuple(zip(units, path.bounds(len(units))[:-1].tolist(), strict=True)))
     return sequences
@@ -93,7 +92,7 @@ def test_posteriors_are_the_shares_of_all_sequences():
     shares = np.exp([score for score, _, _ in ways] - np.logaddexp.reduce([score for score, _, _ in ways]))
     expected = np.zeros((frames, len(hmm.inventory.monophones)))
     for share, (_, units, lengths) in zip(shares, ways, strict=True):
-        expected[np.arange(frames), np.repeat(triphone_states(hmm.inventory, units).monophones, lengths)] += share
+        expected[np.arange(frames), np.repeat(expand_triphones(hmm.inventory, units).monophones, lengths)] += share
     found = state_posteriors(JointRecogniser(hmm, SOFT), data)
     assert found == pytest.approx(expected, abs=1e-4)
     assert found.sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-5)
@@ -102,7 +101,7 @@ def test_posteriors_are_the_shares_of_all_sequences():
 def test_paths_that_are_drawn_go_through_the_states_of_their_units():
     hmm, data = random_joint(3, bigram_weight=0.3, insertion=2.0), observed(np.random.default_rng(5), 40)
     recogniser = JointRecogniser(hmm, SOFT)
-    paths = recogniser.sampled_paths(data, 400, 6)
+    paths = recogniser.draw_paths(data, 400, 6)
     for path, said in zip(paths, sampled_units(recogniser, data, 400, 6), strict=True):
         assert set(np.diff(path.frames).tolist()) <= {0, 1}
         assert (path.frames[0], path.frames[-1]) == (0, len(path.states.monophones) - 1)
@@ -130,11 +129,11 @@ def test_speech_alone_is_the_plain_model():
             leaves.append(model.forest.leaf((context, state)))
     table = StateTable(known.names, tuple(map(known.count, known.names)), tuple(names), known.free)
     config = HmmConfig(bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
-    plain = UnitHmm(config, table, model.tied.mixtures.selected(np.array(leaves)), hmm.log_stay, hmm.bigram)
+    plain = UnitHmm(config, table, model.tied.mixtures.select(np.array(leaves)), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
     rows = model.scale.standardise(data.streams[SPEECH])
     units, bounds = decode_units(
-        unit_loop(plain, ["sil", "a", "b"]), log_likelihoods_of(plain, model.tied.values(rows))
+        build_unit_loop(plain, ["sil", "a", "b"]), compute_log_likelihoods(plain, model.tied.values(rows))
     )
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
@@ -149,11 +148,11 @@ def test_what_cannot_be_recognised():
     with pytest.raises(InputError, match="switched on are"):
         JointRecogniser(hmm, StreamWeights(0, 0, 0, 0, 0)).recognise(data)
     with pytest.raises(InputError, match="required one or more"):
-        JointRecogniser(hmm).sampled_paths(data, 0, 0)
+        JointRecogniser(hmm).draw_paths(data, 0, 0)
     with pytest.raises(AlignmentError):
         JointRecogniser(hmm).recognise(observed(np.random.default_rng(0), 2))
     with pytest.raises(AlignmentError):
-        JointRecogniser(hmm).sampled_paths(observed(np.random.default_rng(0), 2), 1, 0)
+        JointRecogniser(hmm).draw_paths(observed(np.random.default_rng(0), 2), 1, 0)
     wide = StreamObservations({SPEECH: type(data.streams[SPEECH])(np.zeros((9, 4)), np.ones(9, bool))})
     with pytest.raises(InputError, match="has 4 dimensions"):
         JointRecogniser(hmm).recognise(wide)

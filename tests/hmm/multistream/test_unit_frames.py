@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.recognise import RecognisedUnit
-from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
+from lipmotion.hmm.multistream.unit_states import RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.types import Span, Timeline, Unit
 
 
@@ -15,23 +14,23 @@ def timeline(*spans):
 
 def test_every_frame_has_a_unit():
     spoken = timeline((0.015, 0.05, "a"), (0.05, 0.054, "t"), (0.07, 0.1, "b"))
-    units, bounds = units_in_frames(spoken, 13, "sil")
+    units, bounds = units_to_frames(spoken, 13, "sil")
     assert units == ("sil", "a", "t", "sil", "b", "sil")
     assert bounds.tolist() == [0, 2, 5, 6, 7, 10, 13]
-    assert units_in_frames(spoken, 4, "sil", lambda label: {"a": "open"}[label.phone])[0] == ("sil", "open")
-    assert units_in_frames(timeline(), 3, "sil")[0] == ("sil",)
+    assert units_to_frames(spoken, 4, "sil", lambda label: {"a": "open"}[label.phone])[0] == ("sil", "open")
+    assert units_to_frames(timeline(), 3, "sil")[0] == ("sil",)
     with pytest.raises(InputError):
-        units_in_frames(spoken, 0, "sil")
+        units_to_frames(spoken, 0, "sil")
 
 
 def test_a_unit_without_a_frame_is_left_out():
-    units, bounds = units_in_frames(timeline((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
+    units, bounds = units_to_frames(timeline((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
     assert units == ("a", "b")
     assert bounds.tolist() == [0, 4, 6]
 
 
 def test_a_unit_begins_half_a_frame_before_its_first_frame():
-    spoken = units_in_time([RecognisedUnit("sil", 0), RecognisedUnit("a", 3), RecognisedUnit("sil", 9)], 0.125)
+    spoken = frames_to_units([RecognisedUnit("sil", 0), RecognisedUnit("a", 3), RecognisedUnit("sil", 9)], 0.125)
     assert [span.start_s for span in spoken] == pytest.approx([0, 0.025, 0.085])
     assert [span.end_s for span in spoken] == pytest.approx([0.025, 0.085, 0.125])
 
@@ -41,7 +40,7 @@ def test_a_unit_begins_half_a_frame_before_its_first_frame():
 def test_there_and_back(lengths):
     firsts = np.cumsum([0, *lengths]).tolist()
     said = [RecognisedUnit("ab"[i % 2], first) for i, first in enumerate(firsts[:-1])]
-    spoken = units_in_time(said, firsts[-1] / 100)
+    spoken = frames_to_units(said, firsts[-1] / 100)
     assert spoken[-1].end_s == firsts[-1] / 100
-    units, bounds = units_in_frames(spoken, firsts[-1], "sil")
+    units, bounds = units_to_frames(spoken, firsts[-1], "sil")
     assert [RecognisedUnit(unit, first) for unit, first in zip(units, bounds[:-1].tolist(), strict=True)] == said

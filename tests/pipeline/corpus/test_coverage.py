@@ -12,7 +12,7 @@ import pytest
 from lipmotion import Corpus
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, Lexicon, most_similar_lips
+from lipmotion.units import PHONES, Lexicon, find_similar_lips
 from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
 
 WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
@@ -54,7 +54,7 @@ def test_what_stands_in(tmp_path: Path) -> None:
     phones, diphones, triphones = coverage(corpus, text_of(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
     stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
     assert stand_ins["d"] == ("t", 1)
-    assert stand_ins["m"][0] == most_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"
+    assert stand_ins["m"][0] == find_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"
     nearest = {unit.unit: (unit.stand_in, unit.recorded) for unit in diphones.missing}
     assert nearest["sil-b"] == ("sil-p", 1)
     assert nearest["b-aa"] == ("p-aa", 2)

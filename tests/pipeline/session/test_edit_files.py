@@ -17,7 +17,7 @@ from lipmotion.pipeline.edits import STEPS, MoodStep, step_of
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
-from lipmotion.units import words_in_time
+from lipmotion.units import group_words
 
 SENTENCES = (
     "word 3 is blue",
@@ -141,7 +141,7 @@ def test_a_file_holds_the_moods_of_tags(toy_sentence: ToySentence, toy_model_fil
     file = begun(Request(recording, tagged, model=toy_model_file))
     first, second = (step for step in file.edits.steps if isinstance(step, MoodStep))
     assert (str(first), second.mood) == ("mood happy:0.5 at 0.0", "angry")
-    spoken = [span for span in words_in_time(file.units or Timeline(())) if span.label]
+    spoken = [span for span in group_words(file.units or Timeline(())) if span.label]
     assert second.time_s == pytest.approx(spoken[1].start_s)
 
 

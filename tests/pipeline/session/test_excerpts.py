@@ -47,7 +47,7 @@ def made_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return lengths
 
 
-def number_of(units: Timeline[Unit], phone: str, after_s: float) -> int:
+def parse_number(units: Timeline[Unit], phone: str, after_s: float) -> int:
     return next(n for n, span in enumerate(units, 1) if span.label.phone == phone and span.start_s > after_s)
 
 
@@ -59,8 +59,8 @@ def test_around_an_edit_the_motion_is_that_of_the_whole(
     session, other = Session(long_request, model=toy_model), Session(long_request, model=toy_model)
     units, lasts_s = session.units(), long_request.recording.duration_s  # type: ignore[union-attr]
     before = session.generated().motion
-    middle, edits = number_of(units, "iy", lasts_s / 2), Edits()
-    silent = number_of(units, "sil", lasts_s / 4)
+    middle, edits = parse_number(units, "iy", lasts_s / 2), Edits()
+    silent = parse_number(units, "sil", lasts_s / 4)
     for sentence in (
         f"phone {middle} is p",
         f"phone {middle} ends {units[middle - 1].end_s + 0.02:.3f}",

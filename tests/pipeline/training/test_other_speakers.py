@@ -29,7 +29,7 @@ from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Item, Timeline, Unit
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon, split_words
 
 VOICES = [SyntheticVoice("low", "flite", "anna"), SyntheticVoice("high", "flite", "bert")]
 TEXTS = ["Blue baby.", "Five tea."]
@@ -42,7 +42,7 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def say(texts: list[str], voice: SyntheticVoice, _: Lexicon | None) -> Sayings:
         for text in texts:
-            phones = [phone for word in words_of(text) for phone in Lexicon().pronunciations(word)[0]]
+            phones = [phone for word in split_words(text) for phone in Lexicon().pronunciations(word)[0]]
             yield synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200)
 
     monkeypatch.setattr(module, "speak_sentences", say)

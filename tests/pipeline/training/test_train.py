@@ -11,7 +11,7 @@ from lipmotion import Corpus, Model, Run, Selection, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.motion.resample import model_motion
+from lipmotion.motion.resample import resample_track
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.train import about_training, phones_of
@@ -178,14 +178,14 @@ def test_nothing_usable(toy_corpus: Corpus, tmp_path: Path) -> None:
 def test_frames_without_a_face_are_not_learned_from(toy_corpus: Corpus) -> None:
     track = toy_corpus.utterance("toy00").track
     seen = np.arange(len(track.seen)) % 10 > 1
-    _, valid = model_motion(replace(track, seen=seen), 250)
+    _, valid = resample_track(replace(track, seen=seen), 250)
     nearest = np.minimum(np.floor(np.arange(250) / 4 + 0.5).astype(int), len(seen) - 1)
     assert np.array_equal(valid, seen[nearest])
 
 
 def test_camera_frames_become_model_frames() -> None:
     curve = np.sin(np.arange(26) / 25 * 2 * np.pi)[:, None]
-    motion, valid = model_motion(Track(Motion(curve, 25.0, (Channel("opening"),)), np.ones(26, bool)), 111)
+    motion, valid = resample_track(Track(Motion(curve, 25.0, (Channel("opening"),)), np.ones(26, bool)), 111)
     assert motion.values[:101, 0] == pytest.approx(np.sin(np.arange(101) / 100 * 2 * np.pi), abs=0.01)
     assert valid[:101].all()
     assert not valid[103:].any()  # half a camera frame after the last one

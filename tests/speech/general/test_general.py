@@ -104,7 +104,7 @@ def test_the_bigram_is_that_of_the_phone_model() -> None:
 def test_another_pocketsphinx_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     (tmp_path / "en-us").mkdir()
     general_model.cache_clear()
-    monkeypatch.setattr(acoustic, "english_data", lambda: tmp_path)
+    monkeypatch.setattr(acoustic, "find_english_data", lambda: tmp_path)
     with pytest.raises(MissingDependencyError, match="not those of its version 5"):
         general_model()
     for name in ("means", "variances", "sendump"):

@@ -27,7 +27,7 @@ from lipmotion.speech.voices.installed import (
     voiced_sentences,
 )
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.units import PHONES, Lexicon, is_silent, words_of
+from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 
 FAKED = [
     SyntheticVoice("kal16", "flite", "kal"),
@@ -204,7 +204,7 @@ TEXTS = ["Please put both blue bowls on the table.", "The judge measured the bei
 def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
     lexicon = Lexicon()
     for text, (audio, units) in zip(TEXTS[:2], speak_sentences(TEXTS[:2], real), strict=True):
-        words = words_of(text)
+        words = split_words(text)
         assert [span.label.word for span in units if not is_silent(span.label.phone)] != []
         assert list(dict.fromkeys(span.label.word for span in units if span.label.word)) == list(dict.fromkeys(words))
         assert {span.label.phone for span in units} <= set(PHONES)

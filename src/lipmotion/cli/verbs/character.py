@@ -10,7 +10,7 @@ from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.errors import InputError, shortened
 from lipmotion.pipeline.request import Outputs
-from lipmotion.types.values import number_of
+from lipmotion.types.values import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -126,7 +126,7 @@ def _stated(options: argparse.Namespace) -> dict[str, dict[str, float]]:
     for pose in CALIBRATION:
         for part in filter(None, getattr(options, pose).split(",")):
             name, _, text = part.rpartition("=")
-            value = number_of(text, f"--{pose}: the value in {shortened(part)!r} is", "NAME=X, as A=0.8")
+            value = parse_number(text, f"--{pose}: the value in {shortened(part)!r} is", "NAME=X, as A=0.8")
             if not name.strip():
                 raise InputError(f"--{pose}: {shortened(part)!r} names no control, required NAME=X, as A=0.8")
             stated.setdefault(pose, {})[name.strip()] = value

@@ -19,7 +19,7 @@ from lipmotion.errors import shortened
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import is_file
 from lipmotion.types.delivery import Delivery
-from lipmotion.types.values import whole_of
+from lipmotion.types.values import parse_whole
 
 RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}
 """The recogniser that takes the place of each of Rhubarb's."""
@@ -78,7 +78,7 @@ def _recogniser(name: str) -> str:
 
 def _threads(text: str) -> int:
     """Return a number of threads. Raises ArgumentTypeError: it is none, or under 1."""
-    if (count := whole_of(text)) < 1:
+    if (count := parse_whole(text)) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}, required: 1 or more")
     return count
 

@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import begun, read_edits, write_edits
-    from lipmotion.units import words_in_time
+    from lipmotion.units import group_words
 
     with reporting(options) as report:
         if options.of is None and not options.file.exists():
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> None:
         if options.list:
             lines.append("")
             spans = enumerate(units, 1)
-            words = iter(enumerate((span for span in words_in_time(units) if span.label), 1))
+            words = iter(enumerate((span for span in group_words(units) if span.label), 1))
             number, word = next(words, (0, None))
             for n, span in spans:
                 begins = word is not None and span.start_s == word.start_s

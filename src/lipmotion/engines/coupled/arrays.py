@@ -19,10 +19,10 @@ from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_arrays, motion_from_arrays
-from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from
+from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays, motion_to_arrays
+from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from_arrays
 from lipmotion.motion.limits import check_poses, check_rest
-from lipmotion.motion.modulation_filter import MODULATION, filter_arrays, filter_from_arrays
+from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
 from lipmotion.stats.bigram import check_sums_to_one
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (
@@ -44,7 +44,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
     """Serialise a model: return its arrays by name. The configuration is not among them."""
     chains = model.chains
     product = chains.transitions.product
-    arrays = motion_arrays(PHONE_SET, model.space, model.closure, model.prior) | {
+    arrays = motion_to_arrays(PHONE_SET, model.space, model.closure, model.prior) | {
         "gain": model.scaling,
         "rest": model.rest_pose,
         "streams": np.array(chains.streams),
@@ -65,7 +65,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
             f"visual_{number}/columns": stream.columns,
             f"visual_{number}/scale": np.stack([stream.mean, stream.deviation]),
         }
-    return arrays | _regression_arrays(model) | filter_arrays(model.modulation)
+    return arrays | _regression_arrays(model) | filter_to_arrays(model.modulation)
 
 
 def _group_arrays(group: StreamGroup) -> dict[str, NDArray[Any]]:
@@ -251,7 +251,9 @@ def _regression(
     checked_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0])
     size = of_inputs["window_basis"].shape[1] + of_inputs["belief"].shape[1] * len(OFFSETS)
     checked = checked_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0], I=size)
-    inputs = RegressionInputs(acoustic_context_from(checked), checked["belief"], checked["mean"], checked["basis"])
+    inputs = RegressionInputs(
+        acoustic_context_from_arrays(checked), checked["belief"], checked["mean"], checked["basis"]
+    )
     regressions = []
     for number, stream in enumerate(visual):
         count = structure.state_counts[structure.chain_of(number + 1)]

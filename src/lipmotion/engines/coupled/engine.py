@@ -22,7 +22,7 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.generation import Statistics, generation_blocks
+from lipmotion.motion.generation import Statistics, split_into_blocks
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     ChainPosteriors,
@@ -132,7 +132,7 @@ class CoupledEngine(Engine[CoupledModel]):
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
         result = self.generate(model, speech)
         features, explanations = np.asarray(speech.features.values), dict[int, Explanation]()
-        for inner, outer in generation_blocks(len(features)):
+        for inner, outer in split_into_blocks(len(features)):
             inside = [frame for frame in frames if inner.start <= frame < inner.stop]
             if inside:
                 inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
@@ -143,7 +143,7 @@ class CoupledEngine(Engine[CoupledModel]):
 
     def posteriors(self, model: CoupledModel, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: D102
         features, blocks = np.asarray(speech.features.values), []
-        for inner, outer in generation_blocks(len(features)):
+        for inner, outer in split_into_blocks(len(features)):
             inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             blocks.append(unit_posteriors(model.chains, inference.posteriors, kept))

@@ -240,7 +240,7 @@ def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[i
     if not all(stream.dynamic for stream in model.visual):
         return [() for _ in rows]
     means, precisions = model.motion_statistics(inference)
-    away, result = model.away_from_speech(inference.posteriors.chains[0]), []
+    away, result = model.is_away_from_speech(inference.posteriors.chains[0]), []
     rest: list[tuple[NamedProbability, ...]] = [(NamedProbability(REST, 1.0),)] * len(model.visual)
     for row in rows:
         shares = rest if away[row] else _regression_shares(model, inference, row)

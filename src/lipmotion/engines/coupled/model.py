@@ -17,7 +17,7 @@ from lipmotion.engines.coupled.conversion.mean_regression import RegressionInput
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.limits import MotionLimits, limits_of
+from lipmotion.motion.limits import MotionLimits, measure_limits
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
@@ -64,7 +64,7 @@ class CoupledModel:
         for stream in self.visual:
             deviation[stream.columns] = stream.deviation[: len(stream.columns)]
         low, high = np.minimum(poses.low, self.rest_pose), np.maximum(poses.high, self.rest_pose)
-        return MotionLimits(low, high).extended(deviation)
+        return MotionLimits(low, high).extend(deviation)
 
     @cached_property
     def motion(self) -> LearnedMotion:
@@ -81,7 +81,7 @@ class CoupledModel:
             means = group.stream_mixtures(number).means.astype(float)
             flat = means.reshape(-1, means.shape[2])
             poses = stream.unstandardised(flat, np.ones_like(flat))[0][:, 0]
-            low[stream.columns], high[stream.columns] = limits_of(poses)
+            low[stream.columns], high[stream.columns] = measure_limits(poses)
         return MotionLimits(low, high)
 
     def speech_observations(self, features: Single) -> AudioVisualObservations:
@@ -111,7 +111,7 @@ class CoupledModel:
                 regression = self.regression[1][number]
                 mean, precision = regression.means(inputs, posterior), regression.precisions(posterior)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.unstandardised(mean, precision)
-        away = self.away_from_speech(inference.posteriors.chains[0])
+        away = self.is_away_from_speech(inference.posteriors.chains[0])
         means[away] = 0
         means[away, 0] = self.rest_pose
         precisions[away] *= REST_PRECISION_FACTOR
@@ -137,7 +137,7 @@ class CoupledModel:
             return None
         return self.regression[0](inference.observations.streams[0], inference.posteriors.chains[0])
 
-    def away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
+    def is_away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
         """Return whether each frame is silence away from speech [shape=(T,)].
 
         posterior : of the first chain's states [shape=(T, N)]

@@ -11,7 +11,7 @@ from lipmotion.hmm.multistream.model import JointConfig
 from lipmotion.hmm.multistream.streams import StreamWeights
 from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.types import Configuration, Rule, option
-from lipmotion.units import unit_set
+from lipmotion.units import load_unit_set
 
 COUNT = Rule(least=1)
 WEIGHT = Rule(least=0)
@@ -95,7 +95,7 @@ class JointEngineConfig(Configuration):
             raise InputError("no stream takes part in recognition; give speech or F0 a weight")
 
     def check_files(self) -> None:  # noqa: D102
-        unit_set(self.units)
+        load_unit_set(self.units)
 
     @property
     def hmm(self) -> JointConfig:

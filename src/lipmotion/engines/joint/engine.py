@@ -15,38 +15,36 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.engines.joint.config import JointEngineConfig
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.hmm.multistream.align import StatePath, align
-from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
-from lipmotion.hmm.multistream.generate import densities_of_path, densities_of_paths, single_gaussians
-from lipmotion.hmm.multistream.model import JointHmm
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, growing_joint, train_joint, with_durations
-from lipmotion.hmm.multistream.recognise import RecognisedUnit, joint_recogniser
+from lipmotion.hmm.multistream.generate import average_path_densities, merge_gaussians, select_densities
+from lipmotion.hmm.multistream.model import JointHmm, joint_from_arrays, joint_to_arrays
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint, with_durations
+from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, stream_observations
-from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
-from lipmotion.hmm.multistream.unit_states import Inventory
+from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.arrays import (
     MOTION_ARRAYS,
     SCALING,
-    motion_arrays,
     motion_from_arrays,
-    scaling_arrays,
+    motion_to_arrays,
     scaling_from_arrays,
+    scaling_to_arrays,
 )
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion, Statistics
-from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
+from lipmotion.motion.limits import MotionLimits, check_poses, measure_limits
 from lipmotion.motion.modulation_filter import (
     MODULATION,
     ModulationFilter,
-    filter_arrays,
     filter_from_arrays,
-    learned_filter,
-    resting_motion,
+    filter_to_arrays,
+    learn_filter,
+    select_resting_motion,
 )
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
-from lipmotion.motion.variance_scaling import VarianceScaling, scaling_factors
+from lipmotion.motion.variance_scaling import VarianceScaling, fit_scaling_factors
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
 from lipmotion.types import (
@@ -61,7 +59,7 @@ from lipmotion.types import (
     Timeline,
     Unit,
 )
-from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, unit_set
+from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, load_unit_set
 
 PREFIX = "joint_"
 """Prefix of the names of the arrays of the joint model."""
@@ -91,7 +89,7 @@ class JointModel:
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of plausible motion."""
-        return self.poses.extended(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
+        return self.poses.extend(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
 
     @cached_property
     def motion(self) -> LearnedMotion:
@@ -103,7 +101,7 @@ class JointModel:
         """Smallest and largest means of all states [each shape=(Q,)]."""
         stream, Q = self.hmm.models[MOTION], self.space.dimensions
         means = stream.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
-        return limits_of(means * stream.scale.deviation[:Q] + stream.scale.mean[:Q])
+        return measure_limits(means * stream.scale.deviation[:Q] + stream.scale.mean[:Q])
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,12 +157,12 @@ class JointEngine(Engine[JointModel]):
         """
         learning = self._learning(examples)
         classes = learning.units.classes()
-        for hmm in growing_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
+        for hmm in grow_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
             yield learning.model(with_durations(hmm, learning.utterances))
 
     def _learning(self, examples: Sequence[Example]) -> _Learning:
         """Return what the joint model is trained on. Raises CorpusError: there is no speech."""
-        units = unit_set(self.config.units)
+        units = load_unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
         utterances = [self._training_utterance(example, x, units) for example, x in zip(examples, values, strict=True)]
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
@@ -183,16 +181,16 @@ class JointEngine(Engine[JointModel]):
         values = [model.space.reduce(example.motion.values.astype(float)) for example in examples]
         recorded = [x[example.valid] for x, example in zip(values, examples, strict=True)]
         generated = [self._generated(model, example.speech)[example.valid] for example in examples]
-        factors = scaling_factors(recorded, generated)
-        rest = np.median(np.concatenate(resting_motion(examples, values) or recorded), axis=0)
+        factors = fit_scaling_factors(recorded, generated)
+        rest = np.median(np.concatenate(select_resting_motion(examples, values) or recorded), axis=0)
         compared = ((x, factors * made) for x, made in zip(recorded, generated, strict=True))
-        modulation = learned_filter(self.config.modulation_filter, compared, examples, values)
+        modulation = learn_filter(self.config.modulation_filter, compared, examples, values)
         return replace(model, scaling=VarianceScaling(factors, rest), modulation=modulation)
 
     def _generated(self, model: JointModel, speech: Speech) -> NDArray[np.float64]:
         """Return motion in the motion space for phones in time, as parameter generation makes it [shape=(T, Q)]."""
         path = _aligned(model, self._observations(speech), speech.units)
-        return generate(*single_gaussians(densities_of_path(model.hmm, path)))[0]
+        return generate(*merge_gaussians(select_densities(model.hmm, path)))[0]
 
     def without_closures(self) -> JointEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
@@ -209,8 +207,10 @@ class JointEngine(Engine[JointModel]):
             if self.config.own_alignment and speech.units_known and not speech.times_given:
                 units = _own_times(model, observations, units, speech.features.duration_s)
             paths = [_aligned(model, observations, units)]
-        densities = densities_of_path(model.hmm, paths[0]) if len(paths) == 1 else densities_of_paths(model.hmm, paths)
-        means, precisions = single_gaussians(densities)
+        densities = (
+            select_densities(model.hmm, paths[0]) if len(paths) == 1 else average_path_densities(model.hmm, paths)
+        )
+        means, precisions = merge_gaussians(densities)
 
         def statistics(frames: slice) -> Statistics:
             return means[frames], precisions[frames]
@@ -234,9 +234,9 @@ class JointEngine(Engine[JointModel]):
         return model.hmm.text()
 
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
-        joint = {f"{PREFIX}{name}": array for name, array in joint_arrays(model.hmm).items()}
-        restoring = scaling_arrays(model.scaling) | filter_arrays(model.modulation)
-        return motion_arrays(model.units, model.space, model.closure, model.prior) | restoring | joint
+        joint = {f"{PREFIX}{name}": array for name, array in joint_to_arrays(model.hmm).items()}
+        restoring = scaling_to_arrays(model.scaling) | filter_to_arrays(model.modulation)
+        return motion_to_arrays(model.units, model.space, model.closure, model.prior) | restoring | joint
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
         with format_errors("the joint model"):
@@ -262,7 +262,7 @@ class JointEngine(Engine[JointModel]):
 
     def _training_utterance(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> TrainingUtterance:
         observations = self._observations(example.speech, values, example.valid)
-        sequence, bounds = units_in_frames(example.speech.units, observations.frames, units.silence[0], units.unit_of)
+        sequence, bounds = units_to_frames(example.speech.units, observations.frames, units.silence[0], units.unit_of)
         return TrainingUtterance(observations, sequence, None if self.config.flat_start else bounds)
 
     def _recognised(
@@ -271,9 +271,9 @@ class JointEngine(Engine[JointModel]):
         """Return the recognised units in time, and the state sequences from which motion is generated."""
         recogniser = joint_recogniser(model.hmm)
         segments = recogniser.recognise(observations)
-        units = units_in_time(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
+        units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
         if self.config.paths > 1:
-            return units, recogniser.sampled_paths(observations, self.config.paths, self.config.seed)
+            return units, recogniser.draw_paths(observations, self.config.paths, self.config.seed)
         bounds = np.array([*(segment.first for segment in segments), observations.frames])
         return units, [align(model.hmm, observations, [segment.unit for segment in segments], bounds)]
 
@@ -295,12 +295,12 @@ def _own_times(
         return units
     labels = iter(span.label for span in spoken)
     timed = [RecognisedUnit(name, int(first)) for name, first in zip(names, bounds[:-1], strict=True)]
-    return units_in_time(timed, duration_s, lambda _: next(labels))
+    return frames_to_units(timed, duration_s, lambda _: next(labels))
 
 
 def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
     """Return the best state sequence within the times of given units."""
-    sequence, bounds = units_in_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
+    sequence, bounds = units_to_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
     return align(model.hmm, observations, sequence, bounds)
 
 

@@ -23,7 +23,7 @@ from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import fit_selection, target_of
 from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows
 from lipmotion.errors import InputError
-from lipmotion.motion.predictors import conditions_of
+from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -169,7 +169,7 @@ class SelectionEngine(Engine[SelectionModel]):
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
         guide = self.config.guide > 0
-        conditions = conditions_of(self.config.predictor, motion_s, self.config.conditions) if guide else 0
+        conditions = count_conditions(self.config.predictor, motion_s, self.config.conditions) if guide else 0
         return Inputs(self.config.joint_recogniser, conditions, prior=guide, posteriors=guide)
 
     def fit(  # noqa: D102

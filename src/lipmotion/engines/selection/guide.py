@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.selection.costs import FRACTIONS
 from lipmotion.motion.predictors import Predictor
 from lipmotion.types import FRAME_RATE_HZ, Example, Speech
-from lipmotion.types.motion import between_frames
+from lipmotion.types.motion import interpolate_rows
 
 Array = NDArray[np.float64]
 LEAST_EXPANSION, MOST_EXPANSION = 1.0, 1.6
@@ -59,4 +59,4 @@ def at_points(motion: Array, times_s: Array) -> Array:
     """
     start_s, end_s = times_s.T[:, :, None]
     points_s = start_s + FRACTIONS * (end_s - start_s)
-    return between_frames(motion, FRAME_RATE_HZ, points_s.ravel()).reshape(*points_s.shape, -1)
+    return interpolate_rows(motion, FRAME_RATE_HZ, points_s.ravel()).reshape(*points_s.shape, -1)

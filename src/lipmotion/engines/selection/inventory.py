@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
 from lipmotion.types import FRAME_RATE_HZ
-from lipmotion.units import PHONES, most_similar_lips
+from lipmotion.units import PHONES, find_similar_lips
 
 LINE = 110
 """Width of a line of text, in characters."""
@@ -204,7 +204,7 @@ def digits(bias: int, window: int) -> list[int]:
 def standing_in(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, str]:
     """Return for every phone that no usable unit has the phone that stands in for it."""
     known = {PHONES[number] for number in np.unique(windows.phones[usable])}
-    return {phone: most_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
+    return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
 
 
 def replaced(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:

@@ -17,12 +17,12 @@ from lipmotion.engines.selection.windows import PhoneWindows
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,
-    recogniser_arrays,
     recogniser_from_arrays,
+    recogniser_to_arrays,
 )
-from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_arrays, learned_motion_from_arrays
+from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_from_arrays, learned_motion_to_arrays
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.predictors import names_of_predictors, predictor_arrays, predictor_from_arrays
+from lipmotion.motion.predictors import list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
 from lipmotion.storage.schema import (
     POSITIVE,
     Arrays,
@@ -95,13 +95,13 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
         "selection_variances": model.variances,
     }
     if model.guide is not None and inventory.predicted is not None:
-        arrays |= predictor_arrays(model.guide.predictor)
+        arrays |= predictor_to_arrays(model.guide.predictor)
         arrays |= {
             "guide_range": np.stack([model.guide.centre, model.guide.expansion]),
             "unit_predicted": inventory.predicted,
         }
-    recogniser = recogniser_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
-    return learned_motion_arrays(model.motion) | arrays | recogniser
+    recogniser = recogniser_to_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
+    return learned_motion_to_arrays(model.motion) | arrays | recogniser
 
 
 def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
@@ -114,7 +114,7 @@ def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
         if any(name.startswith(OLD_PREFIX) for name in arrays):
             raise ValueError("its recorded motion is compressed, which is no longer read; train the model again")
         named = (name for name in arrays if name.startswith(JOINT_PREFIX))
-        refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, names_of_predictors(arrays), UNITS, GUIDE, named)
+        refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, list_predictor_arrays(arrays), UNITS, GUIDE, named)
         motion = learned_motion_from_arrays(arrays, filtered=filtered)
         dimensions = motion.space.dimensions
         stored = checked_arrays(arrays, UNITS, Q=dimensions)

@@ -12,7 +12,7 @@ from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.inventory import UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.motion.generation import Statistics
-from lipmotion.motion.rest import away_from_speech, digital_silence, runs, speech_intervals
+from lipmotion.motion.rest import find_digital_silence, find_runs, is_away_from_speech, list_speech_intervals
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.types import FRAME_RATE_HZ, Constraints, Motion, ReducedVariance, Speech, Timeline, Unit
 from lipmotion.units import SILENCE, is_silent
@@ -72,12 +72,12 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
     features : acoustic features [shape=(T, D)]
     always   : whether it is 1 in every silence, for no silence was recorded
     """
-    silent = np.ones(len(features), bool) if always else digital_silence(features, units)
+    silent = np.ones(len(features), bool) if always else find_digital_silence(features, units)
     if not silent.any():
         return np.zeros(len(features))
-    away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
+    away = is_away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, list_speech_intervals(units), SETTLED_S)
     resting = np.zeros(len(features))
-    for first, stop in runs(away):
+    for first, stop in find_runs(away):
         resting[first:stop] = float(silent[first:stop].any())
     width = round(SETTLED_S * FRAME_RATE_HZ)
     window = np.hanning(2 * width + 1)

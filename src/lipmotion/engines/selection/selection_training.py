@@ -22,12 +22,12 @@ from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.fit import fit_motion
-from lipmotion.motion.modulation_filter import learned_filter
-from lipmotion.motion.predictors import PredictorTraining, predictor_class, suitable_predictor
-from lipmotion.motion.reliability import phone_reliability
-from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
+from lipmotion.motion.modulation_filter import learn_filter
+from lipmotion.motion.predictors import PredictorTraining, choose_predictor, load_predictor
+from lipmotion.motion.reliability import rate_phones
+from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import MotionSpace
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Span, Speech, Timeline, Unit, sub_monitor
 from lipmotion.units import SILENCE, is_silent
@@ -51,7 +51,7 @@ def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
         return costs.target(costs.shown(phone_windows([units])), None, None)
     motion, distortion = guide.predict(speech)
-    by_sound = bool(phone_reliability(speech, distortion, frames).mean() < LEAST_RELIABILITY)
+    by_sound = bool(rate_phones(speech, distortion, frames).mean() < LEAST_RELIABILITY)
     windows = phone_windows([_segments(duration_s)]) if by_sound else costs.shown(phone_windows([units]))
     predicted = at_points(motion, windows.times_s)
     return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
@@ -92,7 +92,7 @@ def fit_selection(
         recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     guide = None
     if config.guide:
-        kind = suitable_predictor(config.predictor, examples) or predictor_class("prior")
+        kind = choose_predictor(config.predictor, examples) or load_predictor("prior")
         direct, of_guide = len(motion.space.direct), sub_monitor(monitor, 0.3, 0.9)
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
         guide = fit_guide(kind.fit(training).predictor, examples, values)
@@ -110,7 +110,7 @@ def fit_selection(
         for out in left_out
         for made, _ in [motion_of_units(model, costs, out.chosen, examples[out.number].speech)]
     )
-    modulation = learned_filter(config.modulation_filter, compared, examples, values)
+    modulation = learn_filter(config.modulation_filter, compared, examples, values)
     model = replace(model, motion=replace(motion, modulation=modulation))
     monitor(Progress(_STAGE, 3, 3, 1.0))
     return model, np.sqrt(model.variances[0])
@@ -170,8 +170,8 @@ def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int
     ranges = list[list[int]]()
     for example, begin in zip(examples, first[:-1].tolist(), strict=True):
         time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
-        near = example.valid & ~away_from_speech(time_s, speech_intervals(example.speech.units), KEPT_SILENCE_S)
-        ranges += (runs(near) + begin).tolist()
+        near = example.valid & ~is_away_from_speech(time_s, list_speech_intervals(example.speech.units), KEPT_SILENCE_S)
+        ranges += (find_runs(near) + begin).tolist()
     return ranges
 
 
@@ -180,7 +180,9 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
     resting = []
     for example, x in zip(examples, values, strict=True):
         time_s = np.arange(len(x)) / FRAME_RATE_HZ
-        resting.append(x[example.valid & away_from_speech(time_s, speech_intervals(example.speech.units), REST_AWAY_S)])
+        resting.append(
+            x[example.valid & is_away_from_speech(time_s, list_speech_intervals(example.speech.units), REST_AWAY_S)]
+        )
     poses = np.concatenate(resting)
     if len(poses) < LEAST_REST_FRAMES:
         poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
@@ -209,7 +211,7 @@ def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence
     if len(examples) < 2:
         return found
     for number in np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist():
-        frames = dynamics_known(examples[number].valid)
+        frames = mark_known_dynamics(examples[number].valid)
         if frames.any():
             chosen = _chosen(model, costs, examples[number], costs.inventory.windows.recording == number)
             found.append(_LeftOut(number, frames, chosen))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, is_silent, unknown_phone_message, without_gaps
-from lipmotion.units.stress import NUCLEI, stress_of
+from lipmotion.units import PHONES, SILENCE, close_gaps, describe_unknown_phone, is_silent
+from lipmotion.units.stress import NUCLEI, find_stress
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 INVISIBLE_SYMBOL = len(PHONES)
@@ -125,7 +125,7 @@ def covering(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
 
     duration_s : of the recording
     """
-    spans = tuple(span for span in without_gaps(units, duration_s) if span.duration_s > 0)
+    spans = tuple(span for span in close_gaps(units, duration_s) if span.duration_s > 0)
     return Timeline(spans or (Span(0.0, SHORTEST_S, Unit(SILENCE)),))
 
 
@@ -135,7 +135,7 @@ def phone_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
     for number, units in enumerate(timelines):
         for span in units:
             if span.label.phone not in PHONE_NUMBER:
-                raise InputError(unknown_phone_message(span.label.phone, f" at {span.start_s} s"))
+                raise InputError(describe_unknown_phone(span.label.phone, f" at {span.start_s} s"))
         spoken = [(span.label.word, is_silent(span.label.phone)) for span in units]
         for position, span in enumerate(units):
             recording.append(number)
@@ -147,7 +147,7 @@ def phone_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
                     for other in (position - 1, position + 1)
                 )
             )
-        stress += [UNKNOWN_STRESS if each is None else each for each in stress_of(units)]
+        stress += [UNKNOWN_STRESS if each is None else each for each in find_stress(units)]
     return PhoneWindows(
         np.array(recording, np.int32),
         np.array(phones, np.int16),

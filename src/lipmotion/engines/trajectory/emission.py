@@ -10,10 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.context_window import WINDOW, AcousticContext, acoustic_context_arrays, acoustic_context_from
+from lipmotion.motion.context_window import (
+    WINDOW,
+    AcousticContext,
+    acoustic_context_from_arrays,
+    acoustic_context_to_arrays,
+)
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
 from lipmotion.motion.limits import check_spread
-from lipmotion.stats.trees import TREES, Context, Tree, tree_arrays, trees_from_arrays
+from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
 
 Array = NDArray[np.float64]
@@ -125,14 +130,14 @@ def add_acoustic_regression(
 
 def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
     """Serialise the densities; means and coefficients are stored at half precision."""
-    arrays = tree_arrays(emission.forest) | {
+    arrays = trees_to_arrays(emission.forest) | {
         "means": emission.means.astype(np.float16),
         "variances": emission.variances,
     }
     if emission.regression is not None:
         context = emission.regression.context
         arrays |= {
-            **acoustic_context_arrays(context),
+            **acoustic_context_to_arrays(context),
             "coefficients": emission.regression.coefficients.astype(np.float16),
             "coefficient_rows": emission.regression.rows,
         }
@@ -173,4 +178,4 @@ def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> Aco
     rows = stored["coefficient_rows"]
     if rows.max() >= stored.sizes["C"]:
         raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
-    return AcousticRegression(acoustic_context_from(stored), stored["coefficients"], rows)
+    return AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)

@@ -15,10 +15,10 @@ from lipmotion.engines.trajectory.experts import Experts
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.training_data import TrainingOptions
 from lipmotion.engines.trajectory.trajectory_training import fit_trajectory
-from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
+from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_unit_names
 from lipmotion.motion.modulation_filter import STRENGTH
-from lipmotion.motion.predictors import AUTOMATIC, check_predictor, conditions_of
-from lipmotion.motion.rest import digital_silence
+from lipmotion.motion.predictors import AUTOMATIC, check_predictor, count_conditions
+from lipmotion.motion.rest import find_digital_silence
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -34,7 +34,7 @@ from lipmotion.types import (
     Unit,
     option,
 )
-from lipmotion.units import UnitSet, unit_set
+from lipmotion.units import UnitSet, load_unit_set
 
 POSITIVE, ODD = Rule(above=0), Rule(least=1, odd=True)
 
@@ -104,7 +104,7 @@ class TrajectoryConfig(Configuration):
     absent: ClassVar[Mapping[str, Any]] = {"modulation_filter": 0.0}
 
     def check_files(self) -> None:  # noqa: D102
-        unit_set(self.units)
+        load_unit_set(self.units)
         check_predictor(self.predictor)
 
     def layout(self, units: UnitSet) -> StateLayout:
@@ -115,7 +115,7 @@ class TrajectoryConfig(Configuration):
     def training(self) -> TrainingOptions:
         """The options of the training. Raises InputError: no such unit set, or a table with errors."""
         names = {field.name for field in fields(TrainingOptions)} - {"layout"}
-        return TrainingOptions(self.layout(unit_set(self.units)), **{name: getattr(self, name) for name in names})
+        return TrainingOptions(self.layout(load_unit_set(self.units)), **{name: getattr(self, name) for name in names})
 
 
 @final
@@ -132,7 +132,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     Config: ClassVar[type[Configuration]] = TrajectoryConfig
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
-        conditions = conditions_of(self.config.predictor, motion_s, self.config.conditions)
+        conditions = count_conditions(self.config.predictor, motion_s, self.config.conditions)
         return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=True)
 
     def fit(  # noqa: D102
@@ -157,12 +157,12 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
         layout = self.config.layout(model.units)
-        states = full_context_states(speech.units, frames, layout)
+        states = label_full_context(speech.units, frames, layout)
         distinct = {state: number for number, state in enumerate(dict.fromkeys(states))}
         path = np.array([distinct[state] for state in states], np.intp)
         rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
         densities = rows[path]
-        silent = digital_silence(np.asarray(speech.features.values), speech.units)
+        silent = find_digital_silence(np.asarray(speech.features.values), speech.units)
         densities[silent] = len(model.emission.means) - 1
         experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share, silent)
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.motion.articulation import ArticulationPrior, dynamics_of, strangeness
+from lipmotion.motion.articulation import ArticulationPrior, slice_dynamics, unseen_share
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import Predictor
-from lipmotion.motion.reliability import phone_reliability
+from lipmotion.motion.reliability import rate_phones
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
@@ -50,14 +50,14 @@ class Experts:
         if self.network is None or self._predicted is None:
             return means, precisions
         share = self._share[frames, None, None]
-        means += share * (dynamics_of(self._predicted[0], frames) - means)
+        means += share * (slice_dynamics(self._predicted[0], frames) - means)
         precisions += share * (1 / self.network.variances - precisions)
         return means, precisions
 
     @cached_property
     def reliability(self) -> Array:
         """How far the phones in time can be relied on, 0 to 1 [shape=(T,)]."""
-        return phone_reliability(self.speech, None if self._predicted is None else self._predicted[1], len(self.rows))
+        return rate_phones(self.speech, None if self._predicted is None else self._predicted[1], len(self.rows))
 
     @cached_property
     def _predicted(self) -> tuple[Array, Array] | None:
@@ -80,7 +80,7 @@ class Experts:
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
         own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
-        strange = strangeness(self.speech.voice)
+        strange = unseen_share(self.speech.voice)
         known = 1.0 if own else 1 - STRANGER_LOSS * strange
         states = (1 - self.network_share) * self.reliability * familiarity * known
         at_rest = np.maximum(1 - self.reliability, 0.0 if own else RESTING_SHARE * (1 - strange))

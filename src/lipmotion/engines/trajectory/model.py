@@ -15,22 +15,22 @@ from lipmotion.engines.trajectory.experts import NETWORK_SHARE
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,
-    recogniser_arrays,
     recogniser_from_arrays,
+    recogniser_to_arrays,
 )
-from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
+from lipmotion.motion.arrays import MOTION_ARRAYS, motion_from_arrays, motion_to_arrays
 from lipmotion.motion.articulation import KNOWN_VOICE_SHARE, TABLE_WEIGHT_WITH_PREDICTOR, ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
-from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_arrays, filter_from_arrays
+from lipmotion.motion.limits import MotionLimits, check_poses, measure_limits
+from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import (
     ADDED,
     Predictor,
-    names_of_predictors,
-    predictor_arrays,
+    list_predictor_arrays,
     predictor_from_arrays,
+    predictor_to_arrays,
 )
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
@@ -68,7 +68,7 @@ class TrajectoryModel:
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of plausible motion."""
-        return self.poses.extended(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
+        return self.poses.extend(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
 
     @cached_property
     def motion(self) -> LearnedMotion:
@@ -83,17 +83,17 @@ class TrajectoryModel:
     @property
     def poses(self) -> MotionLimits:
         """Smallest and largest means of all states [each shape=(Q,)]."""
-        return limits_of(self.emission.means[:, 0])
+        return measure_limits(self.emission.means[:, 0])
 
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Serialise a model."""
-    arrays = motion_arrays(model.units, model.space, model.closure, model.prior) | {"gain": model.variance_factors}
-    recogniser = recogniser_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
-    network = predictor_arrays(model.network)
+    arrays = motion_to_arrays(model.units, model.space, model.closure, model.prior) | {"gain": model.variance_factors}
+    recogniser = recogniser_to_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
+    network = predictor_to_arrays(model.network)
     if model.network is not None:
         network |= {"network_share": np.array([model.network_share])}
-    return arrays | emission_arrays(model.emission) | network | recogniser | filter_arrays(model.modulation)
+    return arrays | emission_arrays(model.emission) | network | recogniser | filter_to_arrays(model.modulation)
 
 
 def model_from_arrays(
@@ -108,7 +108,7 @@ def model_from_arrays(
     """
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
-        others = names_of_predictors(arrays)
+        others = list_predictor_arrays(arrays)
         refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, others, SHARE, joint, MODULATION)
         unit_set, space, closure, prior = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)

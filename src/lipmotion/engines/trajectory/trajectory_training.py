@@ -18,16 +18,16 @@ from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
-from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
-from lipmotion.motion.modulation_filter import learned_filter
-from lipmotion.motion.predictors import Predictor, PredictorTraining, folds, suitable_predictor
+from lipmotion.motion.frame_labels import FullContextState, StateLayout, label_full_context
+from lipmotion.motion.modulation_filter import learn_filter
+from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
 from lipmotion.motion.space import fit_reduced_motion
-from lipmotion.motion.variance_scaling import scaling_factors
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.motion.variance_scaling import fit_scaling_factors
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 from lipmotion.stats.tree_regression import (
     RegressionStatistics,
+    fit_regression_node,
     fit_tree_regressions,
-    regression_node,
     ridge,
     zero_statistics,
 )
@@ -70,7 +70,7 @@ def _owners(emission: Emission, options: TrainingOptions) -> list[_Node | None]:
     least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
     owners: list[_Node | None] = []
     for name, tree in emission.forest.items():
-        owners += [(name, regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
+        owners += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
     return [*owners, None]
 
 
@@ -179,7 +179,7 @@ def fit_trajectory(
     prior = fit_articulation_prior(space, values, examples) if options.articulation else None
     network: Predictor | None = None
     share = NETWORK_SHARE
-    kind, direct = suitable_predictor(options.predictor, examples), len(space.direct)
+    kind, direct = choose_predictor(options.predictor, examples), len(space.direct)
     if kind is not None:
         of_predictor = sub_monitor(monitor, 0.4, 0.99)
         network, held_out = kind.fit(
@@ -188,9 +188,9 @@ def fit_trajectory(
         if held_out is not None:
             share = _share_of_predictor(held_out, clips, options, direct)
     recorded, generated = _recorded_and_generated(emission, network, prior, share, clips, layout)
-    factors = scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
+    factors = fit_scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
     scaled = ((original, factors * made) for original, made in zip(recorded, generated, strict=True))
-    modulation = learned_filter(options.modulation_filter, scaled, examples, values)
+    modulation = learn_filter(options.modulation_filter, scaled, examples, values)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
     return TrajectoryModel(
@@ -214,7 +214,7 @@ def _share_of_predictor(
     if len(clips) < 2:
         return 1.0
     products = squares = 0.0
-    for inside, outside in folds(len(clips)):
+    for inside, outside in split_folds(len(clips)):
         emission = _fit_emission([clips[number] for number in inside], options)
         if options.acoustic_regression:
             emission = fit_acoustic_regression(emission, [clips[number] for number in inside], options)
@@ -256,8 +256,8 @@ def training_clip(example: Example, values: Array, layout: StateLayout) -> Train
 
     values : its motion in the motion space [shape=(T, Q)]
     """
-    frames = np.nonzero(dynamics_known(example.valid))[0]
-    states = full_context_states(example.speech.units, len(values), layout)
+    frames = np.nonzero(mark_known_dynamics(example.valid))[0]
+    states = label_full_context(example.speech.units, len(values), layout)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
     return TrainingClip(example.speech, states, frames, dynamics)
 

@@ -12,11 +12,11 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
-from lipmotion.hmm.multistream.unit_states import TriphoneStates, triphone_states
-from lipmotion.hmm.network import NetworkBuilder
+from lipmotion.hmm.multistream.unit_states import TriphoneStates, expand_triphones
+from lipmotion.hmm.network import build_chain
 
-LEAST_SPREAD = 1.0
-"""Least variance of a duration, in frames²; durations that were all equal have variance 0."""
+MIN_VARIANCE = 1.0
+"""Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,63 +51,40 @@ def align(
     Raises AlignmentError: fewer frames than states. Raises InputError: an unknown unit, or bounds that do not fit.
     """
     weights = weights or hmm.config.recognition
-    states = triphone_states(hmm.inventory, units)
+    states = expand_triphones(hmm.inventory, units)
     streams = hmm.standardise(observed, weights)
     log_density = hmm.log_density(streams, hmm.leaves(states.triphones), weights)
     chosen = np.arange(len(states.monophones))
     if bounds is not None:
-        _check_bounds(bounds, len(units), observed.frames)
-        chosen = _states_that_fit(states, np.diff(bounds))
+        check_bounds(bounds, len(units), observed.frames)
         first, end = bounds[states.positions], bounds[states.positions + 1]
         time = np.arange(observed.frames)[:, None]
         log_density[(time < first) | (time >= end)] = -np.inf
-    _check_room(len(units), len(chosen), observed.frames)
-    return StatePath(states, chosen[_best_path(hmm, log_density[:, chosen], states.monophones[chosen])])
-
-
-def _check_room(units: int, states: int, frames: int) -> None:
-    if states > frames:
+        fitting = []  # of a unit with fewer frames than states, one state for each frame
+        for position, length in enumerate(np.diff(bounds).tolist()):
+            of_unit = np.flatnonzero(states.positions == position)
+            count = min(length, len(of_unit))
+            fitting.append(of_unit[(2 * np.arange(count) + 1) * len(of_unit) // (2 * max(count, 1))])
+        chosen = np.concatenate(fitting)
+    if len(chosen) > observed.frames:
         raise AlignmentError(
-            f"{units} units take at least {states} frames of 10 ms, found {frames}: the recording is too short for "
-            "what should be said in it; give its own units"
+            f"{len(units)} units take at least {len(chosen)} frames of 10 ms, found {observed.frames}: the recording "
+            "is too short for what should be said in it; give its own units"
         )
+    monophones = states.monophones[chosen]
+    network = build_chain(range(len(chosen)), hmm.log_stay[monophones], hmm.log_move[monophones])
+    values = log_density[:, chosen].astype(np.float32)
+    path = network.best_path(LogLikelihoods(len(values), lambda first, end, _: values[first:end]))
+    return StatePath(states, chosen[path])
 
 
-def _check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
+def check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
+    """Raise InputError unless bounds are the first frames of so many units, and the frame count at the end."""
     if bounds.shape != (units + 1,) or bounds[0] != 0 or bounds[-1] != frames or (np.diff(bounds) < 0).any():
         raise InputError(f"bounds {bounds.tolist()} of {units} units; required one more than units, from 0 to {frames}")
 
 
-def _states_that_fit(states: TriphoneStates, lengths: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the numbers of the states on the path: of a unit with fewer frames than states, one for each frame."""
-    chosen = []
-    for position, length in enumerate(lengths.tolist()):
-        of_unit = np.flatnonzero(states.positions == position)
-        count = min(length, len(of_unit))
-        chosen.append(of_unit[(2 * np.arange(count) + 1) * len(of_unit) // (2 * max(count, 1))])
-    return np.concatenate(chosen)
-
-
-def _best_path(hmm: JointHmm, log_density: NDArray[np.float64], monophones: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the state of every frame [shape=(T,)] on the best path through all S states in order.
-
-    log_density : [shape=(T, S)]
-    monophones  : [shape=(S,)], the number of each state without context
-    """
-    builder = NetworkBuilder()
-    for number, (stay, move) in enumerate(zip(hmm.log_stay[monophones], hmm.log_move[monophones], strict=True)):
-        builder.state(number, float(stay))
-        if number + 1 < len(monophones):
-            builder.arc(number, number + 1, float(move))
-        else:
-            builder.final(number, float(move))
-    builder.initial(0)
-    values = log_density.astype(np.float32)
-    log_likelihoods = LogLikelihoods(len(values), lambda first, end, _: values[first:end])
-    return builder.build().best_path(log_likelihoods)
-
-
-def measured_durations(
+def measure_durations(
     hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
 ) -> NDArray[np.float64]:
     """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)].
@@ -118,7 +95,7 @@ def measured_durations(
     sums = np.zeros((len(hmm.log_stay), 3))
     for observed, units in utterances:
         active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)
-        if not active or len(triphone_states(hmm.inventory, units).monophones) > observed.frames:
+        if not active or len(expand_triphones(hmm.inventory, units).monophones) > observed.frames:
             continue
         path = align(hmm, observed, units, weights=hmm.config.training)
         frames = np.bincount(path.frames, minlength=len(path.states.monophones)).astype(float)
@@ -129,5 +106,5 @@ def measured_durations(
     mean = sums[:, 1] / count
     measured = np.stack([mean, sums[:, 2] / count - mean * mean], axis=1)
     durations = np.where(sums[:, :1] > 0, measured, geometric)
-    durations[:, 1] = np.maximum(durations[:, 1], LEAST_SPREAD)
+    durations[:, 1] = np.maximum(durations[:, 1], MIN_VARIANCE)
     return durations

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from lipmotion.hmm.multistream.streams import Stream
 from lipmotion.stats.mixture import LOG_2PI, Mixtures, QuadraticForm
 
-LEAST_FRAMES = 2.0
+MIN_FRAMES = 2.0
 """A Gaussian with less data, in frames, is not re-estimated."""
 SPLIT_FRAMES = 40.0
 """A Gaussian with less data, in frames, is not split."""
-LEAST_VOICED_PROBABILITY = 1e-3
-"""Least probability of a frame being voiced, and of its being unvoiced."""
-LEAST_POSTERIOR = np.float32(1e-10)
+MIN_VOICED_PROBABILITY = 1e-3
+"""Smallest probability of a frame being voiced, and of its being unvoiced."""
+MIN_POSTERIOR = np.float32(1e-10)
 """Smaller posteriors are set to 0; so none is denormal, which would be slow."""
-LEAST_SCALE = 1e-6
-"""Least standard deviation of a scale: a dimension that varies less is constant."""
+MIN_SCALE = 1e-6
+"""Smallest standard deviation of a scale: a dimension that varies less is constant."""
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ class GaussianStatistics:
 
     @classmethod
     def zeros(cls, densities: int, components: int, dimensions: int) -> GaussianStatistics:
-        """Return zero statistics."""
+        """Return the statistics of no frames."""
         return cls(np.zeros(densities), np.zeros((densities, components, 1 + 2 * dimensions)))
 
     def add(self, densities: NDArray[np.intp], rows: Array) -> None:
@@ -78,7 +78,7 @@ class GaussianStatistics:
         self.frames[densities] += rows[:, 0]
         self.moments[densities, 0] += rows[:, 1:]
 
-    def pooled(self, groups: NDArray[np.intp], count: int) -> GaussianStatistics:
+    def pool(self, groups: NDArray[np.intp], count: int) -> GaussianStatistics:
         """Return the statistics of ``count`` groups of densities; ``groups`` is the group of each [shape=(G,)]."""
         pooled = GaussianStatistics.zeros(count, self.moments.shape[1], self.moments.shape[2] // 2)
         np.add.at(pooled.frames, groups, self.frames)
@@ -110,7 +110,7 @@ class TiedDensities:
             values -= np.float32(log_determinant) * rows[:, 1:2]
             return values
         used, local = np.unique(leaves, return_inverse=True)
-        form = self._whole if len(used) == self.mixtures.size[0] else self.mixtures.quadratic(used)
+        form = self._all_mixtures if len(used) == self.mixtures.size[0] else self.mixtures.quadratic(used)
         values = form.log_likelihood(self.values(rows)) - np.float32(log_determinant)
         values *= rows[:, 1:2]
         values += rows[:, :2] @ self._linear[used].T
@@ -121,8 +121,7 @@ class TiedDensities:
         return rows[:, 2 : 2 + self.mixtures.size[2]]
 
     @cached_property
-    def _whole(self) -> QuadraticForm:
-        """All mixtures as a quadratic form."""
+    def _all_mixtures(self) -> QuadraticForm:
         return self.mixtures.quadratic()
 
     @cached_property
@@ -155,32 +154,30 @@ class TiedDensities:
             statistics.moments[leaf] += components.T @ x[:, 1:]
             statistics.frames[leaf] += (known if self.voiced is None else posteriors[pairs]).sum()
 
-    def reestimated(self, statistics: GaussianStatistics, floor: float) -> TiedDensities:
+    def reestimate(self, statistics: GaussianStatistics, floor: float) -> TiedDensities:
         """Return the densities re-estimated from sufficient statistics (the M-step).
 
         floor : least variance of standardised values
-        Gaussians with less than ``LEAST_FRAMES`` of data stay as they are, so the likelihood never falls.
+        Gaussians with less than ``MIN_FRAMES`` of data stay as they are, so the likelihood never falls.
         """
         count, first, second = np.split(statistics.moments, [1, 1 + self.mixtures.size[2]], axis=2)
-        enough = count >= LEAST_FRAMES
-        safe = np.maximum(count, LEAST_FRAMES)
+        enough = count >= MIN_FRAMES
+        safe = np.maximum(count, MIN_FRAMES)
         mean = first / safe
         variance = np.maximum(second / safe - mean * mean, floor)
         total = count.sum(axis=1)
         with np.errstate(divide="ignore"):
             log_weights = np.log(count[:, :, 0] / np.maximum(total, 1e-30))
         mixtures = Mixtures(
-            np.where(total >= LEAST_FRAMES, log_weights, self.mixtures.log_weights).astype(np.float32),
+            np.where(total >= MIN_FRAMES, log_weights, self.mixtures.log_weights).astype(np.float32),
             np.where(enough, mean, self.mixtures.means).astype(np.float32),
             np.where(enough, variance, self.mixtures.variances).astype(np.float32),
         )
         if self.voiced is None:
             return replace(self, mixtures=mixtures)
         frames = statistics.frames
-        voiced = np.clip(
-            total[:, 0] / np.maximum(frames, 1e-30), LEAST_VOICED_PROBABILITY, 1 - LEAST_VOICED_PROBABILITY
-        )
-        return TiedDensities(mixtures, np.where(frames >= LEAST_FRAMES, voiced, self.voiced))
+        voiced = np.clip(total[:, 0] / np.maximum(frames, 1e-30), MIN_VOICED_PROBABILITY, 1 - MIN_VOICED_PROBABILITY)
+        return TiedDensities(mixtures, np.where(frames >= MIN_FRAMES, voiced, self.voiced))
 
     def can_split(self, statistics: GaussianStatistics) -> bool:
         """Return whether any Gaussian has enough data to be split."""
@@ -188,30 +185,26 @@ class TiedDensities:
 
     def split(self, statistics: GaussianStatistics) -> TiedDensities:
         """Return mixtures of up to twice as many Gaussians; those with too little data are not split."""
-        once, twice, M = self.mixtures, self.mixtures.split(), self.mixtures.size[1]
+        halves, M = self.mixtures.split(), self.mixtures.size[1]
+        log_weights, means = halves.log_weights, halves.means
         unsplit = statistics.moments[:, :, 0] < SPLIT_FRAMES
-        twice.log_weights[:, :M] = np.where(unsplit, once.log_weights, twice.log_weights[:, :M])
-        twice.log_weights[:, M:] = np.where(unsplit, -np.inf, twice.log_weights[:, M:])
-        twice.means[:, :M] = np.where(unsplit[:, :, None], once.means, twice.means[:, :M])
-        return replace(self, mixtures=_compact(twice))
+        log_weights[:, :M] = np.where(unsplit, self.mixtures.log_weights, log_weights[:, :M])
+        log_weights[:, M:] = np.where(unsplit, -np.inf, log_weights[:, M:])
+        means[:, :M] = np.where(unsplit[:, :, None], self.mixtures.means, means[:, :M])
+        order = np.argsort(-log_weights, axis=1, kind="stable")  # those of weight 0 last, and not where all are
+        order = order[:, : np.isfinite(log_weights).sum(axis=1).max()]
+        means, variances = (np.take_along_axis(a, order[:, :, None], axis=1) for a in (means, halves.variances))
+        return replace(self, mixtures=Mixtures(np.take_along_axis(log_weights, order, axis=1), means, variances))
 
 
-def _compact(mixtures: Mixtures) -> Mixtures:
-    """Return the mixtures with Gaussians of weight 0 last, and without the columns in which all have weight 0."""
-    order = np.argsort(-mixtures.log_weights, axis=1, kind="stable")
-    order = order[:, : np.isfinite(mixtures.log_weights).sum(axis=1).max()]
-    means, variances = (np.take_along_axis(a, order[:, :, None], axis=1) for a in (mixtures.means, mixtures.variances))
-    return Mixtures(np.take_along_axis(mixtures.log_weights, order, axis=1), means, variances)
-
-
-def standard_normal_densities(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> TiedDensities:
+def make_standard_normals(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> TiedDensities:
     """Return equal densities of mean 0 and variance 1, those of the whole standardised stream.
 
     has_spaces : whether frames may be without a value;  voiced : the share of frames with one
     """
     shape = (densities, 1, dimensions)
     mixtures = Mixtures(np.zeros((densities, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
-    share = float(np.clip(voiced, LEAST_VOICED_PROBABILITY, 1 - LEAST_VOICED_PROBABILITY))
+    share = float(np.clip(voiced, MIN_VOICED_PROBABILITY, 1 - MIN_VOICED_PROBABILITY))
     return TiedDensities(mixtures, np.full(densities, share) if has_spaces else None)
 
 
@@ -221,5 +214,5 @@ def fit_scale(streams: list[Stream]) -> tuple[StreamScale, float]:
     dimensions = known.shape[1]
     if not len(known):
         return StreamScale(np.zeros(dimensions), np.ones(dimensions)), 0.0
-    scale = StreamScale(known.mean(axis=0), np.maximum(known.std(axis=0), LEAST_SCALE))
+    scale = StreamScale(known.mean(axis=0), np.maximum(known.std(axis=0), MIN_SCALE))
     return scale, len(known) / sum(len(stream.known) for stream in streams)

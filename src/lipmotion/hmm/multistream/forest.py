@@ -63,8 +63,8 @@ class Forest:
         """Return the leaves of a state beside every left and every right neighbour [shape=(N, N)]."""
         name = self.inventory.tree(unit, state)
         tree, leaves = self.trees[name], np.empty((len(neighbours), len(neighbours)), np.intp)
+        names = np.array(neighbours)
         numbers = {int(node): self._first_leaf[name] + i for i, node in enumerate(tree.leaves)}
-        beside = np.array(neighbours)
 
         def fill(node: int, left: NDArray[np.intp], right: NDArray[np.intp]) -> None:
             if tree.asked[node] < 0:
@@ -74,13 +74,11 @@ class Forest:
             if position == 1:
                 fill(node + 1 if unit in members else int(tree.no[node]), left, right)
                 return
-            one_of = np.isin(beside, list(members))
+            one_of = np.isin(names, list(members))
             for answer, following in ((True, node + 1), (False, int(tree.no[node]))):
-                kept = [
-                    side[one_of[side] == answer] if position == at else side for at, side in ((0, left), (2, right))
-                ]
-                if len(kept[0]) and len(kept[1]):
-                    fill(following, *kept)
+                sides = [s[one_of[s] == answer] if position == at else s for at, s in ((0, left), (2, right))]
+                if len(sides[0]) and len(sides[1]):
+                    fill(following, *sides)
 
         everything = np.arange(len(neighbours))
         fill(0, everything, everything)
@@ -102,18 +100,12 @@ def unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
     number = {unit: i for i, unit in enumerate(inventory.names)}
     trees = {}
     for name, (unit, _) in inventory.trees.items():
-        asked = [] if unit else [number[spoken_unit] for spoken_unit in spoken if spoken_unit not in inventory.free]
-        trees[name] = _question_list(questions, asked)
+        order = [] if unit else [number[spoken_unit] for spoken_unit in spoken if spoken_unit not in inventory.free]
+        nodes = 2 * len(order) + 1
+        asked, no = np.full((2, nodes), -1, np.int32)
+        asked[:-1:2], no[:-1:2] = order, np.arange(2, nodes, 2)  # one after another, until one is answered with yes
+        trees[name] = Tree(questions, asked, no, np.zeros(nodes))
     return Forest(inventory, trees)
-
-
-def _question_list(questions: tuple[Question, ...], order: Sequence[int]) -> Tree:
-    """Return the tree that asks the questions of some numbers in order, until one is answered with yes."""
-    nodes = 2 * len(order) + 1
-    asked, no = np.full(nodes, -1, np.int32), np.full(nodes, -1, np.int32)
-    asked[:-1:2] = order
-    no[:-1:2] = np.arange(2, nodes, 2)
-    return Tree(questions, asked, no, np.zeros(nodes))
 
 
 def context_questions(inventory: Inventory, classes: Mapping[str, frozenset[str]]) -> tuple[Question, ...]:
@@ -131,7 +123,7 @@ def context_questions(inventory: Inventory, classes: Mapping[str, frozenset[str]
     return tuple(Question(position, name, members) for position in range(3) for members, name in distinct.items())
 
 
-def positions_asked(
+def choose_positions(
     stream: str, inventory: Inventory, unit: str, state: int, *, both_neighbours: bool = False
 ) -> tuple[int, ...]:
     """Return the positions of the context that the tree of a state may ask about (``Question.position``).
@@ -156,7 +148,7 @@ class TreeCosts:
     factor         : price of a leaf, in units of its description length
     least_frames   : frames that a leaf must have
     least_variance : of a leaf's Gaussian, in the scale of the stream
-    both_neighbours : as of ``positions_asked``
+    both_neighbours : as of ``choose_positions``
     """
 
     factor: float
@@ -189,37 +181,24 @@ def grow_forest(
     names = np.array([inventory.tree(context[1], state) for context, state in triphones])
     trees = {}
     for name, (unit, state) in inventory.trees.items():
-        asked = positions_asked(stream, inventory, unit, state, both_neighbours=costs.both_neighbours)
+        asked = choose_positions(stream, inventory, unit, state, both_neighbours=costs.both_neighbours)
         in_tree = np.flatnonzero(names == name)
-        contexts, pooled = _pooled([triphones[i][0] for i in in_tree.tolist()], values[in_tree], asked)
+        index: dict[Context, int] = {}  # contexts reduced to the positions asked about
+        groups = [
+            index.setdefault(
+                tuple(part if place in asked else "" for place, part in enumerate(triphones[i][0])), len(index)
+            )
+            for i in in_tree.tolist()
+        ]
+        pooled = np.zeros((max(len(index), 1), values.shape[1]))
+        np.add.at(pooled, np.array(groups, np.intp), values[in_tree])
         trees[name] = grow_tree(
-            contexts,
+            list(index) or [("", "", "")],
             pooled,
-            [question if question.position in asked else _never_true(question) for question in questions],
+            [q if q.position in asked else q._replace(members=frozenset()) for q in questions],  # always no
             partial(likelihood, least_variance=costs.least_variance),
             parameters=values.shape[1] - 1,
             factor=costs.factor,
             least=costs.least_frames,
         )
     return Forest(inventory, {name: Tree(questions, tree.asked, tree.no, tree.frames) for name, tree in trees.items()})
-
-
-def _never_true(question: Question) -> Question:
-    """Return a question of the same name that is always answered with no."""
-    return Question(question.position, question.name, frozenset())
-
-
-def _pooled(
-    contexts: Sequence[Context], statistics: NDArray[np.float64], asked: Sequence[int]
-) -> tuple[list[Context], NDArray[np.float64]]:
-    """Return the contexts reduced to the positions asked about, each once, and the summed statistics of each."""
-    index: dict[Context, int] = {}
-    groups = [
-        index.setdefault(tuple(name if position in asked else "" for position, name in enumerate(context)), len(index))
-        for context in contexts
-    ]
-    if not index:
-        return [("", "", "")], np.zeros((1, statistics.shape[1]))
-    pooled = np.zeros((len(index), statistics.shape[1]))
-    np.add.at(pooled, groups, statistics)
-    return list(index), pooled

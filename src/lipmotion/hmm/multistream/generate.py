@@ -17,8 +17,8 @@ from lipmotion.stats.delta_windows import with_dynamics
 
 Array = NDArray[np.float64]
 ITERATIONS = 20
-"""Most steps of EM; a dozen are enough nearly always."""
-LEAST_GAIN = 1e-4
+"""Largest number of steps of EM; a dozen are enough nearly always."""
+MIN_GAIN = 1e-4
 """EM ends when a step raises the log likelihood per frame by less."""
 LOG_2PI = float(np.log(2 * np.pi))
 
@@ -57,60 +57,56 @@ class Trajectory:
     log_likelihoods: tuple[float, ...]
 
 
-def densities_of_path(hmm: JointHmm, path: StatePath) -> FrameDensities:
+def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
     """Return the densities of motion in every frame along a path of states.
 
     Raises InputError: the model has no motion, or motion has weight 0 in synthesis.
     """
-    model, weight = _motion_model(hmm)
-    leaves = model.forest.leaves(path.states.triphones)
-    means, precisions = _in_units(model, weight)
-    log_weights = model.tied.mixtures.log_weights.astype(float)
-    chosen = leaves[path.frames]
-    return _without_end_dynamics(FrameDensities(log_weights[chosen], means[chosen], precisions[chosen]))
+    model, means, precisions = _motion_gaussians(hmm)
+    chosen = model.forest.leaves(path.states.triphones)[path.frames]
+    return _make_densities(model.tied.mixtures.log_weights[chosen].astype(float), means[chosen], precisions[chosen])
 
 
-def densities_of_posterior(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) -> FrameDensities:
+def average_densities(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) -> FrameDensities:
     """Return one Gaussian for every frame, that of all states together, given their posteriors.
 
     leaves    : of S states in the motion stream [shape=(S,)]
     posterior : of the states in every frame [shape=(T, S)]
     A trajectory that maximises the expected log density needs, in every frame, the expected precision, and the mean
     weighted by precision. The Gaussians of a mixture count by their weights.
-    Raises InputError: as ``densities_of_path``, or the shapes do not fit.
+    Raises InputError: as ``select_densities``, or the shapes do not fit.
     """
-    model, weight = _motion_model(hmm)
+    model, means, precisions = _motion_gaussians(hmm)
     if posterior.ndim != 2 or posterior.shape[1] != len(leaves):
         raise InputError(f"posteriors of shape {posterior.shape}, required (T, {len(leaves)}): one of each state")
     used, local = np.unique(leaves, return_inverse=True)
     by_leaf = np.zeros((len(used), len(posterior)))
     np.add.at(by_leaf, local, posterior.T)
-    means, precisions = _in_units(model, weight)
     weights = np.exp(model.tied.mixtures.log_weights[used].astype(float))[:, :, None, None]
     precision = (weights * precisions[used]).sum(axis=1)
     weighted = (weights * precisions[used] * means[used]).sum(axis=1)
     shape = (len(posterior), 1, *precision.shape[1:])
     total = (by_leaf.T @ precision.reshape(len(used), -1)).reshape(shape)
     mean = (by_leaf.T @ weighted.reshape(len(used), -1)).reshape(shape) / np.maximum(total, np.finfo(float).tiny)
-    return _without_end_dynamics(FrameDensities(np.zeros((len(posterior), 1)), mean, total))
+    return _make_densities(np.zeros((len(posterior), 1)), mean, total)
 
 
-def densities_of_paths(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
-    """Return one Gaussian for every frame, that of several equally probable paths (``JointRecogniser.sampled_paths``).
+def average_path_densities(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
+    """Return one Gaussian for every frame, that of several equally probable paths (``JointRecogniser.draw_paths``).
 
-    Raises InputError: as ``densities_of_posterior``, or no paths, or of different lengths.
+    Raises InputError: as ``average_densities``, or no paths, or of different lengths.
     """
-    model, _ = _motion_model(hmm)
+    model, _, _ = _motion_gaussians(hmm)
     if not paths or len({len(path.frames) for path in paths}) > 1:
         raise InputError(f"{len(paths)} paths, required one or more of the same length")
     chosen = np.stack([model.forest.leaves(path.states.triphones)[path.frames] for path in paths])
     leaves, local = np.unique(chosen, return_inverse=True)
     posterior = np.zeros((len(paths[0].frames), len(leaves)))
     np.add.at(posterior, (np.arange(len(posterior)), local.reshape(chosen.shape)), 1 / len(paths))
-    return densities_of_posterior(hmm, leaves, posterior)
+    return average_densities(hmm, leaves, posterior)
 
 
-def generate(
+def solve_trajectory(
     densities: FrameDensities, pins: Mapping[tuple[int, int], float] | None = None, iterations: int = ITERATIONS
 ) -> Trajectory:
     """Return the trajectory that is most probable together with its dynamics.
@@ -126,47 +122,42 @@ def generate(
     for frame, dimension in pins or {}:
         if not (0 <= frame < frames and 0 <= dimension < dimensions):
             raise InputError(f"a pin at {(frame, dimension)}, required within {frames} frames, {dimensions} dimensions")
-    share = np.exp(densities.log_weights)
-    values, variance = _solved(densities, share, pins or {})
+    values, variance = _solve(densities, np.exp(densities.log_weights), pins or {})
     log_likelihoods: list[float] = []
     for _ in range(iterations):
         components = densities.log_components(values)
         best = components.max(axis=1, keepdims=True)
         share = np.exp(components - best)
         log_likelihoods.append(float((best[:, 0] + np.log(share.sum(axis=1))).sum()))
-        done = share.shape[1] == 1 or _converged(log_likelihoods, frames)
-        if done or len(log_likelihoods) == iterations:
+        gain = np.diff(log_likelihoods[-2:])
+        if share.shape[1] == 1 or len(log_likelihoods) == iterations or (gain < MIN_GAIN * frames).any():
             break
-        values, variance = _solved(densities, share / share.sum(axis=1, keepdims=True), pins or {})
+        values, variance = _solve(densities, share / share.sum(axis=1, keepdims=True), pins or {})
     return Trajectory(values, variance, tuple(log_likelihoods))
 
 
-def _converged(log_likelihoods: Sequence[float], frames: int) -> bool:
-    return len(log_likelihoods) > 1 and log_likelihoods[-1] - log_likelihoods[-2] < LEAST_GAIN * frames
-
-
-def single_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
+def merge_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
     """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)].
 
     The Gaussians of a mixture are merged by their posteriors given the most probable trajectory, which EM finds.
     """
     if densities.log_weights.shape[1] == 1:
         return densities.means[:, 0], densities.precisions[:, 0]
-    components = densities.log_components(generate(densities).values)
+    components = densities.log_components(solve_trajectory(densities).values)
     share = np.exp(components - components.max(axis=1, keepdims=True))
-    return _merged(densities, share / share.sum(axis=1, keepdims=True))
+    return _merge(densities, share / share.sum(axis=1, keepdims=True))
 
 
-def _merged(densities: FrameDensities, share: Array) -> tuple[Array, Array]:
+def _merge(densities: FrameDensities, share: Array) -> tuple[Array, Array]:
     """Return mean and precision of every frame [each shape=(T, 3, Q)], given posteriors of the Gaussians (T, M)."""
     shared = densities.precisions * share[:, :, None, None]
     precision = shared.sum(axis=1)
     return (shared * densities.means).sum(axis=1) / np.maximum(precision, np.finfo(float).tiny), precision
 
 
-def _solved(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
+def _solve(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
     """Return the trajectory and its variance [each shape=(T, Q)], given posteriors of the Gaussians [shape=(T, M)]."""
-    bands = normal_equations(*_merged(densities, share))
+    bands = normal_equations(*_merge(densities, share))
     for (frame, dimension), value in pins.items():
         pin(bands, frame, dimension, value)
     values, variance = solve(bands)
@@ -175,24 +166,23 @@ def _solved(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, in
     return values, variance
 
 
-def _motion_model(hmm: JointHmm) -> tuple[StreamModel, float]:
-    """Return the model of the motion stream, and its weight in synthesis. Raises InputError: it has none."""
+def _motion_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
+    """Return the model of motion, and means and weighted precisions of its leaves in its units [shape=(G, M, 3, Q)].
+
+    Raises InputError: there is none.
+    """
     weight = hmm.config.synthesis.motion
     if MOTION not in hmm.models or not weight:
         raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")
-    return hmm.models[MOTION], weight
-
-
-def _in_units(model: StreamModel, weight: float) -> tuple[Array, Array]:
-    """Return means and weighted precisions of all leaves in units of the motion [shape=(G, M, 3, Q)]."""
+    model = hmm.models[MOTION]
     mixtures, deviation = model.tied.mixtures, model.scale.deviation
     G, M, D = mixtures.size
     means = mixtures.means * deviation + model.scale.mean
     precisions = weight / (mixtures.variances * deviation**2)
-    return means.reshape(G, M, 3, D // 3), precisions.reshape(G, M, 3, D // 3)
+    return model, means.reshape(G, M, 3, D // 3), precisions.reshape(G, M, 3, D // 3)
 
 
-def _without_end_dynamics(densities: FrameDensities) -> FrameDensities:
-    precisions = densities.precisions.copy()
+def _make_densities(log_weights: Array, means: Array, precisions: Array) -> FrameDensities:
+    """Return the densities, in which Δ and Δ² of the first and last frame count for nothing; changes the precisions."""
     precisions[[0, -1], :, 1:] = 0
-    return FrameDensities(densities.log_weights, densities.means, precisions)
+    return FrameDensities(log_weights, means, precisions)

@@ -9,16 +9,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, batches
-from lipmotion.hmm.multistream.densities import LEAST_POSTERIOR, GaussianStatistics, TiedDensities
+from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
+from lipmotion.hmm.multistream.densities import MIN_POSTERIOR, GaussianStatistics, TiedDensities
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations
-from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, triphone_states
+from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 
-LEAST_STAY_PROBABILITY = 0.05
-"""Least probability of staying in a state."""
-LEAST_MIXTURE_POSTERIOR = 1e-5
+MIN_STAY_PROBABILITY = 0.05
+"""Smallest probability of staying in a state."""
+MIN_MIXTURE_POSTERIOR = 1e-5
 """Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
 FRAMES_AT_ONCE = 50_000
 """Frames whose statistics for mixtures are accumulated together."""
@@ -108,7 +108,7 @@ def prepare_utterances(
     index: dict[TriphoneState, int] = {}
     items = []
     for observed, units in utterances:
-        states = triphone_states(hmm.inventory, units)
+        states = expand_triphones(hmm.inventory, units)
         triphones = np.array([index.setdefault(state, len(index)) for state in states.triphones], np.intp)
         distinct, local = np.unique(triphones, return_inverse=True)
         member = np.eye(len(distinct), dtype=np.float32)[local]
@@ -121,7 +121,7 @@ def prepare_utterances(
     return PreparedUtterances(tuple(items), tuple(index))
 
 
-def state_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[StatePosteriors]:
+def iterate_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[StatePosteriors]:
     """Give the state posteriors of utterances, in order of their lengths.
 
     Utterances with fewer frames than states, or without a stream that is active in training, are left out.
@@ -130,7 +130,7 @@ def state_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[
     usable = [i for i, item in enumerate(utterances.items) if item.fits and set(weights.active) & set(item.streams)]
     items = [utterances.items[i] for i in usable]
     counts = [len(item.monophones) for item in items]
-    for batch in batches([item.frames for item in items], counts):
+    for batch in group_by_length([item.frames for item in items], counts):
         frames = np.array([items[i].frames for i in batch], np.intp)
         states = np.array([counts[i] for i in batch], np.intp)
         log_emission = np.zeros((frames.max(), len(batch), states.max()))
@@ -157,7 +157,7 @@ class _MixtureAccumulator:
 
     def add(self, rows: Rows, leaves: NDArray[np.intp], posterior: Rows) -> None:
         """Add an utterance with the leaves [shape=(S,)] and posteriors [shape=(T, S)] of its states."""
-        frame, state = np.nonzero(posterior > LEAST_MIXTURE_POSTERIOR)
+        frame, state = np.nonzero(posterior > MIN_MIXTURE_POSTERIOR)
         self._waiting.append((rows[frame], leaves[state], posterior[frame, state]))
         if sum(len(leaves_of_frames) for _, leaves_of_frames, _ in self._waiting) > FRAMES_AT_ONCE:
             self.statistics()
@@ -187,10 +187,10 @@ def accumulate_statistics(
     }
     stay, occupied, leaf_of = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay)), utterances.leaves(hmm)
     log_likelihood, frames = 0.0, 0
-    for posterior in state_posteriors(hmm, utterances) if posteriors is None else posteriors:
+    for posterior in iterate_posteriors(hmm, utterances) if posteriors is None else posteriors:
         item = utterances.items[posterior.utterance]
         states = posterior.states.astype(np.float32)
-        states[states < LEAST_POSTERIOR] = 0
+        states[states < MIN_POSTERIOR] = 0
         by_triphone = (states @ item.member).T
         for name, rows in item.streams.items():
             triphones[name].add(item.distinct, by_triphone @ rows)
@@ -201,26 +201,23 @@ def accumulate_statistics(
         log_likelihood += posterior.log_likelihood
         frames += item.frames
     leaves = {
-        name: mixed[name].statistics() if name in mixed else triphones[name].pooled(leaf_of[name], model.forest.size)
+        name: mixed[name].statistics() if name in mixed else triphones[name].pool(leaf_of[name], model.forest.size)
         for name, model in hmm.models.items()
     }
     return StreamStatistics(triphones, leaves, stay, occupied, log_likelihood, frames)
 
 
-def reestimated_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
+def reestimate_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
     """Return the models re-estimated from sufficient statistics (the M-step)."""
     floor = hmm.config.variance_floor
     models = {
-        name: replace(model, tied=model.tied.reestimated(statistics.leaves[name], floor))
+        name: replace(model, tied=model.tied.reestimate(statistics.leaves[name], floor))
         for name, model in hmm.models.items()
     }
-    return replace(hmm, models=models, log_stay=_log_stay(hmm, statistics))
-
-
-def _log_stay(hmm: JointHmm, statistics: StreamStatistics) -> NDArray[np.float64]:
-    kept = statistics.stay / np.maximum(statistics.occupied, 1e-9)
-    keep = np.where(statistics.occupied > 1, kept, np.exp(hmm.log_stay))
-    return np.log(np.clip(keep, LEAST_STAY_PROBABILITY, max_stay_probability(hmm.inventory)))
+    measured = statistics.stay / np.maximum(statistics.occupied, 1e-9)
+    stay = np.where(statistics.occupied > 1, measured, np.exp(hmm.log_stay))
+    log_stay = np.log(np.clip(stay, MIN_STAY_PROBABILITY, max_stay_probability(hmm.inventory)))
+    return replace(hmm, models=models, log_stay=log_stay)
 
 
 def max_stay_probability(inventory: Inventory) -> NDArray[np.float64]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.multistream.align import measured_durations
-from lipmotion.hmm.multistream.densities import fit_scale, standard_normal_densities
+from lipmotion.hmm.multistream.align import check_bounds, measure_durations
+from lipmotion.hmm.multistream.densities import fit_scale, make_standard_normals
 from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest, unit_forest
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
 from lipmotion.hmm.multistream.multistream_baum_welch import (
@@ -19,13 +19,13 @@ from lipmotion.hmm.multistream.multistream_baum_welch import (
     StatePosteriors,
     StreamStatistics,
     accumulate_statistics,
+    iterate_posteriors,
     max_stay_probability,
     prepare_utterances,
-    reestimated_hmm,
-    state_posteriors,
+    reestimate_hmm,
 )
 from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, StreamObservations
-from lipmotion.hmm.multistream.unit_states import Inventory, triphone_states
+from lipmotion.hmm.multistream.unit_states import Inventory, expand_triphones
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import run_em
 from lipmotion.stats.trees import Question
@@ -48,13 +48,8 @@ class TrainingUtterance:
     def __post_init__(self) -> None:
         if not self.units:
             raise InputError("an utterance without units; give at least silence")
-        bounds, frames = self.bounds, self.observed.frames
-        if bounds is not None and (
-            len(bounds) != len(self.units) + 1 or bounds[0] != 0 or bounds[-1] != frames or (np.diff(bounds) < 0).any()
-        ):
-            raise InputError(
-                f"bounds {bounds.tolist()} of {len(self.units)} units; required one more than units, from 0 to {frames}"
-            )
+        if self.bounds is not None:
+            check_bounds(self.bounds, len(self.units), self.observed.frames)
 
 
 def train_joint(
@@ -65,12 +60,12 @@ def train_joint(
     monitor: Monitor = silent_monitor,
     validation: Sequence[TrainingUtterance] = (),
 ) -> JointHmm:
-    """Return models of all streams, trained together: the last of ``growing_joint``, which says what it takes."""
-    *_, hmm = growing_joint(utterances, inventory, classes, config, monitor, validation)
+    """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
+    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, validation)
     return with_durations(hmm, utterances)
 
 
-def growing_joint(
+def grow_joint(
     utterances: Sequence[TrainingUtterance],
     inventory: Inventory,
     classes: Mapping[str, frozenset[str]],
@@ -91,19 +86,19 @@ def growing_joint(
     Raises InputError: an unknown unit, or no stream that is active in training.
     Source: Hofer 2008, §4 and §6; tying by minimum description length as in ``stats.trees``.  Deviations: utterances
     with ``bounds`` start from these, not flat; trees of acoustic streams ask about one neighbour, unless
-    ``both_neighbours`` is set (``forest.positions_asked``).
+    ``both_neighbours`` is set (``forest.choose_positions``).
     """
     hmm, prepared = _start(utterances, inventory, config)
-    splits = _doublings(config.mixtures), _doublings(config.motion_mixtures)
+    splits = [count.bit_length() - 1 for count in (config.mixtures, config.motion_mixtures)]
     widths = [config.plain_iterations, 1, config.iterations, *(2 * config.iterations * count for count in splits), 1]
-    plain, trees, tied, *mixed, last = _part_monitors(monitor, widths)
+    plain, trees, tied, *mixed, last = _split_monitor(monitor, widths)
     hmm = _run_em(hmm, prepared, "units", config.plain_iterations, plain)
-    hmm = _tied(hmm, prepared, context_questions(inventory, classes), trees)
+    hmm = _tie_states(hmm, prepared, context_questions(inventory, classes), trees)
     hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied)
     yield hmm
-    held_out = _prepared(hmm, validation)
+    held_out = _prepare(hmm, validation)
     for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
-        for part in _part_monitors(of_stream, [1] * count) if name in hmm.models else ():
+        for part in _split_monitor(of_stream, [1] * count) if name in hmm.models else ():
             split = _split(hmm, prepared, held_out, name, part)
             if split is None:
                 break
@@ -115,8 +110,10 @@ def growing_joint(
 def _start(
     utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig
 ) -> tuple[JointHmm, PreparedUtterances]:
-    """Return models without context that were estimated from states of equal length, and the utterances. Raises as
-    ``growing_joint``."""
+    """Return models without context, estimated from states of equal length inside known bounds, and the utterances.
+
+    Raises as ``grow_joint``.
+    """
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
@@ -124,27 +121,65 @@ def _start(
         raise InputError(f"an inventory of {inventory.states} states a unit, the configuration says {config.states}")
     if not set(streams) & set(config.training.active):
         raise InputError(f"switched on are {', '.join(config.training.active)}; observed were {', '.join(streams)}")
-    hmm = _untrained(utterances, inventory, config, streams)
-    prepared = _prepared(hmm, utterances)
+    hmm = _make_equal_models(utterances, inventory, config, streams)
+    prepared = _prepare(hmm, utterances)
     if not any(item.fits for item in prepared.items):
         raise CorpusError(
             f"none of {len(utterances)} utterances has room for the states of its units; "
             "check that units and recordings belong together, or give units fewer states"
         )
-    return _initialised(hmm, prepared, [(utterance.units, utterance.bounds) for utterance in utterances]), prepared
+
+    def posteriors() -> Iterator[StatePosteriors]:
+        for number, (item, utterance) in enumerate(zip(prepared.items, utterances, strict=True)):
+            if item.fits:
+                positions = expand_triphones(inventory, utterance.units).positions
+                posterior = np.zeros((item.frames, len(item.monophones)))
+                posterior[np.arange(item.frames), _spread_states(positions, item.frames, utterance.bounds)] = 1
+                yield StatePosteriors(number, posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
+
+    return reestimate_hmm(hmm, accumulate_statistics(hmm, prepared, posteriors())), prepared
+
+
+def _make_equal_models(
+    utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig, streams: Sequence[str]
+) -> JointHmm:
+    """Return models in which all units have equal densities."""
+    occurring = {unit for utterance in utterances for unit in utterance.units} | {inventory.silence}
+    spoken = tuple(unit for unit in inventory.names if unit in occurring)
+    models = {}
+    for name in streams:
+        scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
+        forest = unit_forest(inventory, spoken)
+        tied = make_standard_normals(forest.size, len(scale.mean), name in F0_STREAMS, known)
+        models[name] = StreamModel(scale, forest, tied)
+    free, silence = inventory.free, inventory.silence
+    sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
+    log_stay = np.log(max_stay_probability(inventory))
+    durations = np.full((len(log_stay), 2), np.nan)
+    bigram = estimate_bigram(inventory.names, sequences)
+    return JointHmm(config, inventory, models, log_stay, durations, spoken, bigram)
+
+
+def _spread_states(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
+    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long.
+
+    positions : [shape=(S,)], the unit that each state belongs to
+    """
+    if bounds is None:
+        return np.arange(frames) * len(positions) // frames
+    path = np.empty(frames, np.intp)
+    for position, (start, end) in enumerate(pairwise(bounds.tolist())):
+        states = np.flatnonzero(positions == position)
+        path[start:end] = states[np.arange(end - start) * len(states) // max(end - start, 1)]
+    return path
 
 
 def with_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> JointHmm:
     """Return models with the durations of states that are measured in the alignment of their training."""
-    return replace(hmm, durations=measured_durations(hmm, [(u.observed, u.units) for u in utterances]))
+    return replace(hmm, durations=measure_durations(hmm, [(u.observed, u.units) for u in utterances]))
 
 
-def _doublings(most: int) -> int:
-    """Return how often 1 can be doubled before it exceeds ``most``."""
-    return most.bit_length() - 1
-
-
-def _part_monitors(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
+def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
     """Return a monitor for each part of the work; the widths are the relative amounts of work."""
     edges = np.cumsum([0, *widths]) / max(sum(widths), 1)
     return [sub_monitor(monitor, start, stop) for start, stop in pairwise(edges.tolist())]
@@ -156,10 +191,12 @@ def _run_em(hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int,
     def report(step: int, _: JointHmm, statistics: StreamStatistics) -> None:
         monitor(Progress(stage, step, steps, step / steps, statistics.mean_log_likelihood))
 
-    return run_em(hmm, lambda model: accumulate_statistics(model, prepared), reestimated_hmm, steps, report).model
+    return run_em(hmm, lambda model: accumulate_statistics(model, prepared), reestimate_hmm, steps, report).model
 
 
-def _tied(hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question, ...], monitor: Monitor) -> JointHmm:
+def _tie_states(
+    hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question, ...], monitor: Monitor
+) -> JointHmm:
     """Return the models with their states in context tied by decision trees, one Gaussian a leaf."""
     config, triphones = hmm.config, prepared.triphones
     statistics = accumulate_statistics(hmm, prepared).triphones
@@ -170,9 +207,9 @@ def _tied(hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question
         forest = grow_forest(
             name, hmm.inventory, questions, triphones, statistics[name], has_spaces=has_spaces, costs=costs
         )
-        of_leaves = statistics[name].pooled(forest.leaves(triphones), forest.size)
-        untrained = standard_normal_densities(forest.size, len(model.scale.mean), has_spaces)
-        models[name] = StreamModel(model.scale, forest, untrained.reestimated(of_leaves, config.variance_floor))
+        of_leaves = statistics[name].pool(forest.leaves(triphones), forest.size)
+        untrained = make_standard_normals(forest.size, len(model.scale.mean), has_spaces)
+        models[name] = StreamModel(model.scale, forest, untrained.reestimate(of_leaves, config.variance_floor))
         monitor(Progress("trees", step, len(hmm.models), step / len(hmm.models), float(forest.size)))
     return replace(hmm, models=models)
 
@@ -196,64 +233,9 @@ def _split(
 
 def mean_log_likelihood(hmm: JointHmm, prepared: PreparedUtterances) -> float:
     """Return the mean log likelihood per frame of utterances with as many frames as states; 0 where there are none."""
-    values = [(p.log_likelihood, prepared.items[p.utterance].frames) for p in state_posteriors(hmm, prepared)]
+    values = [(p.log_likelihood, prepared.items[p.utterance].frames) for p in iterate_posteriors(hmm, prepared)]
     return sum(value for value, _ in values) / max(sum(frames for _, frames in values), 1)
 
 
-def _prepared(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> PreparedUtterances:
+def _prepare(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> PreparedUtterances:
     return prepare_utterances(hmm, [(utterance.observed, utterance.units) for utterance in utterances])
-
-
-def _untrained(
-    utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig, streams: Sequence[str]
-) -> JointHmm:
-    """Return models in which all units have equal densities."""
-    spoken = {unit for utterance in utterances for unit in utterance.units}
-    spoken_units = tuple(unit for unit in inventory.names if unit in spoken | {inventory.silence})
-    models = {}
-    for name in streams:
-        scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
-        forest = unit_forest(inventory, spoken_units)
-        tied = standard_normal_densities(forest.size, len(scale.mean), name in F0_STREAMS, known)
-        models[name] = StreamModel(scale, forest, tied)
-    sequences = [_without_pauses(utterance.units, inventory) for utterance in utterances]
-    log_stay = np.log(max_stay_probability(inventory))
-    durations = np.full((len(log_stay), 2), np.nan)
-    bigram = estimate_bigram(inventory.names, sequences)
-    return JointHmm(config, inventory, models, log_stay, durations, spoken_units, bigram)
-
-
-def _without_pauses(units: Sequence[str], inventory: Inventory) -> tuple[str, ...]:
-    return tuple(inventory.silence if unit in inventory.free else unit for unit in units)
-
-
-def _initialised(
-    hmm: JointHmm,
-    prepared: PreparedUtterances,
-    starts: Sequence[tuple[tuple[str, ...], NDArray[np.intp] | None]],
-) -> JointHmm:
-    """Return models estimated from states of equal length, inside the bounds of each unit where bounds are known."""
-
-    def posteriors() -> Iterator[StatePosteriors]:
-        for number, (item, (units, bounds)) in enumerate(zip(prepared.items, starts, strict=True)):
-            if item.fits:
-                path = _equal_path(triphone_states(hmm.inventory, units).positions, item.frames, bounds)
-                posterior = np.zeros((item.frames, len(item.monophones)))
-                posterior[np.arange(item.frames), path] = 1
-                yield StatePosteriors(number, posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
-
-    return reestimated_hmm(hmm, accumulate_statistics(hmm, prepared, posteriors()))
-
-
-def _equal_path(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
-    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long.
-
-    positions : [shape=(S,)], the unit that each state belongs to
-    """
-    if bounds is None:
-        return np.arange(frames) * len(positions) // frames
-    path = np.empty(frames, np.intp)
-    for position, (start, end) in enumerate(pairwise(bounds.tolist())):
-        states = np.flatnonzero(positions == position)
-        path[start:end] = states[np.arange(end - start) * len(states) // max(end - start, 1)]
-    return path

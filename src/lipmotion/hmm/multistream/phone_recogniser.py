@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
-from lipmotion.hmm.multistream.model import JointConfig, JointHmm
+from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
 from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, stream_observations
-from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
-from lipmotion.hmm.multistream.unit_states import Inventory
+from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
@@ -67,7 +65,7 @@ class OwnPhoneRecogniser:
             segments = joint_recogniser(self.hmm).recognise(observations)
         except AlignmentError:  # shorter than any phone
             return None
-        return units_in_time(segments, speech.features.duration_s)
+        return frames_to_units(segments, speech.features.duration_s)
 
 
 def fit_phone_recogniser(
@@ -90,16 +88,16 @@ def fit_phone_recogniser(
             CONFIG,
             monitor,
         )
-        arrays = joint_arrays(hmm, np.float32)
+        arrays = joint_to_arrays(hmm, np.float32)
         checkpoint.save(_CHECKPOINT, arrays)
     hmm = joint_from_arrays(arrays, CONFIG)
     scores = [_similarity_score(hmm, _observations(example.speech)) for example in examples]
     return OwnPhoneRecogniser(hmm, float(np.mean(scores)))
 
 
-def recogniser_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[Any]]:
+def recogniser_to_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[Any]]:
     """Serialise a recogniser, at half precision."""
-    arrays = joint_arrays(recogniser.hmm) | {"typical": np.array([recogniser.training_score])}
+    arrays = joint_to_arrays(recogniser.hmm) | {"typical": np.array([recogniser.training_score])}
     return {f"{JOINT_PREFIX}{name}": array for name, array in arrays.items()}
 
 
@@ -125,7 +123,7 @@ def _observations(speech: Speech) -> StreamObservations:
 def _training_utterance(example: Example, values: NDArray[np.float64]) -> TrainingUtterance:
     speech = example.speech
     observations = stream_observations(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
-    units, bounds = units_in_frames(speech.units, observations.frames, PHONES.silence[0], PHONES.unit_of)
+    units, bounds = units_to_frames(speech.units, observations.frames, PHONES.silence[0], PHONES.unit_of)
     return TrainingUtterance(observations, units, bounds)
 
 

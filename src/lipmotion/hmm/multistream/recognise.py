@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
-from lipmotion.hmm.multistream.unit_states import triphone_states
+from lipmotion.hmm.multistream.unit_states import RecognisedUnit, expand_triphones
 from lipmotion.hmm.network import NetworkBuilder
 from lipmotion.kernels.paths import sample_paths
 
@@ -61,7 +61,7 @@ class _StateNodes:
         return [int(number) for number in self.numbers[:, self.right[neighbour]]]
 
 
-def context_loop(hmm: JointHmm) -> ContextLoop:
+def build_context_loop(hmm: JointHmm) -> ContextLoop:
     """Return the loop of a model's units with the back-off bigram.
 
     A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
@@ -69,20 +69,25 @@ def context_loop(hmm: JointHmm) -> ContextLoop:
     """
     inventory = hmm.inventory
     units = [unit for unit in hmm.spoken if unit not in inventory.free[1:]]
-    leaves, densities = _densities(hmm, units)
+    leaves, densities = _number_densities(hmm, units)
     builder, owners, monophones = NetworkBuilder(), list[str](), list[int]()
     nodes: dict[str, list[_StateNodes]] = {}
     for unit in units:
-
-        def add(density: int, monophone: int, unit: str = unit) -> int:
-            owners.append(unit)
-            monophones.append(monophone)
-            return builder.state(density, float(hmm.log_stay[monophone]))
-
-        rows = [inventory.monophones[unit, state] for state in range(inventory.count(unit))]
-        nodes[unit] = _nodes_of(densities[unit], rows, add)
-        for row, source, target in zip(rows, nodes[unit], nodes[unit][1:], strict=False):
-            _advance(builder, source, target, float(hmm.log_move[row]))
+        nodes[unit] = []
+        for state, grid in enumerate(densities[unit]):
+            monophone = inventory.monophones[unit, state]
+            left = _classify(densities[unit][state:].transpose(1, 0, 2))
+            right = _classify(densities[unit][: state + 1].transpose(2, 0, 1))
+            _, first_left = np.unique(left, return_index=True)
+            _, first_right = np.unique(right, return_index=True)
+            chosen = grid[np.ix_(first_left, first_right)]
+            stay = float(hmm.log_stay[monophone])
+            numbers = np.array([[builder.state(int(density), stay) for density in row] for row in chosen], np.intp)
+            owners += [unit] * numbers.size
+            monophones += [monophone] * numbers.size
+            nodes[unit].append(_StateNodes(left, right, numbers))
+        for state, (source, target) in enumerate(pairwise(nodes[unit])):
+            _advance(builder, source, target, float(hmm.log_move[inventory.monophones[unit, state]]))
     _join_units(builder, hmm, units, nodes)
     entries = frozenset(int(number) for of_unit in nodes.values() for number in of_unit[0].numbers.ravel())
     network = UnitLoop(builder.build(), tuple(owners), entries)
@@ -98,22 +103,22 @@ def _join_units(
         first, last = nodes[unit][0], nodes[unit][-1]
         leave = float(hmm.log_move[hmm.inventory.monophones[unit, hmm.inventory.count(unit) - 1]])
         for following in units:
-            entered, score = nodes[following][0], leave + _price(hmm, unit, following)
+            entered, score = nodes[following][0], leave + _language_score(hmm, unit, following)
             for source in last.before(place[following]):
                 for target in entered.after(place[unit]):
                     builder.arc(source, target, score)
         for node in first.after(place[silence]):
-            builder.initial(node, hmm.config.insertion if unit == silence else _price(hmm, silence, unit))
+            builder.initial(node, hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit))
         for node in last.before(place[silence]):
-            builder.final(node, leave + (0.0 if unit == silence else _price(hmm, unit, silence)))
+            builder.final(node, leave + (0.0 if unit == silence else _language_score(hmm, unit, silence)))
 
 
-def _price(hmm: JointHmm, unit: str, following: str) -> float:
+def _language_score(hmm: JointHmm, unit: str, following: str) -> float:
     """Return the score of the language model: weighted log bigram plus insertion penalty."""
     return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
 
 
-def _densities(hmm: JointHmm, units: Sequence[str]) -> tuple[dict[str, NDArray[np.intp]], dict[str, Grid]]:
+def _number_densities(hmm: JointHmm, units: Sequence[str]) -> tuple[dict[str, NDArray[np.intp]], dict[str, Grid]]:
     """Return the leaves of distinct densities by stream, and by unit the density of each state beside N² neighbours.
 
     The grids have the shape (states, N, N): the left neighbour, then the right one.
@@ -132,24 +137,7 @@ def _densities(hmm: JointHmm, units: Sequence[str]) -> tuple[dict[str, NDArray[n
     return dict(zip(acoustic, distinct.T, strict=True)), dict(zip(units, of_states, strict=True))
 
 
-def _nodes_of(densities: Grid, rows: Sequence[int], add: Callable[[int, int], int]) -> list[_StateNodes]:
-    """Return the nodes of all states of a unit.
-
-    densities : [shape=(states, N, N)];  rows : the states without context;  add : adds a node
-    """
-    found = []
-    for state, row in enumerate(rows):
-        left = _classes(densities[state:].transpose(1, 0, 2))
-        right = _classes(densities[: state + 1].transpose(2, 0, 1))
-        _, first_left = np.unique(left, return_index=True)
-        _, first_right = np.unique(right, return_index=True)
-        grid = densities[state][np.ix_(first_left, first_right)]
-        numbers = np.array([[add(int(density), row) for density in line] for line in grid], np.intp)
-        found.append(_StateNodes(left, right, numbers))
-    return found
-
-
-def _classes(rows: Grid) -> NDArray[np.intp]:
+def _classify(rows: Grid) -> NDArray[np.intp]:
     """Return the class of every row: those of equal rows are the same [shape=(N,)]."""
     return np.unique(rows.reshape(len(rows), -1), axis=0, return_inverse=True)[1].reshape(-1)
 
@@ -159,13 +147,6 @@ def _advance(builder: NetworkBuilder, source: _StateNodes, target: _StateNodes, 
     for left, left_after in set(zip(source.left.tolist(), target.left.tolist(), strict=True)):
         for right, right_after in set(zip(source.right.tolist(), target.right.tolist(), strict=True)):
             builder.arc(int(source.numbers[left, right]), int(target.numbers[left_after, right_after]), log_move)
-
-
-class RecognisedUnit(NamedTuple):
-    """A recognised unit, and its first frame."""
-
-    unit: str
-    first: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +177,7 @@ class JointRecogniser:
         units, starts = decode_units(self._loop.network, self._log_likelihoods(observed), beam)
         return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
-    def sampled_paths(self, observed: StreamObservations, count: int, seed: int) -> list[StatePath]:
+    def draw_paths(self, observed: StreamObservations, count: int, seed: int) -> list[StatePath]:
         """Return ``count`` paths of states, drawn independently from the posterior of all paths.
 
         Memory grows with the frames: 20 kB each, in GRID. Raises as ``recognise``.
@@ -205,16 +186,15 @@ class JointRecogniser:
             raise InputError(f"{count} paths, required one or more")
         uniform = np.random.default_rng(seed).random((count, observed.frames))
         log_density = self._log_likelihoods(observed).log_density(0, observed.frames, None)
-        paths, log_likelihood = sample_paths(log_density, self._loop.network.network.arrays, uniform)
+        paths, log_likelihood = sample_paths(log_density, self._loop.network.network, uniform)
         if not np.isfinite(log_likelihood):
             raise AlignmentError(f"no units fit into {observed.frames} frames of 10 ms; give a longer recording")
-        return [self._path(nodes) for nodes in paths]
-
-    def _path(self, nodes: NDArray[np.intp]) -> StatePath:
-        """Return a path through the nodes of the loop as a path through the states of its units, one state a node."""
-        changes, loop = np.append(True, np.diff(nodes) != 0), self._loop.network
-        units = [loop.owners[node] for node in nodes[changes].tolist() if node in loop.entries]
-        return StatePath(triphone_states(self.hmm.inventory, units), np.cumsum(changes) - 1)
+        drawn, loop = [], self._loop.network
+        for nodes in paths:  # one node of the loop is one state of its unit
+            changes = np.append(True, np.diff(nodes) != 0)
+            units = [loop.owners[node] for node in nodes[changes].tolist() if node in loop.entries]
+            drawn.append(StatePath(expand_triphones(self.hmm.inventory, units), np.cumsum(changes) - 1))
+        return drawn
 
     @property
     def _weights(self) -> StreamWeights:
@@ -222,7 +202,7 @@ class JointRecogniser:
 
     @cached_property
     def _loop(self) -> ContextLoop:
-        return context_loop(self.hmm)
+        return build_context_loop(self.hmm)
 
     def _log_likelihoods(self, observed: StreamObservations) -> LogLikelihoods:
         streams = self.hmm.standardise(observed, self._weights)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
 
 SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
@@ -97,47 +97,35 @@ def stream_observations(
     log_f0 : natural logarithm of F0 in Hz, NaN where there is no voice [shape=(T,)]
     motion : static values [shape=(T, Q)]; their Δ and Δ² are computed here
     measured : where motion was measured [shape=(T,)]; None: everywhere
-    Raises InputError: as ``StreamObservations``.
+    F0 becomes three streams: static values, Δ and Δ², each known where its whole window is voiced. Motion is one, of
+    static values, Δ and Δ² side by side, known where all three are.
+    Source: Hofer 2008, §4; the windows of F0 as for motion.
+    Raises InputError: as ``StreamObservations``; log F0 or motion of another shape, infinite log F0, a mask that is not
+    that of the frames, or a measured value that is not finite.
     """
     speech = np.asarray(speech)
     streams = {SPEECH: Stream(speech, np.ones(len(speech), bool))}
     if log_f0 is not None:
-        streams |= f0_streams(np.asarray(log_f0, float))
+        pitch: NDArray[np.float64] = np.asarray(log_f0, np.float64)
+        if pitch.ndim != 1 or np.isinf(pitch).any():
+            raise InputError(
+                f"log F0 has shape {pitch.shape}, required (T,), NaN where there is no voice, never infinite"
+            )
+        voiced = ~np.isnan(pitch)
+        dynamics = with_dynamics(np.where(voiced, pitch, 0.0)[:, None])
+        masks = (voiced, *[mark_known_dynamics(voiced)] * 2)
+        for window, (name, mask) in enumerate(zip(F0_STREAMS, masks, strict=True)):
+            streams[name] = Stream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
     if motion is not None:
         values: NDArray[np.float64] = np.asarray(motion, np.float64)
-        streams[MOTION] = motion_stream(values, np.ones(len(values), bool) if measured is None else measured)
+        seen = np.ones(len(values), bool) if measured is None else np.asarray(measured)
+        if values.ndim != 2 or seen.shape != values.shape[:1]:
+            raise InputError(f"motion has shape {values.shape}, its mask {seen.shape}; required (T, Q) and (T,)")
+        if not np.isfinite(values[seen]).all():
+            raise InputError(
+                "motion holds values that are not finite where it was measured; mark these frames as not measured"
+            )
+        known = mark_known_dynamics(np.asarray(seen, bool))
+        dynamics = with_dynamics(np.where(seen[:, None], values, 0.0)).reshape(len(values), -1)
+        streams[MOTION] = Stream(np.where(known[:, None], dynamics, 0.0), known)
     return StreamObservations(streams)
-
-
-def f0_streams(log_f0: NDArray[np.float64]) -> dict[str, Stream]:
-    """Return static values, Δ and Δ² of log F0 [shape=(T,)] as three streams, known where the whole window is voiced.
-
-    Source: Hofer 2008, §4; the windows as for motion.
-    Raises InputError: not one value a frame, or infinite ones.
-    """
-    if log_f0.ndim != 1 or np.isinf(log_f0).any():
-        raise InputError(f"log F0 has shape {log_f0.shape}, required (T,), NaN where there is no voice, never infinite")
-    voiced = ~np.isnan(log_f0)
-    dynamics = with_dynamics(np.where(voiced, log_f0, 0.0)[:, None])
-    known = (voiced, *[dynamics_known(voiced)] * 2)
-    return {
-        name: Stream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
-        for window, (name, mask) in enumerate(zip(F0_STREAMS, known, strict=True))
-    }
-
-
-def motion_stream(motion: NDArray[np.float64], measured: NDArray[np.bool_]) -> Stream:
-    """Return static values, Δ and Δ² of motion side by side [shape=(T, 3·Q)], known where all three are.
-
-    motion   : [shape=(T, Q)];  measured : where it was measured [shape=(T,)]
-    Raises InputError: the mask is not that of the frames, or a measured value is not finite.
-    """
-    if motion.ndim != 2 or measured.shape != motion.shape[:1]:
-        raise InputError(f"motion has shape {motion.shape}, its mask {measured.shape}; required (T, Q) and (T,)")
-    if not np.isfinite(motion[measured]).all():
-        raise InputError(
-            "motion holds values that are not finite where it was measured; mark these frames as not measured"
-        )
-    known = dynamics_known(np.asarray(measured, bool))
-    dynamics = with_dynamics(np.where(measured[:, None], motion, 0.0)).reshape(len(motion), -1)
-    return Stream(np.where(known[:, None], dynamics, 0.0), known)

@@ -18,7 +18,7 @@ from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_hea
 from lipmotion.storage.files import check_source, read_text_file, whole_file
 from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
 from lipmotion.storage.text_table import read_table
-from lipmotion.types.values import whole_of
+from lipmotion.types.values import parse_whole
 
 BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"
@@ -107,7 +107,7 @@ def read_weights(path: Path) -> dict[int, dict[int, float]]:
     """
     paint: dict[int, dict[int, float]] = {}
     for number, row in _rows(path, WEIGHT_COLUMNS, "table of weights"):
-        vertex, point = (whole_of(text, f"{path}: line {number}: the number of a point is") for text in row[:2])
+        vertex, point = (parse_whole(text, f"{path}: line {number}: the number of a point is") for text in row[:2])
         weights = paint.setdefault(vertex, {})
         if point in weights:
             raise InputError(f"{path}: line {number}: vertex {vertex} and point {point} occur twice; remove one")
@@ -134,7 +134,7 @@ def read_points(path: Path) -> dict[int, int]:
     """
     named: dict[int, int] = {}
     for number, row in _rows(path, POINT_COLUMNS, "table of lip points"):
-        point, vertex = (whole_of(text, f"{path}: line {number}: the number of a point is") for text in row)
+        point, vertex = (parse_whole(text, f"{path}: line {number}: the number of a point is") for text in row)
         if point in named:
             raise InputError(f"{path}: line {number}: the point {point} occurs twice; remove one")
         named[point] = vertex

@@ -22,7 +22,7 @@ from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.sources import is_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
 from lipmotion.types import Channel, Motion
-from lipmotion.types.values import number_of
+from lipmotion.types.values import parse_number
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
 CONTROL = "control"
@@ -136,7 +136,7 @@ def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]]
 def _number(text: str, default: float) -> float:
     if not text:
         return default
-    value = number_of(text.replace(",", "."))
+    value = parse_number(text.replace(",", "."))
     if not abs(value) <= LARGEST_NUMBER:
         raise ValueError(f"the number {text}, required at most {LARGEST_NUMBER:g}")
     return value

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.model.shape_names import arkit_name, is_known
-from lipmotion.motion.rest import runs
+from lipmotion.motion.rest import find_runs
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion.types.motion import RADIAN
 
@@ -165,7 +165,9 @@ def resample_rows(
     if not seen.all():
         if not seen.any():
             raise InputError("0 rows with values of all curves, required two or more")
-        spans = [f"{time_s[start] - time_s[0]:.2f}–{time_s[stop - 1] - time_s[0]:.2f} s" for start, stop in runs(~seen)]
+        spans = [
+            f"{time_s[start] - time_s[0]:.2f}–{time_s[stop - 1] - time_s[0]:.2f} s" for start, stop in find_runs(~seen)
+        ]
         more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
         LOG.warning(
             "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",

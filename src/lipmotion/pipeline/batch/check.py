@@ -21,11 +21,11 @@ from lipmotion.pipeline.understand.spoken_language import english_spoken
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript, silent_monitor
-from lipmotion.types.audio import sixteen_bits
+from lipmotion.types.audio import to_sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, script_of
-from lipmotion.units.languages_told import COMMON_WORDS, language_of_text
-from lipmotion.units.mood_tags import tagged_text
-from lipmotion.units.text_normalisation import words_in, written_words
+from lipmotion.units.languages_told import COMMON_WORDS, detect_language
+from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.text_normalisation import find_words, split_written_words
 
 SILENT_DB = -60.0
 """A recording that is nowhere louder, in dB of full scale, is silent."""
@@ -86,7 +86,7 @@ def checked_line(work: LineToCheck) -> CheckedLine:
     return CheckedLine(
         line.name,
         reason=_wrong_language(work.request.language, words, audio, spoken_s),
-        digest=hashlib.sha256(sixteen_bits(audio.samples).tobytes()).hexdigest(),
+        digest=hashlib.sha256(to_sixteen_bits(audio.samples).tobytes()).hexdigest(),
         spoken_s=spoken_s,
         letters=letters_of(words),
         words=words,
@@ -109,10 +109,10 @@ def _words(work: LineToCheck) -> tuple[str, ...]:
     given = line.transcript or read_request(named, words_beside=True).transcript
     if given is None or isinstance(given, TimedTranscript):
         return given.words if given else ()
-    text = tagged_text(str(given)).text
+    text = parse_tagged_text(str(given)).text
     if request.language == ENGLISH:
-        return words_in(text)
-    return written_words(text) if text.strip() else ()
+        return find_words(text)
+    return split_written_words(text) if text.strip() else ()
 
 
 def _wrong_language(language: str, words: Sequence[str], audio: Audio, spoken_s: float) -> str:
@@ -120,7 +120,7 @@ def _wrong_language(language: str, words: Sequence[str], audio: Audio, spoken_s:
 
     language : that they should be in; ``AUTO``: both in the same one
     """
-    told = language_of_text(words) if len(words) >= FEWEST_TOLD_WORDS else ""
+    told = detect_language(words) if len(words) >= FEWEST_TOLD_WORDS else ""
     wanted = language if language != AUTO else told
     if told and wanted in COMMON_WORDS and told != wanted:
         return f"the words are in {told}, required {wanted}"

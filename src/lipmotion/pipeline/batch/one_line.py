@@ -20,8 +20,8 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import failed_extension, provided
 from lipmotion.formats.base import motion_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
-from lipmotion.motion.closure import OPENING, closable_ranges
-from lipmotion.motion.rest import speech_intervals
+from lipmotion.motion.closure import OPENING, find_closable_ranges
+from lipmotion.motion.rest import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.batch.ledger import (
     DONE,
@@ -197,7 +197,7 @@ def _findings(generation: Generation) -> Record:
     if OPENING in motion.names and len(motion.values):
         opening = motion[OPENING]
         closed = CLOSED_SHARE * float(np.percentile(opening, 95))
-        ranges = closable_ranges(generation.units, len(opening))
+        ranges = find_closable_ranges(generation.units, len(opening))
         found |= {
             "widest": round(float(opening.max()), 4),
             "closures_heard": len(ranges),
@@ -210,7 +210,7 @@ def _confidence_of_motion(generation: Generation) -> Record:
     """Return the mean confidence of the motion in speech, and where the least sure second begins, if they are known."""
     confidence, rate_hz = generation.confidence, generation.motion.rate_hz
     spoken = np.zeros(len(generation.motion.values), bool)
-    for start_s, end_s in speech_intervals(generation.units):
+    for start_s, end_s in list_speech_intervals(generation.units):
         spoken[round(start_s * rate_hz) : round(end_s * rate_hz)] = True
     if confidence is None or not spoken.any():
         return {}

@@ -17,8 +17,8 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Pauses, Request
 from lipmotion.speech.sound.overlap_add import JoinedPieces, overlapped
 from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
-from lipmotion.units import SILENCE, Lexicon, words_of
-from lipmotion.units.sentences import sentences_of
+from lipmotion.units import SILENCE, Lexicon, split_words
+from lipmotion.units.sentences import split_sentences
 
 REST_S = 0.25
 """Silence before the first and after the last word,"""
@@ -103,9 +103,9 @@ def _target(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model
         spans.append(Span(now_s, now_s + duration_s, Unit(phone, word=word)))
         now_s += duration_s
 
-    for number, sentence in enumerate(sentences_of(text)):
+    for number, sentence in enumerate(split_sentences(text)):
         add(SILENCE, "", BETWEEN_S if number else REST_S)
-        for word in words_of(sentence):
+        for word in split_words(sentence):
             for phone in lexicon.pronunciations(word)[0]:
                 add(phone, word, engine.typical_duration_s(model.learned, phone))
     add(SILENCE, "", REST_S)

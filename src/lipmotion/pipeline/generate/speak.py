@@ -29,9 +29,9 @@ from lipmotion.storage.files import read_text_file
 from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
 from lipmotion.types.moods import MoodTag
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
-from lipmotion.units.mood_tags import moods_in_time, tagged_text
+from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
-from lipmotion.units.sentences import MOST_CHARACTERS, sentences_of
+from lipmotion.units.sentences import MOST_CHARACTERS, split_sentences
 
 LOG = logging.getLogger("lipmotion")
 CORPUS_VOICE = "corpus"
@@ -91,7 +91,7 @@ def speak(  # noqa: PLR0913
     if is_subtitles(text):
         LOG.warning("the text is that of subtitles: times, and sounds in brackets, are left out")
         text = subtitle_words(text)
-    text, tags = tagged_text(text)
+    text, tags = parse_tagged_text(text)
     if voice == CORPUS_VOICE or corpus is not None:
         if voice != CORPUS_VOICE or corpus is None:
             raise InputError("a corpus that speaks needs both: the voice 'corpus', and the corpus (--corpus FOLDER)")
@@ -109,7 +109,7 @@ def speak(  # noqa: PLR0913
             asymmetry=asymmetry,
         )
         return spoken._replace(generation=_tagged(spoken.generation, tags))
-    sentences = sentences_of(text)
+    sentences = split_sentences(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
     loaded = model if isinstance(model, Model) else load_model(model)
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
@@ -131,7 +131,7 @@ def speak(  # noqa: PLR0913
 
 def _tagged(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
     """Return a generation with the moods of tags in its text."""
-    return replace(generation, moods=moods_in_time(tags, generation.units))
+    return replace(generation, moods=time_moods(tags, generation.units))
 
 
 def read_text(path: Path) -> str:

@@ -25,7 +25,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.types import Gain, Generation, VoiceEvent
-from lipmotion.types.moods import NEUTRAL, PLAIN, MoodKey, in_time
+from lipmotion.types.moods import NEUTRAL, PLAIN, MoodKey, sort_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion.types.voice_event import LAUGHTER, SHOUT, WHISPER
 
@@ -51,7 +51,7 @@ def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tup
         named, usual = (event.kind, PLAIN) if is_manner else (LAUGHING, NEUTRAL)
         strength = event.strength if is_manner else 1.0
         keys += [MoodKey(event.start_s, named, strength), MoodKey(event.end_s, usual)]
-    return in_time(keys)
+    return sort_moods(keys)
 
 
 def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
@@ -76,7 +76,7 @@ def delivered(generation: Generation, delivery: Delivery) -> Generation:
     detected count.
     Raises InputError: the offset leaves nothing.
     """
-    keys = with_detected(in_time((*delivery.moods, *generation.moods)), generation.events)
+    keys = with_detected(sort_moods((*delivery.moods, *generation.moods)), generation.events)
     larger = _larger(with_manners(generation, keys), delivery.intensity)
     if not all(key.is_manner for key in keys):
         moods = with_moods(larger.motion, keys)

@@ -13,7 +13,7 @@ from lipmotion.errors import CorpusError, InputError, shortened
 from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
 from lipmotion.printable import printable
-from lipmotion.stats.pca import evenly_spaced
+from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Channel, Motion, Track, Utterance
 
 LOG = logging.getLogger("lipmotion")
@@ -38,7 +38,7 @@ def train_eigenlips(
     """
     seen_frames = [np.flatnonzero(utterance.track.seen) for utterance in utterances]
     ends = np.cumsum([len(frames) for frames in seen_frames])
-    chosen = evenly_spaced(pictures, int(ends[-1]) if len(ends) else 0)
+    chosen = choose_evenly(pictures, int(ends[-1]) if len(ends) else 0)
     if not len(chosen):
         raise CorpusError(f"no face is seen in {len(utterances)} utterances; prepare a corpus of videos with faces")
     by_utterance = np.split(chosen, np.searchsorted(chosen, ends[:-1]))

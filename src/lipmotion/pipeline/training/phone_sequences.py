@@ -11,7 +11,7 @@ from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_plain_text
-from lipmotion.units import Lexicon, is_silent, words_of
+from lipmotion.units import Lexicon, is_silent, split_words
 
 SHIPPED = "english.txt"
 
@@ -60,7 +60,7 @@ def _pronounced(lines: Iterable[str], lexicon: Lexicon) -> tuple[dict[str, tuple
     left_out: dict[str, str] = {}
     for line in lines:
         try:
-            words = words_of(line)
+            words = split_words(line)
         except InputError:  # a line of dashes
             continue
         unknown = next((word for word in words if not lexicon.known(word)), None)

@@ -19,8 +19,8 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.resample import model_motion
-from lipmotion.motion.speaker_maps import SpeakerMaps, mean_person_examples, with_habits
+from lipmotion.motion.resample import resample_track
+from lipmotion.motion.speaker_maps import SpeakerMaps, add_habits, map_to_mean_person
 from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
 from lipmotion.pipeline.training.channels import (
     check_visual,
@@ -192,7 +192,7 @@ def train(  # noqa: PLR0913
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
     if speakers is not None:
         generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
-        speakers = with_habits(speakers, examples, [speaker_of[name] for name in used], generated)
+        speakers = add_habits(speakers, examples, [speaker_of[name] for name in used], generated)
         about["speakers"] = list(speakers.names)
     return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers), TrainReport(
         used, skipped, fit.figures
@@ -261,7 +261,7 @@ def _of_the_mean_person(
     names = [speakers[example.name] for example in examples]
     if len(set(filter(None, names))) < 2:
         return examples, None
-    return mean_person_examples(examples, names)
+    return map_to_mean_person(examples, names)
 
 
 def _train_phone_models(
@@ -333,7 +333,7 @@ def _examples(
             skipped[utterance.name] = units
             continue
         labelled.append((utterance, units))
-        motion, valid = model_motion(utterance.track, len(utterance.features.values))
+        motion, valid = resample_track(utterance.track, len(utterance.features.values))
         spectrum = analysed(utterance.audio).spectrum
         speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum)
         examples.append(Example(utterance.name, speech, motion, valid))

@@ -14,9 +14,9 @@ from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
-from lipmotion.units.languages_told import language_of_text
-from lipmotion.units.mood_tags import tagged_text
-from lipmotion.units.text_normalisation import written_words
+from lipmotion.units.languages_told import detect_language
+from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.text_normalisation import split_written_words
 
 LOG = logging.getLogger("lipmotion")
 
@@ -38,7 +38,9 @@ def in_language(request: Request) -> Request:
         return replace(request, language=language)
     lexicon = LanguageLexicon(lexicon_of(request).user, language)
     if transcript is not None and request.units is None:
-        transcript = transcript.with_words(lambda word: written_words(word) if any(map(str.isalnum, word)) else ())
+        transcript = transcript.with_words(
+            lambda word: split_written_words(word) if any(map(str.isalnum, word)) else ()
+        )
         lexicon = lexicon.with_words(transcript.words)
     return replace(request, language=language, transcript=transcript, lexicon=lexicon)
 
@@ -50,7 +52,7 @@ def _told(request: Request, transcript: TimedTranscript | None) -> str:
     Raises InputError: that of a transcript is not known.
     """
     if transcript is not None and request.units is None:
-        language = language_of_text(transcript.words)
+        language = detect_language(transcript.words)
         if not language:
             raise InputError(f"the language of the transcript is not known; give it, one of: {', '.join(LANGUAGES)}")
         LOG.warning("the transcript is taken for %s; --language says otherwise", LANGUAGES[language].name)
@@ -68,5 +70,5 @@ def _told(request: Request, transcript: TimedTranscript | None) -> str:
 
 def _plain_transcript(text: str) -> TimedTranscript:
     """Return the words of a text, without times, as a transcript. Raises InputError: there is no word in it."""
-    plain, tags = tagged_text(text, lambda part: written_words(part) if part.strip() else ())
-    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, written_words(plain)))),), tags)
+    plain, tags = parse_tagged_text(text, lambda part: split_written_words(part) if part.strip() else ())
+    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, split_written_words(plain)))),), tags)

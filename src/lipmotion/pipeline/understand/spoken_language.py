@@ -13,7 +13,7 @@ from lipmotion.speech.recognition.network.posteriors import (
 )
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.types import Audio
-from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.languages_told import is_english
 
 LOG = logging.getLogger("lipmotion")
@@ -42,7 +42,7 @@ def english_spoken(audio: Audio) -> bool | None:
         for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
     ]
     words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
-    return is_english(tuple(phone for phone, _ in token_phones(word)) for word in words)
+    return is_english(tuple(phone for phone, _ in read_tokens(word)) for word in words)
 
 
 def confidence_of(found: Recognition) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, shortened
-from lipmotion.hmm.loudness import frames_above
+from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
 from lipmotion.speech.recognition.anchors import anchors_of, fitted
@@ -39,7 +39,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
-from lipmotion.units.phones import phone_edits
+from lipmotion.units.phones import count_phone_edits
 
 __all__ = [
     "Transcription",
@@ -94,7 +94,7 @@ def transcribe(
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
-        words = fitted(words, frames_above(analysed(audio, features).log_energy), audio.duration_s)
+        words = fitted(words, find_loud_frames(analysed(audio, features).log_energy), audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
         LOG.warning(
@@ -207,7 +207,7 @@ def _found_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
             continue
         lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
         runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
-        edits = [(phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
+        edits = [(count_phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
         if edits and min(edits)[0] <= most:
             _, first, end = min(edits)
             words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)

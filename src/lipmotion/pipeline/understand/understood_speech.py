@@ -80,11 +80,11 @@ from lipmotion.units import (
     UNKNOWN_PHONES,
     check_phones,
     check_text,
+    close_gaps,
     is_silent,
-    without_gaps,
 )
-from lipmotion.units.mood_tags import tagged_text
-from lipmotion.units.text_normalisation import checked_tokens
+from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.text_normalisation import require_tokens
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -255,7 +255,7 @@ def aligned_within(
         (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
         lexicon_of(request),
     )
-    words = checked_tokens(word)
+    words = require_tokens(word)
     warn_of_guesses(words, lexicon)
     piece = audio.stretch(first, stop)
     if stop > len(audio.samples) // HOP:
@@ -463,8 +463,8 @@ def _words(text: str | TimedTranscript | None, duration_s: float) -> tuple[str, 
     if "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
-    plain, tags = tagged_text(text)
-    words = checked_tokens(plain)
+    plain, tags = parse_tagged_text(text)
+    words = require_tokens(plain)
     return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
 
 
@@ -498,7 +498,7 @@ def _followed(
         LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
     if guessed:
         LOG.warning("the units do not say which phones are said at %s: they are recognised", named_places(guessed))
-    units = without_gaps(Timeline(tuple(spans)), audio.duration_s)
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
     if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
     name = network_of(kind) if request.language == ENGLISH else None
@@ -515,7 +515,7 @@ def _followed(
     ]
     warn_of_label_misfit(fit, filled=bool(filling))
     spans = sorted([*spans, *filling], key=lambda span: span.start_s)
-    units = without_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
     return units, replace(fit, missing=(*fit.missing, *guessed))
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import power_level, smooth_level, sound_runs, spoken_frames
+from lipmotion.hmm.loudness import average_power, find_sound_runs, find_spoken_frames, smooth_level
 from lipmotion.speech.features.mfcc import HOP, WINDOW, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import CEPSTRA, general_features
@@ -68,7 +68,7 @@ class AnalysedAudio(Audio):
         for number, (piece, (first, end)) in enumerate(found):
             level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
             samples = level_passage(fill_gaps(samples, level), level)
-            sound = spoken_frames(level)
+            sound = find_spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
             padded = _PassageAudio(np.pad(samples, (lead * HOP, tail * HOP)), self.rate_hz, lead=lead, tail=tail)
             own = slice(bounds[number], bounds[number + 1])
@@ -111,7 +111,7 @@ class AnalysedAudio(Audio):
             else:
                 frame = min((start + HOP // 2) // HOP, self.frames - len(energy))
                 pieces.append(_Piece(frame, samples, energy, passages, tones))
-        levels = [power_level(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
+        levels = [average_power(piece.energy).max() if piece.passages else -np.inf for piece in pieces]
         least = max(levels, default=0) - SOFTEST_DROP
         return [piece for piece, level in zip(pieces, levels, strict=True) if level >= least or piece.tones]
 
@@ -239,7 +239,7 @@ def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) 
     silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
     for first, end in passages:
         silent[first:end] = False
-    runs = sound_runs(silent, 1) if passages else []
+    runs = find_sound_runs(silent, 1) if passages else []
     return [(first + end) // 2 * HOP for first, end in runs if end - first >= SEPARATE_FRAMES]
 
 

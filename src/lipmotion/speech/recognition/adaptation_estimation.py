@@ -21,9 +21,9 @@ from lipmotion.speech.recognition.recogniser import Recogniser, own_model_weight
 from lipmotion.stats.constrained_mllr import (
     AffineStatistics,
     Array,
-    improved_transform,
+    collect_transform_statistics,
+    improve_transform,
     prior_statistics,
-    transform_statistics,
 )
 from lipmotion.stats.em import run_em
 from lipmotion.stats.mixture import Mixtures
@@ -145,7 +145,7 @@ def _improved(
     """
     return run_em(
         transform,
-        lambda transform: transform_statistics(mixtures, features, densities, transform),
-        lambda transform, expected: improved_transform(transform, expected.statistics + prior, free),
+        lambda transform: collect_transform_statistics(mixtures, features, densities, transform),
+        lambda transform, expected: improve_transform(transform, expected.statistics + prior, free),
         ITERATIONS,
     ).model

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import frames_above, quiet_frames
+from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.general.acoustic import STATES, density_column, general_model
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
@@ -99,7 +99,7 @@ def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     """
     analysis = analysed(audio)
     scored = _scored_frames(analysis, units)
-    loud = frames_above(analysis.log_energy)
+    loud = find_loud_frames(analysis.log_energy)
     missing, speech_s = [], 0.0
     for span in units:
         loud_s = (_first_frame(span.start_s) + np.flatnonzero(loud[_frames_of(span)])) / FRAME_RATE_HZ
@@ -128,11 +128,11 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
         found = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
         idle, wrong = found.idle, found.wrong
         loud = _joined(
-            [(at, at + 1 / FRAME_RATE_HZ) for at in np.flatnonzero(frames_above(audio.log_energy)) / FRAME_RATE_HZ]
+            [(at, at + 1 / FRAME_RATE_HZ) for at in np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ]
         )
         missing = tuple(_unlabelled(stretch, spoken, loud) for stretch in found.missing)
     else:
-        quiet = quiet_frames(audio.log_energy)
+        quiet = find_quiet_frames(audio.log_energy)
         silent = _joined([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
         idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= LEAST_IDLE_S)
         missing, wrong = transcript_fit(audio, units).missing, ()

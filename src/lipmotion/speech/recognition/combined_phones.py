@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.log_likelihoods import DensitySelection, LogLikelihoods
-from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.states import StateTable
+from lipmotion.hmm.model import StateTable, UnitHmm
 from lipmotion.speech.recognition.general.acoustic import density_column, general_model
 from lipmotion.speech.recognition.general.language import english_bigram
 from lipmotion.stats.bigram import Bigram
-from lipmotion.units import PHONES, SILENCE, is_silent, most_similar_phone
+from lipmotion.units import PHONES, SILENCE, find_similar_phone, is_silent
 
 NOISES = ("+nsn+", "+spn+")
 """Units that only the general models have: noise, and noise of the mouth (a breath, a cough)."""
@@ -42,7 +41,7 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
     """Return the own models extended to all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
     old, modelled = own.table, [unit for unit in own.table.units if not is_silent(unit)]
     new = tuple(unit for unit in (*PHONES, *NOISES) if unit not in old.units)
-    borrowed = [SILENCE if unit in NOISES or is_silent(unit) else most_similar_phone(unit, modelled) for unit in new]
+    borrowed = [SILENCE if unit in NOISES or is_silent(unit) else find_similar_phone(unit, modelled) for unit in new]
     plain = len(own.log_stay)
     added = [(unit, state, old.density(source, state)) for unit, source in zip(new, borrowed, strict=True)
              for state in range(old.count(source))]  # fmt: skip
@@ -57,7 +56,7 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
         own,
         config=replace(own.config, bigram_weight=BIGRAM_WEIGHT, insertion=INSERTION_SCORE),
         table=table,
-        mixtures=own.mixtures.selected(sources),
+        mixtures=own.mixtures.select(sources),
         log_stay=own.log_stay[sources[: plain + len(added)]],
         bigram=_bigram(own.bigram, table.units),
     )

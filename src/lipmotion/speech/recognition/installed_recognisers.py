@@ -15,8 +15,8 @@ import numpy as np
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.extensions import install_command
-from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine, in_order
-from lipmotion.units.spoken_text import spoken_text, timed_words
+from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine, sort_lines
+from lipmotion.units.spoken_text import extract_spoken_text, time_words
 
 LOG = logging.getLogger("lipmotion")
 ENGLISH = "en"
@@ -63,7 +63,7 @@ def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
     lines = recogniser.words(module, folder, audio)
     if lines is None:
         return None
-    transcript = in_order(lines)
+    transcript = sort_lines(lines)
     return transcript if transcript.lines else None
 
 
@@ -98,9 +98,9 @@ def _whisper_line(segment: Any) -> TranscriptLine:
     """Return a segment: from its words in time, or where there are none from its text."""
     words: list[TimedWord] = []
     for word in segment.words or ():
-        words += timed_words(spoken_text(word.word), float(word.start), float(word.end))
+        words += time_words(extract_spoken_text(word.word), float(word.start), float(word.end))
     if not words:
-        words = [TimedWord(word.word) for word in timed_words(spoken_text(segment.text))]
+        words = [TimedWord(word.word) for word in time_words(extract_spoken_text(segment.text))]
     return TranscriptLine(tuple(words), float(segment.start), float(segment.end))
 
 
@@ -119,7 +119,7 @@ def _vosk_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]
     for result in _vosk_results(recogniser, audio):
         words: list[TimedWord] = []
         for item in json.loads(result).get("result", ()):
-            words += timed_words(spoken_text(item["word"]), float(item["start"]), float(item["end"]))
+            words += time_words(extract_spoken_text(item["word"]), float(item["start"]), float(item["end"]))
         if words:
             lines.append(TranscriptLine(tuple(words), words[0].start_s, words[-1].end_s))
     return lines

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, unit_windows
-from lipmotion.hmm.decode import UnitLoop, unit_loop
+from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, spread_windows
+from lipmotion.hmm.decode import UnitLoop, build_unit_loop
 from lipmotion.hmm.log_likelihoods import (
     LogLikelihoods,
-    log_likelihoods_of,
+    compute_log_likelihoods,
     penalise_silence,
     penalise_speech,
 )
-from lipmotion.hmm.loudness import frames_above, quiet_frames
+from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.kernels.paths import Windows
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
@@ -45,7 +45,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 )
 from lipmotion.speech.recognition.word_search import WordSearch, begun_decoding, free_labels
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
-from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
+from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
 
 RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
@@ -149,7 +149,7 @@ class Recogniser:
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
         features = audio.mfcc()
-        loud = frames_above(audio.log_energy)
+        loud = find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
             parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
@@ -177,7 +177,7 @@ class Recogniser:
     ) -> WordSearch:
         """Return the search for words in a recording whose phones without words have a path through ``_loop``."""
         aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
-        loud = frames_above(audio.log_energy)
+        loud = find_loud_frames(audio.log_energy)
         free = self._loop.network.emission[path]
         return WordSearch(hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words")
 
@@ -211,11 +211,11 @@ class Recogniser:
         """
         audio = analysed(audio, features)
         hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
-        log_likelihoods = penalise_silence(hmm, log_likelihoods, frames_above(audio.log_energy))
+        log_likelihoods = penalise_silence(hmm, log_likelihoods, find_loud_frames(audio.log_energy))
         forms_of = {word: lexicon.spoken_forms(word) for word in set(words)}
         modelled = {PAUSE, *(unit for unit in hmm.table.units if not is_silent(unit))}
         units_of = {
-            word: [tuple(most_similar_phone(phone, modelled) for phone, _ in form) for form in forms]
+            word: [tuple(find_similar_phone(phone, modelled) for phone, _ in form) for form in forms]
             for word, forms in forms_of.items()
         }
         spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
@@ -263,7 +263,7 @@ class Recogniser:
     @cached_property
     def _loop(self) -> UnitLoop:
         hmm = self.own if self.kind == "own" else self.combined.hmm
-        return unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
+        return build_unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
 
     @property
     def _has_few_gaussians(self) -> bool:
@@ -277,14 +277,14 @@ class Recogniser:
         similarity : of the recording, if it is known
         """
         hmm, log_likelihoods = self._unpenalised(audio, similarity, aligning)
-        return hmm, penalise_speech(hmm, log_likelihoods, quiet_frames(audio.log_energy))
+        return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
 
     def _unpenalised(
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, aligning: bool
     ) -> tuple[UnitHmm, LogLikelihoods]:
         if self.kind == "own":
             warp, _ = self._own_transform(audio, similarity)
-            return self.own, log_likelihoods_of(self.own, self._own_features(audio, warp))
+            return self.own, compute_log_likelihoods(self.own, self._own_features(audio, warp))
         general_alone = self.kind == "general" or (aligning and self._has_few_gaussians)
         warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
         # own models without weight are not evaluated: any features will do, and those of a long recording are large
@@ -326,7 +326,7 @@ def _aligned(
         edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
         placed, windows = align_within(anchors, least_frames(words, counts), edge, frames, search)
         spoken = [item.spoken for item in placed]
-        of_units = unit_windows(spoken, windows, frames)
+        of_units = spread_windows(spoken, windows, frames)
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
 
 

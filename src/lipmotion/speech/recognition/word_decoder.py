@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.units.lexicon import english_data
+from lipmotion.units.lexicon import find_english_data
 
 
 class FoundWord(NamedTuple):
@@ -79,7 +79,7 @@ def is_filler(word: str) -> bool:
 @cache
 def _decoder() -> Any:
     """Return the decoder of this process; it is loaded once, in 0.2 s."""
-    folder = english_data()
+    folder = find_english_data()
     try:
         from pocketsphinx import Decoder
 

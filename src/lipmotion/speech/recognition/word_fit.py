@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.align import choose_pronunciations, state_path, state_sequence
+from lipmotion.hmm.align import align_states, choose_pronunciations
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.recognition.combined_phones import NOISES
-from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, is_silent, most_similar_phone
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import FULL_FORMS
 
 COMPARED_FORMS = FULL_FORMS | {PAUSE: SILENCE} | dict.fromkeys(NOISES, SILENCE)
@@ -70,13 +70,12 @@ def align_recognised_words(
     modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
     variants = {word: lexicon.pronunciations(word) for word in set(words)}
     units = {
-        word: [tuple(most_similar_phone(phone, modelled) for phone in variant) for variant in of_word]
+        word: [tuple(find_similar_phone(phone, modelled) for phone in variant) for variant in of_word]
         for word, of_word in variants.items()
     }
     spoken = choose_pronunciations(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
     sequence = [unit for item in spoken for unit in item.units]
-    _, path = state_path(hmm, log_likelihoods, sequence)
-    states = state_sequence(hmm, sequence)
+    states, path = align_states(hmm, log_likelihoods, sequence)
     phones = [(phone, item.word) for item in spoken for phone in (
         variants[words[item.word]][item.variant] if item.word >= 0 else item.units)]  # fmt: skip
     bounds = np.searchsorted(states.positions[path], np.arange(len(sequence) + 1)).astype(np.intp)

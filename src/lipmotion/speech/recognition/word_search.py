@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.decode import UnitLoop, units_of_path
-from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_from, penalise_silence
+from lipmotion.hmm.decode import UnitLoop, decode_path
+from lipmotion.hmm.log_likelihoods import LogLikelihoods, penalise_silence, wrap_log_likelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.combined_phones import NOISES
@@ -102,7 +102,7 @@ class WordSearch:
         if not words:
             return [], []
         values = self.aligning.stretch(*stretch)
-        likelihoods = penalise_silence(self.hmm, log_likelihoods_from(values), self.loud[slice(*stretch)])
+        likelihoods = penalise_silence(self.hmm, wrap_log_likelihoods(values), self.loud[slice(*stretch)])
         try:
             aligned = align_recognised_words(self.hmm, likelihoods, words, DICTIONARY)
         except AlignmentError:  # there is not room for them all
@@ -117,7 +117,7 @@ class WordSearch:
     def _favouring(self, stretch: Stretch, aligned: AlignedWords) -> list[LabelledFrames]:
         """Return the phones of a stretch that are recognised if those of words in it are more probable than others."""
         values = self.free.stretch(*stretch) + phone_bonus(self.hmm, aligned, WORD_BONUS)
-        return free_labels(self.loop, self.loop.network.best_path(log_likelihoods_from(values)), stretch.first)
+        return free_labels(self.loop, self.loop.network.best_path(wrap_log_likelihoods(values)), stretch.first)
 
 
 def confidence_of(fit: float, posterior: float) -> float:
@@ -132,7 +132,7 @@ def confidence_of(fit: float, posterior: float) -> float:
 
 def free_labels(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
     """Return the phones of a path through a loop [shape=(T,)] whose first frame is ``first``; noises are silence."""
-    phones, starts = units_of_path(loop, path)
+    phones, starts = decode_path(loop, path)
     return [
         LabelledFrames(first + int(start), SILENCE if phone in NOISES else phone)
         for phone, start in zip(phones, starts[:-1], strict=True)

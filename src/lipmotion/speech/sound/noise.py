@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.loudness import frames_above
+from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.mfcc import HOP, checked_samples, log_energy
 from lipmotion.types import Audio
 
@@ -97,7 +97,7 @@ def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
     Raises InputError: not one channel of finite samples at 16 kHz, shorter than 25 ms, or silent.
     """
     samples = checked_samples(audio)
-    loud = frames_above(log_energy(samples))
+    loud = find_loud_frames(log_energy(samples))
     if not loud.any():  # a steady tone has no quiet frames
         loud = np.ones_like(loud)
     nearest = np.minimum((np.arange(len(samples)) + HOP // 2) // HOP, len(loud) - 1)

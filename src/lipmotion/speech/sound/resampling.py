@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio, sixteen_bits
+from lipmotion.types import Audio, to_sixteen_bits
 
 BLOCK = 1 << 16
 """Samples that are resampled at a time."""
@@ -21,7 +21,7 @@ def at_speech_rate(sound: Audio) -> Audio:
     resampler = av.AudioResampler(format="flt", layout="mono", rate=SPEECH_RATE_HZ)
     parts: list[Any] = []
     for start in range(0, len(sound.samples), BLOCK):
-        block = sixteen_bits(sound.samples[None, start : start + BLOCK])
+        block = to_sixteen_bits(sound.samples[None, start : start + BLOCK])
         frame = av.AudioFrame.from_ndarray(block, format="s16", layout="mono")
         frame.rate, frame.pts, frame.time_base = sound.rate_hz, None, Fraction(1, sound.rate_hz)
         parts += resampler.resample(frame)

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import DECIBEL, LEAST_RANGE, frames_above, power_level, smooth_level, sound_runs
+from lipmotion.hmm.loudness import DECIBEL, LEAST_RANGE, average_power, find_loud_frames, find_sound_runs, smooth_level
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW
 from lipmotion.types import Audio
-from lipmotion.types.audio import sixteen_bits
+from lipmotion.types.audio import to_sixteen_bits
 
 PAUSE_FRAMES = 40
 """Sound with shorter pauses is one stretch."""
@@ -66,7 +66,7 @@ def stretches_of_sound(log_energy: NDArray[np.float32]) -> list[Stretch]:
     None is longer than ``LONGEST_FRAMES``. A recording of constant energy has none.
     """
     stretches: list[Stretch] = []
-    for first, end in sound_runs(frames_above(log_energy), PAUSE_FRAMES):
+    for first, end in find_sound_runs(find_loud_frames(log_energy), PAUSE_FRAMES):
         earliest = stretches[-1].end if stretches else 0
         stretch = Stretch(max(earliest, first - MARGIN_FRAMES), min(len(log_energy), end + MARGIN_FRAMES))
         if (
@@ -94,7 +94,7 @@ def _cut(stretch: Stretch, log_energy: NDArray[np.float32]) -> list[Stretch]:
 
 def stretch_samples(audio: Audio, stretch: Stretch) -> bytes:
     """Return the samples of a stretch of a recording at 16 kHz, as 16-bit integers."""
-    return sixteen_bits(audio.samples[stretch.first * HOP : stretch.end * HOP]).astype("<i2").tobytes()
+    return to_sixteen_bits(audio.samples[stretch.first * HOP : stretch.end * HOP]).astype("<i2").tobytes()
 
 
 def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:
@@ -106,7 +106,7 @@ def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:
     passages: list[Stretch] = []
     floor = float(log_energy.max() + np.log(DYNAMIC_RANGE)) + 1e-3
     for region in _regions(log_energy):
-        found = sound_runs(frames_above(log_energy[region.first : region.end]), SEPARATE_FRAMES)
+        found = find_sound_runs(find_loud_frames(log_energy[region.first : region.end]), SEPARATE_FRAMES)
         runs = _joined([Stretch(region.first + first, region.first + end) for first, end in found])
         for number, run in enumerate(runs):
             before = (runs[number - 1].end + run.first + 1) // 2 if number else region.first
@@ -128,7 +128,7 @@ def find_tones(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) ->
     ranges = maximum_filter1d(log_energy, TONE_FRAMES) - minimum_filter1d(log_energy, TONE_FRAMES)
     steady = (ranges < TONE_RANGE) & (log_energy > log_energy.max() - TONE_DROP)
     window, tones = np.hanning(WINDOW), []
-    for first, end in sound_runs(maximum_filter1d(steady, TONE_FRAMES), 1):
+    for first, end in find_sound_runs(maximum_filter1d(steady, TONE_FRAMES), 1):
         pure = np.zeros(end - first, bool)
         for start in range(first, end, TONE_BLOCK):  # hours may be steady
             stop = min(start + TONE_BLOCK, end)
@@ -137,7 +137,7 @@ def find_tones(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) ->
             power = np.square(np.abs(np.fft.rfft(sliding_window_view(block, WINDOW)[::HOP] * window)))
             near = np.abs(np.arange(power.shape[1]) - np.median(power.argmax(axis=1))) <= 3
             pure[start - first : stop - first] = power[:, near].sum(axis=1) > TONE_SHARE * power.sum(axis=1)
-        runs = sound_runs(pure, 1)
+        runs = find_sound_runs(pure, 1)
         tones += [Stretch(first + start, first + stop) for start, stop in runs if stop - start >= TONE_FRAMES]
     return tones
 
@@ -163,7 +163,7 @@ def _regions(log_energy: NDArray[np.float32]) -> list[Stretch]:
     """Return the recording cut in the quietest frames between voices of other levels, and in long silence."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    level = power_level(log_energy)
+    level = average_power(log_energy)
     local = maximum_filter1d(level, LOCAL_FRAMES, mode="nearest")
     smooth = smooth_level(log_energy)
     falls = maximum_filter1d(local - minimum_filter1d(smooth, STEADY_FRAMES, mode="nearest"), STEADY_FRAMES) > STEADY
@@ -173,7 +173,7 @@ def _regions(log_energy: NDArray[np.float32]) -> list[Stretch]:
     cuts = {0, len(level)}
     for pause in (SEPARATE_FRAMES, SHORT_FRAMES // 10):  # whole lines first, then voices that follow at once
         before: tuple[float, int, int] | None = None
-        for first, end in sound_runs(sound, pause):
+        for first, end in find_sound_runs(sound, pause):
             loud, length = float(level[first:end].max()), end - first
             if before is not None:
                 step = abs(loud - before[0]) > LEVEL_STEP and min(length, before[2]) > SHORT_FRAMES // 2
@@ -207,8 +207,8 @@ def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> 
     Where nothing is recorded, features are unlike those of any room: all else would look alike beside them, and every
     voice like that of the training.
     """
-    loud = float(power_level(log_energy).max())
-    runs = sound_runs(log_energy < loud - GATED_DROP, 1)
+    loud = float(average_power(log_energy).max())
+    runs = find_sound_runs(log_energy < loud - GATED_DROP, 1)
     if not runs:
         return samples
     filled, rng = samples.copy(), np.random.default_rng(0)
@@ -227,7 +227,7 @@ def level_passage(samples: NDArray[np.float32], log_energy: NDArray[np.float32])
     """
     from scipy.ndimage import maximum_filter1d
 
-    level = power_level(log_energy)
+    level = average_power(log_energy)
     loud = float(level.max())
     gain = np.full(len(level), SAME_LEVEL / np.exp((loud - np.log(WINDOW)) / 2))
     lower = loud - maximum_filter1d(level, STEADY_FRAMES + 1, mode="nearest") - STEADY

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap
 from lipmotion.types import Audio, Span, Timeline
-from lipmotion.units import SILENCE, phone_classes
+from lipmotion.units import SILENCE, list_phone_classes
 
-CLOSING = phone_classes()["stop"] | phone_classes()["affricate"]
-VOWELS = phone_classes()["vowel"]
+CLOSING = list_phone_classes()["stop"] | list_phone_classes()["affricate"]
+VOWELS = list_phone_classes()["vowel"]
 CLOSURE_SHARE = 0.03
 """Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
 LONGEST_CLOSURE_S = 0.06

@@ -19,7 +19,7 @@ from lipmotion.speech.voices.inventory_phones import inventory_timeline
 from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
 from lipmotion.storage.files import temporary_folder
 from lipmotion.types import Audio, Timeline, Unit
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon, split_words
 
 LOG = logging.getLogger("lipmotion")
 SYNTHESISERS: dict[str, Synthesiser] = {synthesiser.name: synthesiser for synthesiser in (FLITE, FESTIVAL, ESPEAK_NG)}
@@ -159,7 +159,7 @@ def voiced_sentences(
 ) -> Generator[VoicedSentence, None, None]:
     """Yield several sentences in a voice, as ``speak_sentences``, each with the sound at the synthesiser's own rate."""
     synthesiser = _synthesiser(voice)
-    words = [words_of(text) for text in texts]
+    words = [split_words(text) for text in texts]
     known = (lexicon or Lexicon()) if voice.is_english else None
     with temporary_folder() as folder:
         plain = [" ".join(text.split()) for text in texts]

@@ -12,14 +12,14 @@ from itertools import groupby
 from lipmotion.errors import InputError
 from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, is_silent, phone_classes, words_in
+from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, find_words, is_silent, list_phone_classes
 from lipmotion.units.phones import REDUCED_VOWELS, SHORT_PAUSE_S
-from lipmotion.units.spelling import normalised_text
+from lipmotion.units.spelling import normalise_text
 
 GAP_COST, OWN_FORM_COST, OWN_KIND_COST, OTHER_KIND_COST = 0.7, 0.3, 0.8, 1.5
 """Costs of matching a phone with none, with a form of itself, with another of its kind (vowel or consonant), and with
 one of the other kind."""
-VOWELS = phone_classes()["vowel"]
+VOWELS = list_phone_classes()["vowel"]
 WRITTEN_EDGES = re.compile(r"^[^\w]+|[^\w]+$")
 """Punctuation at the ends of a written word."""
 Phones = Sequence[tuple[str, float, float]]
@@ -96,11 +96,11 @@ def _with_written_words(phones: Phones, written: Timeline[str], lexicon: Lexicon
     for number, group in groupby(zip(phones, numbers, strict=True), key=lambda pair: pair[1]):
         names = [phone for (phone, _, _), _ in group]
         text = written[number].label
-        words = words_in(text)
+        words = find_words(text)
         if lexicon is not None and words:
             named = with_words(names, words, lexicon)
         else:
-            named = [Unit(name, word=WRITTEN_EDGES.sub("", normalised_text(text))) for name in names]
+            named = [Unit(name, word=WRITTEN_EDGES.sub("", normalise_text(text))) for name in names]
         again = bool(units) and named[0].word == units[-1].word
         units += [replace(named[0], again=again), *named[1:]]
     return units

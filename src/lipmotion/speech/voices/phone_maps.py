@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from lipmotion.units import PHONES, SILENCE
-from lipmotion.units.ipa_phones import ipa_phones
+from lipmotion.units.ipa_phones import read_ipa
 
 PhoneMap = Mapping[str, tuple[str, ...]]
 """A synthesiser's label to phones of the inventory."""
@@ -80,6 +80,6 @@ def complete_map(labels: Iterable[str], table: PhoneMap, *, ipa: bool) -> tuple[
         elif label.startswith("_"):
             found[label] = (SILENCE,)
         elif label not in found:
-            found[label], letters = ipa_phones(label)
+            found[label], letters = read_ipa(label)
             unknown |= dict.fromkeys(letters if ipa else [label])
     return found, tuple(unknown)

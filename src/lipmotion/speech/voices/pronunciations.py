@@ -11,7 +11,7 @@ from lipmotion.extensions import install_command
 from lipmotion.speech.voices.espeak import EXTRA, pronounced_words
 from lipmotion.types.languages import ENGLISH, LANGUAGES, foreign_letters
 from lipmotion.units import Lexicon, Pronunciation
-from lipmotion.units.ipa_phones import ipa_phones
+from lipmotion.units.ipa_phones import read_ipa
 from lipmotion.units.lexicon import SpokenForm
 
 MAPPED_CONFIDENCE = 0.8
@@ -78,6 +78,6 @@ def espeak_pronunciations(words: Sequence[str], voice: str) -> dict[str, tuple[P
     """Return the pronunciation of each word by the rules of a voice. Raises as ``pronounced_words``."""
     said = zip(words, pronounced_words(words, voice), strict=True)
     return {
-        word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in ipa_phones(label)[0]),)
+        word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in read_ipa(label)[0]),)
         for word, ipa in said
     }

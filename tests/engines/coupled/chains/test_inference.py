@@ -109,7 +109,7 @@ def test_a_factorial_hmm_of_one_chain_is_the_hmm():
     """With equal densities of all states of the second chain, the posteriors are those of the first chain alone."""
     model = made(FACTORIAL, (THREE, TWO), None)
     group = model.groups[1]
-    same = group.mixtures.selected(np.zeros(group.mixtures.size[0], np.intp))
+    same = group.mixtures.select(np.zeros(group.mixtures.size[0], np.intp))
     blind = type(model)(
         model.streams,
         model.transitions,

@@ -154,7 +154,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
         assert found.means[density] == pytest.approx(means, abs=1e-3)
         assert found.variances[density] == pytest.approx(variances, rel=1e-2, abs=1e-3)
     others = np.setdiff1d(np.arange(len(before.means)), visited)
-    assert found.selected(others).means.tobytes() == before.selected(others).means.tobytes()
+    assert found.select(others).means.tobytes() == before.select(others).means.tobytes()
 
 
 @pytest.mark.long

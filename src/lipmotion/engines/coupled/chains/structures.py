@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from lipmotion.errors import InputError
-from lipmotion.units import PHONES, UnitSet, unit_set
+from lipmotion.units import PHONES, UnitSet, load_unit_set
 
 HMM, MULTISTREAM, FACTORIAL, COUPLED = "hmm", "multistream", "factorial", "coupled"
 STRUCTURES = (HMM, MULTISTREAM, FACTORIAL, COUPLED)
@@ -128,7 +128,7 @@ def unit_sets(names: str) -> tuple[UnitSet, ...]:
 
     Raises InputError: no such unit set, or no name.
     """
-    sets = tuple(unit_set(name) for name in names.split())
+    sets = tuple(load_unit_set(name) for name in names.split())
     if not sets:
         raise InputError("no chains were given; required the unit set of each, as in 'phone viseme'")
     return sets

@@ -168,7 +168,7 @@ def _weighted_precisions(
 
     weight : of the components of these densities in every frame [shape=(T, M, G')]
     """
-    mixtures = group.stream_mixtures(stream).selected(densities)
+    mixtures = group.stream_mixtures(stream).select(densities)
     precision = (1 / mixtures.variances).transpose(1, 0, 2)
     weighted = precision * mixtures.means.transpose(1, 0, 2)
     size, flat = precision.shape[2], weight.reshape(len(weight), -1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product
 from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.hmm.multistream.unit_frames import units_in_frames
+from lipmotion.hmm.multistream.unit_states import units_to_frames
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
 from lipmotion.units import SILENCE
@@ -50,7 +50,7 @@ def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> 
 
 def unit_segments(structure: Structure, phones: Timeline[Unit], frames: int) -> list[tuple[int, int, int]]:
     """Return the unit of the first chain, the first frame, and the frame after the last, of every non-empty label."""
-    names, bounds = units_in_frames(phones, frames, SILENCE)
+    names, bounds = units_to_frames(phones, frames, SILENCE)
     units = [structure.units[0].index(structure.chains[0].unit(name)) for name in names]
     return list(zip(units, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
 

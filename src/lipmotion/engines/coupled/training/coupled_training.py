@@ -52,11 +52,11 @@ from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
-from lipmotion.motion.modulation_filter import learned_filter
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.modulation_filter import learn_filter
+from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
-from lipmotion.motion.variance_scaling import scaling_factors
-from lipmotion.stats.delta_windows import dynamics_known
+from lipmotion.motion.variance_scaling import fit_scaling_factors
+from lipmotion.stats.delta_windows import mark_known_dynamics
 from lipmotion.stats.em import EmResult
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
@@ -138,11 +138,11 @@ def growing_models(
     The last function returns what ``fit_coupled`` does. Raises as ``fit_coupled``.
     """
     structure = config.structure_with(unit_sets(config.chains))
-    moving = [example for example in examples if dynamics_known(example.valid).any()]
+    moving = [example for example in examples if mark_known_dynamics(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)
     if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):
         raise CorpusError(f"nothing is said in {len(moving)} examples with motion; learn from speech")
-    valid = [dynamics_known(example.valid) for example in moving]
+    valid = [mark_known_dynamics(example.valid) for example in moving]
     visual = fit_visual_streams(space, values, valid, config.dynamic)
     data = [
         AlignedUtterance(_observations(example, x, mask, visual), example.speech.units)
@@ -151,7 +151,7 @@ def growing_models(
     speech_only = [
         AlignedUtterance(speech_observations(_features(example), visual), example.speech.units)
         for example in examples
-        if not dynamics_known(example.valid).any()
+        if not mark_known_dynamics(example.valid).any()
     ]
     rest_pose, closure = _rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
     prior = fit_articulation_prior(space, values, moving) if config.articulation else None
@@ -170,9 +170,9 @@ def growing_models(
             recorded = [x[mask] for x, mask in zip(values, valid, strict=True)]
             generated = _generated(model, data)
             if config.variance_scaling:
-                model = replace(model, scaling=scaling_factors(recorded, generated))
+                model = replace(model, scaling=fit_scaling_factors(recorded, generated))
             scaled = ((x, model.scaling * made) for x, made in zip(recorded, generated, strict=True))
-            modulation = learned_filter(config.modulation_filter, scaled, moving, values)
+            modulation = learn_filter(config.modulation_filter, scaled, moving, values)
             model = replace(model, modulation=modulation)
         monitor(Progress("regression of visual means", 1, 1, 1.0))
         joint_states = model.chains.transitions.product.chain_states.shape[1]
@@ -193,7 +193,7 @@ def workers() -> int:
 
 def frames_away_from_speech(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
     """Return whether each frame is silence, further than 0.45 s from every phone [shape=(T,)]."""
-    return away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), AWAY_FROM_SPEECH_S)
+    return is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), AWAY_FROM_SPEECH_S)
 
 
 def _observations(

@@ -24,7 +24,7 @@ from lipmotion.engines.coupled.training.em_steps import (
     m_step,
 )
 from lipmotion.stats.mixture import Mixtures
-from lipmotion.units import most_similar_phone
+from lipmotion.units import find_similar_phone
 
 LEAST_FRAMES = 10
 """A joint state with at least so many frames in training has densities of its own."""
@@ -52,7 +52,7 @@ def with_joint_state_densities(
     groups = []
     for group in chains.groups:
         chain = structure.chain_of(group.streams[0])
-        mixtures = group.mixtures.concatenated(group.mixtures.selected(frequent[:, chain]))
+        mixtures = group.mixtures.concatenate(group.mixtures.select(frequent[:, chain]))
         tie = np.where(frequent_number >= 0, structure.state_counts[chain] + frequent_number, chain_states[chain])
         groups.append(replace(group, mixtures=mixtures, tie=tie))
     return Chains(chains.streams, new_transitions, tuple(groups))
@@ -200,9 +200,9 @@ def _with_borrowed_densities(
             for phone in unit_set.phones(name)
         ]
         if phones:
-            similar = unit_set.unit(most_similar_phone(unit_set.phones(units[unit])[0], phones))
+            similar = unit_set.unit(find_similar_phone(unit_set.phones(units[unit])[0], phones))
             source[state] = structure.state(units.index(similar), position)
-    return replace(group, mixtures=group.mixtures.selected(source))
+    return replace(group, mixtures=group.mixtures.select(source))
 
 
 def _best_path(chains: Chains, utterance: LatticeUtterance) -> Index:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.stats.mixture import Mixtures
-from lipmotion.units.lexicon import english_data
+from lipmotion.units.lexicon import find_english_data
 
 PHONES = (
     "+NSN+ +SPN+ AA AE AH AO AW AY B CH D DH EH ER EY F G HH IH IY JH K L M N NG OW OY P R S SH SIL T TH UH UW V W Y Z"
@@ -99,7 +99,7 @@ GENERAL_PHONE_NAMES = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M"
 @cache
 def general_model() -> GeneralModel:
     """Return the models; they are read once. Raises MissingDependencyError: not installed, or of another version."""
-    folder = english_data() / "en-us"
+    folder = find_english_data() / "en-us"
     try:
         means, variances = (_gaussians((folder / name).read_bytes()) for name in ("means", "variances"))
         weights = _weights((folder / "sendump").read_bytes())

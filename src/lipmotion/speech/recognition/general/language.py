@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.speech.recognition.general.acoustic import GENERAL_PHONE_NAMES, PHONES
-from lipmotion.units.lexicon import english_data
+from lipmotion.units.lexicon import find_english_data
 
 PROBABILITY_SHARE = {
     "ah": 0.3, "ax": 0.7, "er": 0.4, "axr": 0.6, "ih": 0.55, "ix": 0.45,
@@ -45,6 +45,6 @@ def _phone_bigram() -> NDArray[np.float64]:
             "the phone language model comes with pocketsphinx: pip install pocketsphinx"
         ) from error
     log_math = LogMath()
-    model = NGramModel(Config(), log_math, str(english_data() / "en-us-phone.lm.bin"))
+    model = NGramModel(Config(), log_math, str(find_english_data() / "en-us-phone.lm.bin"))
     names = _phones()
     return np.array([[log_math.exp(model.prob([following, phone])) for following in names] for phone in names])

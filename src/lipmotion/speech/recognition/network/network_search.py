@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.decode import UnitLoop
-from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_from, penalise_silence
+from lipmotion.hmm.log_likelihoods import LogLikelihoods, penalise_silence, wrap_log_likelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
 from lipmotion.speech.recognition.network.posteriors import (
@@ -29,7 +29,7 @@ from lipmotion.speech.recognition.word_fit import FORMS, align_recognised_words,
 from lipmotion.speech.recognition.word_search import free_labels
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.units import PHONES, Lexicon, Pronunciation, is_silent
-from lipmotion.units.phones import phone_edits
+from lipmotion.units.phones import count_phone_edits
 
 AGREEMENT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.9, 4.1, -2.7
 """Coefficients of the confidence of a word: by the share of its phones that the network finds without words, and the
@@ -80,7 +80,7 @@ class NetworkSearch:
 
     def _aligned(self, stretch: Stretch, items: list[SpokenItem], first_word: int) -> list[LabelledStretch]:
         """Return the frames of a stretch with its phones; words are numbered from ``first_word`` on."""
-        values = log_likelihoods_from(self.aligning.stretch(*stretch))
+        values = wrap_log_likelihoods(self.aligning.stretch(*stretch))
         likelihoods = penalise_silence(self.hmm, values, self.loud[slice(*stretch)])
         names = [str(number) for number in range(len(items))]
         lexicon = Lexicon({name: item.variants for name, item in zip(names, items, strict=True)})
@@ -124,7 +124,7 @@ def phones_without_words(
     for stretch, posteriors in found:
         if _finds_phones(posteriors):
             values = free.stretch(*stretch) + _posterior_bonus(hmm, posteriors, stretch.end - stretch.first)
-            path = loop.network.best_path(log_likelihoods_from(values))
+            path = loop.network.best_path(wrap_log_likelihoods(values))
             parts.append((stretch, free_labels(loop, path, stretch.first)))
     return parts
 
@@ -148,6 +148,6 @@ def _confidence(
 ) -> float:
     """Return the probability that a word is right, 0 to 1."""
     sure = posteriors.mean_posterior(first, end)
-    agreement = max(1 - phone_edits(variant, found) / max(len(variant), len(found)) for variant in variants)
+    agreement = max(1 - count_phone_edits(variant, found) / max(len(variant), len(found)) for variant in variants)
     score = AGREEMENT_WEIGHT * agreement + POSTERIOR_WEIGHT * sure + CONSTANT
     return float(1 / (1 + np.exp(-score)))

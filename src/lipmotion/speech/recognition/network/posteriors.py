@@ -23,7 +23,7 @@ from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stre
 from lipmotion.types import Audio, JoinedRows, ParallelMap, TokenPosteriors
 from lipmotion.types.audio import from_sixteen_bits
 from lipmotion.units import PHONES
-from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units.ipa_phones import read_tokens
 
 POSTERIOR_STEP = 2
 """Frames of 10 ms from one row of posteriors to the next."""
@@ -141,7 +141,7 @@ class PhonePosteriors:
     def phones_between(self, first: int, end: int) -> list[str]:
         """Return the phones of the best path that begin in some rows: from ``first`` to before ``end``."""
         found = [each.token for each in self.best_tokens if first <= each.first < end]
-        return [phone for phone, _ in token_phones(found)]
+        return [phone for phone, _ in read_tokens(found)]
 
     def mean_posterior(self, first: int, end: int) -> float:
         """Return the mean posterior of the tokens of the best path that begin in some rows, 0 to 1; 0 without any."""
@@ -261,7 +261,7 @@ def _phones_of(tokens: tuple[str, ...]) -> NDArray[np.float32]:
     """Return which phone each token is; several share it; the last column: none [shape=(K, 48)]."""
     table = np.zeros((len(tokens), len(PHONES) + 1), np.float32)
     for number, token in enumerate(tokens):
-        phones = [phone for phone, _ in token_phones([token])] if token not in (BLANK, WORD_BOUNDARY) else []
+        phones = [phone for phone, _ in read_tokens([token])] if token not in (BLANK, WORD_BOUNDARY) else []
         for phone in phones:
             table[number, PHONES.index(phone)] += 1 / len(phones)
         if not phones:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.units import PHONES, is_silent
-from lipmotion.units.lexicon import english_data
+from lipmotion.units.lexicon import find_english_data
 from lipmotion.units.phones import FULL_FORMS
 
 SOUNDS = tuple(phone for phone in PHONES if not is_silent(phone) and phone not in FULL_FORMS)
@@ -92,7 +92,7 @@ def english_words() -> EnglishWords:
         from pocketsphinx import Config, LogMath, NGramModel
 
         log_math = LogMath()
-        model = NGramModel(Config(), log_math, str(english_data() / "en-us.lm.bin"))
+        model = NGramModel(Config(), log_math, str(find_english_data() / "en-us.lm.bin"))
     except (ImportError, RuntimeError) as error:
         raise MissingDependencyError(
             f"words are recognised with the language model of pocketsphinx ({error}): pip install pocketsphinx"
@@ -114,7 +114,7 @@ def _pronunciations() -> dict[str, list[str]]:
     """Return the pronunciations of every word: those of the dictionary, and those that phone networks write."""
     found: dict[str, list[str]] = {}
     written = resources.files(__package__).joinpath("written_words.txt").read_text(encoding="ascii")
-    lines = (english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8")
+    lines = (find_english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8")
     for line in (lines + written).splitlines():
         word, _, phones = line.partition(" ")
         if word[-1] == ")":
