@@ -164,9 +164,9 @@ def _read_nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
 
 def _read_lrs(text: str, where: str) -> list[LabelTier]:
     """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds."""
-    heading, said = LRS_WORDS.search(text), LRS_TEXT.match(text)
+    heading, spoken = LRS_WORDS.search(text), LRS_TEXT.match(text)
     if heading is None:
-        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, said[1] if said else "", "line 1"),), LINES)]
+        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, spoken[1] if spoken else "", "line 1"),), LINES)]
     rows = re.split(r"\n\s*\n", text[heading.start() :], maxsplit=1)[0]
     padded = "\n" * text.count("\n", 0, heading.start()) + re.sub(r"[ \t]+", "\t", rows)
     return _read_table(padded, _find_columns("WORD\tSTART\tEND"), where)

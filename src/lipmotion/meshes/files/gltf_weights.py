@@ -105,7 +105,13 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     ]
     if not animations:
         raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
-    animation, tracks = next((each for each in animations if any(map(_moves_mouth, each[1]))), animations[0])
+
+    def moves_mouth(track: _Track) -> bool:
+        keys = track.keys[:, 1] if track.kind == CUBIC else track.keys
+        mouth = [spoken_name(name) is not None or arkit_name(name) in ARKIT_MOUTH for name in track.names]
+        return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
+
+    animation, tracks = next((each for each in animations if any(map(moves_mouth, each[1]))), animations[0])
     if len(animations) > 1:
         named = [plain_name(each.get("name", "")) or "without a name" for each, _ in animations]
         which = [each is animation for each, _ in animations].index(True)
@@ -118,12 +124,6 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
     return _merge_tracks(document, tracks, ordered), Timeline(())
-
-
-def _moves_mouth(track: _Track) -> bool:
-    keys = track.keys[:, 1] if track.kind == CUBIC else track.keys
-    mouth = [spoken_name(name) is not None or arkit_name(name) in ARKIT_MOUTH for name in track.names]
-    return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
 
 
 def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
