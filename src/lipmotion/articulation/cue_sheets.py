@@ -68,7 +68,7 @@ class CueSheet:
         return self.cues.spans[-1].end_s
 
 
-def start_s(frame: int, fps: float) -> float:
+def frame_to_seconds(frame: int, fps: float) -> float:
     """Return the first hundredth of a second in which a frame is shown.
 
     Rounded up, so that ``int(fps * start)``, which readers of Rhubarb's and Moho's files compute, is the frame again.
@@ -83,7 +83,7 @@ def cue_frame_count(duration_s: float, fps: float) -> int:
     """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
     end_s = whole_hundredths(duration_s)
     frames = int(np.ceil(end_s * fps))
-    while frames and start_s(frames - 1, fps) >= end_s:
+    while frames and frame_to_seconds(frames - 1, fps) >= end_s:
         frames -= 1
     return frames
 
@@ -95,7 +95,7 @@ def whole_hundredths(duration_s: float) -> float:
 
 def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
     """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
-    starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
+    starts = [frame_to_seconds(frame, fps) for frame, _ in segments] or [0.0]
     shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
     ends = [*starts[1:], whole_hundredths(duration_s)]
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
