@@ -4,8 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
-from lipmotion.corpora.splits import LARGEST_LIST_BYTES, MAX_MISSING_NAMES, assign_splits, read_names
+from lipmotion.corpora.source_recordings import (
+    LARGEST_LIST_BYTES,
+    MAX_MISSING_NAMES,
+    RecordingFolder,
+    SourceRecording,
+    assign_splits,
+    read_names,
+)
 from lipmotion.errors import CorpusError
 
 

@@ -251,14 +251,11 @@ def _phone_values(part: PhoneShapes, silent: bool) -> Array:
 
 
 def _split_lines(units: Timeline[Unit], edges_s: Array) -> list[slice]:
-    """Return the frames of each line: how far the lips open and spread in one says nothing of another.
-
-    edges_s : of all frames [shape=(frames + 1,)]
-    Pauses of ``LINE_PAUSE_S`` divide lines; a short one belongs to a near one, as a word says little of a voice.
-    """
+    """Return the frames of each line: how far the lips open and spread in one says nothing of another."""
     lines: list[tuple[float, float]] = []
     for start_s, end_s in find_phrases(units, LINE_PAUSE_S):
         before_s, until_s = lines[-1] if lines else (0.0, -np.inf)
+        # a short one belongs to a near one, as a word says little of a voice
         if start_s - until_s < NEAR_S and min(end_s - start_s, until_s - before_s) < SHORT_S:
             lines[-1] = before_s, end_s
         else:

@@ -272,10 +272,7 @@ def jaw_drop(gap: Any) -> Any:
 
 
 def _express(mood: dict[int, Curve], weights: dict[str, Curve]) -> dict[str, Curve]:
-    """Return what a mood does to the mouth, as far as protruded and tucked lips leave it free [each shape=(T,)].
-
-    Rounding, and teeth on the lip, are seen in any mood.
-    """
+    """Return what a mood does to the mouth, as far as protruded and tucked lips leave it free [each shape=(T,)]."""
     none = np.zeros(len(weights["protrusion"]))
     free = 1 - (1 - ROUND_SHARE) * np.clip(weights["protrusion"], 0, 1)
     lifted = free * (1 - 0.5 * weights["lip_tuck"])
@@ -291,10 +288,7 @@ def _express(mood: dict[int, Curve], weights: dict[str, Curve]) -> dict[str, Cur
 
 
 def _articulate(gap: Curve, weights: dict[str, Curve], time_s: Curve) -> Curve:
-    """Return a gap that suits what is said beside p, b and m: teeth on the lip, tongue between the teeth, a round hole.
-
-    weights : the articulatory channels, with ``pursed`` [each shape=(T,)]
-    """
+    """Return a gap that suits what is said beside p, b and m: teeth on the lip, the tongue out, a round hole."""
     press, tuck, pursed = weights["lip_press"], weights["lip_tuck"], weights["pursed"]
     free = (1 - press) * np.clip(gap / 0.03, 0, 1)
     shown = np.maximum(2 * weights["teeth"] - 1, 0)

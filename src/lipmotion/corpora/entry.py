@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import check_regular, portable_name, read_text_file, whole_folder
 from lipmotion.storage.json_text import as_json, from_json

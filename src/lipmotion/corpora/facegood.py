@@ -14,8 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, MotionFile, RecordingFolder, SourceRecording
-from lipmotion.corpora.splits import LISTS, assign_splits
+from lipmotion.corpora.source_recordings import (
+    AUDIO_SUFFIXES,
+    LISTS,
+    MotionFile,
+    RecordingFolder,
+    SourceRecording,
+    assign_splits,
+)
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.storage.archive import array_in

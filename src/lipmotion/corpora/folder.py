@@ -1,6 +1,7 @@
-"""Reader of folders with videos, or with sounds and motion files; labels beside both where there are any.
+"""Finding the recordings in a folder: all readers by kind, and that of any folder of videos, or sounds with motion.
 
-A video with a table of Live Link Face beside it is not tracked: the table is its motion.
+Labels lie beside both where there are any. A video with a table of Live Link Face beside it is not tracked: the table
+is its motion.
 """
 
 from __future__ import annotations
@@ -11,15 +12,19 @@ from pathlib import Path
 from lipmotion.corpora.separate_sounds import is_of_recorder
 from lipmotion.corpora.source_recordings import (
     AUDIO_SUFFIXES,
+    LISTS,
+    VIDEO_SUFFIXES,
     MotionFile,
     RecordingFolder,
     SourceRecording,
+    assign_splits,
     filter_videos,
 )
-from lipmotion.corpora.splits import LISTS, assign_splits
-from lipmotion.errors import InputError
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.extensions import Registry
 from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.tables import is_live_link_file
+from lipmotion.storage.files import check_listable
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
 VIDEO_KINDS = (VIDEOS, BOTH)
@@ -102,3 +107,41 @@ def find_captures(video: Path) -> list[Path]:
 
 def _is_sound(path: Path) -> bool:
     return path.suffix.lower() in AUDIO_SUFFIXES
+
+
+CorpusReader = Callable[[Path], RecordingFolder | None]
+"""Returns the recordings in a folder; None where the folder is not of the reader's kind."""
+READERS: Registry[CorpusReader] = Registry(
+    "corpus reader",
+    "lipmotion.corpus_readers",
+    {
+        "grid": "lipmotion.corpora.layouts:read_grid",
+        "facegood": "lipmotion.corpora.facegood:read_facegood",
+        "vocaset": "lipmotion.corpora.vocaset:read_vocaset",
+        "layouts": "lipmotion.corpora.layouts:read_layouts",
+        "folder": "lipmotion.corpora.folder:read_folder",
+    },
+)
+
+
+def discover(directory: Path) -> RecordingFolder:
+    """Return the recordings in a folder, from the first reader that recognises its kind.
+
+    GRID of one speaker, FACEGOOD, VOCASET, the table of known corpora (``layouts``), then what installed packages add
+    in alphabetical order, then any folder of videos or sounds.
+
+    Raises InputError: no such folder. Raises CorpusError: no recordings in it, or its lists contradict each other.
+    """
+    if directory.is_file():
+        raise InputError(f"{directory}: is a file; give the folder of recordings that it is in")
+    if not directory.is_dir():
+        raise InputError(f"{directory}: no such folder; give a folder of recordings")
+    check_listable(directory)
+    readers = sorted(READERS.names, key=lambda name: name == "folder")  # the one that reads any folder is the last
+    found = next(filter(None, (READERS.load(name)(directory) for name in readers)))
+    if not found.recordings and not found.problems:
+        raise CorpusError(
+            f"{directory}: no videos in it, and no sounds with motion beside them; required: files ending in one of "
+            f"{' '.join(sorted(VIDEO_SUFFIXES))}, or a sound and a file of the same name in {' '.join(MOTION_SUFFIXES)}"
+        )
+    return found

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lipmotion.corpora.folder import gather_recordings, list_files
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, filter_videos
-from lipmotion.corpora.splits import LISTS, assign_splits
+from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits, filter_videos
 from lipmotion.errors import InputError, shortened
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.storage.files import read_text_file

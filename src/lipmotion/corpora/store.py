@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.corpora.entry import LARGEST_NUMBER, is_utterance_name, read_entry, read_utterance, write_utterance
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import TEMPORARY, confined, make_folder, read_text_file, remove_unfinished, whole_file
 from lipmotion.storage.json_text import as_json, from_json

@@ -141,9 +141,7 @@ def _parse(content: bytes) -> C3dFile:
 def _count_frames(parameters: dict[str, Values], numbered: int, held: int, spare: int) -> int:
     """Return how many frames there are: the largest number that is stated and held.
 
-    numbered : by the header, which cannot count on from 65,535, as whole parameters cannot
-    held     : as many would fit into the data;  spare : so many of them may be what fills its last block
-    Raises InputError: the data hold less than any number that is stated.
+    numbered : by the header, which cannot count on from 65,535;  spare : of those held, what may fill the last block
     """
     start, end = _number(parameters, "TRIAL.ACTUAL_START_FIELD", 1), _number(parameters, "TRIAL.ACTUAL_END_FIELD", 0)
     counted, long = _number(parameters, "POINT.FRAMES", 0), _number(parameters, "POINT.LONG_FRAMES", 0)

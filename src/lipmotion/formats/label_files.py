@@ -266,11 +266,7 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
 
 
 def _choose_tiers(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> list[LabelTier]:
-    """Return the tiers that are said or seen, of those the ones that are asked for.
-
-    tier, speaker : names, in any case; of a tier, all of its speaker stay that hold something else
-    Raises InputError: there is no such tier or speaker.
-    """
+    """Return the tiers that are said or seen, of those the ones that are asked for."""
     tiers = split_speakers(tiers)
     if speaker:
         tiers = [each for each in tiers if each.speaker.lower() == speaker.lower()] or _refuse(

@@ -192,10 +192,7 @@ def _split_words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
 
 
 def _read_dialogue(text: str, where: str) -> Iterator[TimedLabel]:
-    """Yield the dialogue of SubStation Alpha, without drawings and tags of styles (``{\\an8}``, ``{\\i1}``).
-
-    The text is the last field, and may hold commas.
-    """
+    """Yield the dialogue of SubStation Alpha, without drawings and tags of styles (``{\\an8}``, ``{\\i1}``)."""
     fields, in_events = DEFAULT_FIELDS, True
     for number, row in enumerate(StringIO(text), 1):
         line = row.strip()

@@ -137,10 +137,7 @@ def _read_spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
 
 
 def _read_nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
-    """Return the words of a CTM or the lines of an STM in order of time, a tier for each channel or speaker.
-
-    Raises InputError: a line of another form, or with a time that is none (with its number), or several recordings.
-    """
+    """Return the words of a CTM or the lines of an STM in order of time, a tier for each channel or speaker."""
     wanted = "recording channel start duration word" if form is CTM else "recording channel speaker start end words"
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     recording = ""
@@ -182,10 +179,7 @@ def _find_columns(line: str) -> dict[str, int]:
 
 
 def _read_table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
-    """Return the tiers of a table with a header: of the Montreal Forced Aligner, Praat, or anybody.
-
-    Raises InputError: a line of another form, with its number.
-    """
+    """Return the tiers of a table with a header: of the Montreal Forced Aligner, Praat, or anybody."""
     header = next(line for _, line in _lines(text))
     delimiter = max(",;\t", key=header.count)
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)

@@ -151,11 +151,7 @@ def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[i
 
 
 def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:
-    """Return how the head is turned against its rest pose, in the axes of the scene, as quaternions [shape=(T, 4)].
-
-    turns : of the neck and the head, in this order, by the numbers of their nodes
-    Raises InputError: a rotation is none.
-    """
+    """Return how the head is turned against its rest pose, in the axes of the scene, as quaternions [shape=(T, 4)]."""
     from scipy.spatial.transform import Rotation
 
     placed, turned = place_nodes(document), Rotation.identity()
@@ -180,10 +176,7 @@ def _rate(time_s: Array) -> float:
 
 
 def _targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tuple[int, str, dict[str, Any]]]:
-    """Yield the node, the path and the sampler of every channel of an animation that has keys.
-
-    What ``KHR_animation_pointer`` names is the same; ``weights/3`` is one of the weights.
-    """
+    """Yield the node, the path and the sampler of every channel of an animation that has keys."""
     samplers = animation.get("samplers", [])
     for channel in animation.get("channels", []):
         target, number = channel.get("target", {}), channel.get("sampler", -1)

@@ -282,12 +282,7 @@ def expression_weights(moods: Mapping[str, Array]) -> dict[str, Array]:
 def _close_own_weights(
     weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes, mood: Array | None
 ) -> Array:
-    """Return weights that a motion has with the lips of the mesh in contact where the mouth's are [shape=(T, S)].
-
-    motion : with the channels of ``with_mouth``
-    mood   : weights that a mood adds [shape=(T, S)], by which the lips are no further apart than it parts them
-    Frames in which the lips of the mesh touch as they should, and that no closure is near, stay as they are.
-    """
+    """Return weights that a motion has with the lips of the mesh in contact where the mouth's are [shape=(T, S)]."""
     gap, motion_gap = weights @ shapes.gap, read_gap(motion)
     share = np.clip(mouth.gap / np.maximum(motion_gap, 1e-9), 0, 1)
     wanted = np.where(motion_gap > LEAST_GAP, share * gap, gap)

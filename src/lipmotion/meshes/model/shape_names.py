@@ -99,10 +99,7 @@ OPENS = "jawOpen"
 
 
 def _invert(forms: Mapping[str, str]) -> Sources:
-    """Return the sources of blendshapes, from what each one of another set is made of: ``jawOpen 0.5 …``.
-
-    A name that both sides of a face have, as ``mouthSmile``, stands for both.
-    """
+    """Return the sources of blendshapes, from what each one of another set is made of: ``jawOpen 0.5 …``."""
     sources: dict[str, tuple[tuple[str, float], ...]] = {}
     for name, form in forms.items():
         words = form.split()
