@@ -40,7 +40,7 @@ def test_a_blendshape_keeps_only_what_moves():
     shape = CORNERS.copy()
     shape[1] += [0, 0, 1e-9]
     shape[2] += [0, 0, 0.5]
-    assert Blendshape.between("a", CORNERS, shape, least=1e-6).rows.tolist() == [2]
+    assert Blendshape.between("a", CORNERS, shape, smallest=1e-6).rows.tolist() == [2]
 
 
 WRONG = [

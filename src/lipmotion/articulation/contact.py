@@ -91,8 +91,8 @@ def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
             if first >= stop:  # a phone between two frames: the nearer one
                 first = min(max(round((span.start_s + span.end_s) / 2 * motion.rate_hz), 0), len(gap) - 1)
                 stop = first + 1
-            least = np.flatnonzero(gap[first:stop] <= gap[first:stop].min() + 1e-9)
-            frame = first + int(least[len(least) // 2])
+            closest = np.flatnonzero(gap[first:stop] <= gap[first:stop].min() + 1e-9)
+            frame = first + int(closest[len(closest) // 2])
             phones.setdefault(frame, ClosedPhone(frame, span.start_s, span.end_s))
     return [phones[frame] for frame in sorted(phones)]
 

@@ -138,10 +138,10 @@ def discover(directory: Path) -> RecordingFolder:
         raise InputError(f"{directory}: no such folder; give a folder of recordings")
     check_listable(directory)
     readers = sorted(READERS.names, key=lambda name: name == "folder")  # the one that reads any folder is the last
-    found = next(filter(None, (READERS.load(name)(directory) for name in readers)))
-    if not found.recordings and not found.problems:
+    folder = next(filter(None, (READERS.load(name)(directory) for name in readers)))
+    if not folder.recordings and not folder.problems:
         raise CorpusError(
             f"{directory}: no videos in it, and no sounds with motion beside them; required: files ending in one of "
             f"{' '.join(sorted(VIDEO_SUFFIXES))}, or a sound and a file of the same name in {' '.join(MOTION_SUFFIXES)}"
         )
-    return found
+    return folder

@@ -147,31 +147,31 @@ def read_layouts(directory: Path) -> RecordingFolder | None:
     groups = {path: match.groupdict(default="") for path, match in matches.items()}
     lists = frozenset(directory / name for name in LISTS)
     by_name: dict[str, list[Path]] = {}
-    for path, said in groups.items():
-        if all(said[group] == wanted for group, wanted in layout.only.items()):
-            by_name.setdefault(layout.name.format_map(said).lstrip("-"), []).append(path)
+    for path, named in groups.items():
+        if all(named[group] == wanted for group, wanted in layout.only.items()):
+            by_name.setdefault(layout.name.format_map(named).lstrip("-"), []).append(path)
 
     def read_recording(name: str, video: Path) -> SourceRecording:
-        said = groups[video]
+        named = groups[video]
         labels = find_labels(video, ignored=lists) if layout.words is None else None
         return SourceRecording(
             name,
             video,
-            labels.words if labels else layout.words(directory, video, said) if layout.words else None,
-            split=said.get("split") or "train",
+            labels.words if labels else layout.words(directory, video, named) if layout.words else None,
+            split=named.get("split") or "train",
             rights=dict(layout.rights),
-            speaker=said["speaker"],
+            speaker=named["speaker"],
             phones=labels.phones if labels else None,
         )
 
     return gather_recordings(layout.kind, by_name, read_recording, directory)
 
 
-def _grid_words(directory: Path, video: Path, said: Mapping[str, str]) -> Words | None:
+def _grid_words(directory: Path, video: Path, groups: Mapping[str, str]) -> Words | None:
     """Return the words of a word-time file, of the speaker or of all, or else of the video's name."""
     above = [folder for folder in video.parents if folder == directory or directory in folder.parents]
     folders = [video.parent, *(folder / "align" for folder in above)]
-    folders += [folder / inner / said["speaker"] for folder in above for inner in ("align", "alignments")]
+    folders += [folder / inner / groups["speaker"] for folder in above for inner in ("align", "alignments")]
     return _find_words(video, folders)
 
 

@@ -161,10 +161,10 @@ class Corpus:
             raise CorpusError(f"{self.path}: no speaker {unknown[0]!r} (there are: {known})")
         names = self.names(split, speakers)
         if not names:
-            found = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
+            counts = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
             who = f" by {', '.join(speakers)}" if speakers else ""
             raise CorpusError(
-                f"{self.path}: no utterances of split {split!r}{who} (there are {found}); choose another split, or "
+                f"{self.path}: no utterances of split {split!r}{who} (there are {counts}); choose another split, or "
                 "name recordings in a list beside them, test.txt for instance, and prepare them again (docs/corpora.md)"
             )
         return names

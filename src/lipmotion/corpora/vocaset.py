@@ -89,7 +89,7 @@ def read_mesh_motion(first: Path, rate_hz: float) -> Motion:
     Raises InputError: a file that is no mesh with the vertices of FLAME, in metres.
     """
     files = mesh_files(first)
-    numbers = [int(found[1]) if (found := NUMBER.search(path.stem)) else 1 for path in files]
+    numbers = [int(match[1]) if (match := NUMBER.search(path.stem)) else 1 for path in files]
     if not files or max(numbers) > MAX_MESHES:
         what = f"{len(files)} meshes up to number {max(numbers, default=0)}"
         raise InputError(f"{first}: {what}, required 1 to {MAX_MESHES}")

@@ -175,7 +175,7 @@ def _number(parameters: dict[str, Values], name: str, otherwise: float) -> float
 
 def _read_parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
     groups: dict[int, str] = {}
-    found: list[tuple[int, str, Values]] = []
+    stored: list[tuple[int, str, Values]] = []
     while at + 2 <= len(content) and content[at]:
         length, group = abs(struct.unpack_from("b", content, at)[0]), struct.unpack_from("b", content, at + 1)[0]
         name = content[at + 2 : at + 2 + length].decode("ascii").strip().upper()
@@ -184,13 +184,13 @@ def _read_parameters(content: bytes, at: int, processor: int) -> dict[str, Value
         if group < 0:
             groups[-group] = name
         else:
-            found.append((group, name, _read_values(content, body + 2, processor)))
+            stored.append((group, name, _read_values(content, body + 2, processor)))
         if step == 0:
             break
         if step < 0:
             raise InputError(f"the parameter {shortened(name)!r} is before its own place; export the capture again")
         at = body + step
-    return {f"{groups.get(group, '')}.{name}": values for group, name, values in found}
+    return {f"{groups.get(group, '')}.{name}": values for group, name, values in stored}
 
 
 def _read_values(content: bytes, at: int, processor: int) -> Values:
@@ -317,7 +317,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     if content.software == SOFTWARE:
         eyes = {name for name, _ in EYES}
         numbers = {column: MARKER.match(label) for column, label in enumerate(content.labels) if label not in eyes}
-        points = {column: found[1] for column, found in numbers.items() if found}
+        points = {column: match[1] for column, match in numbers.items() if match}
         curves = zip(content.analog_labels, content.analog_units, strict=True)
         channels = [Channel(name, unit or EYE_DISTANCE) for name, unit in curves]
         channels += [Channel(f"{axis}_{point}") for point in points.values() for axis in "xyz"]
@@ -345,7 +345,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 def _points(motion: Motion) -> list[int]:
     """Return the numbers of the points that have all three channels, in order."""
-    numbers = [int(found[1]) for name in motion.names if (found := _POINT.match(name)) and name.startswith("x")]
+    numbers = [int(match[1]) for name in motion.names if (match := _POINT.match(name)) and name.startswith("x")]
     eyes = {Channel(f"{axis}_{point}") for point in numbers for axis in "xyz"} & set(motion.channels)
     return [point for point in numbers if all(Channel(f"{axis}_{point}") in eyes for axis in "xyz")]
 

@@ -137,9 +137,9 @@ def cue_motion(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:
         spans.append(Span(cue.start_s, cue.end_s, Unit(phone, word=words[place].label if inside else "")))
     units = Timeline(tuple(spans))
     time_s = np.arange(int(sheet.duration_s * RATE_HZ + 1e-6) + 1) / RATE_HZ
-    said = crossfade_phones(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
-    gap = np.sum([SHAPES[name].opening * weight for name, weight in said.items()], axis=0) * WIDEST_GAP
-    spread = np.sum([SHAPES[name].spread * weight for name, weight in said.items()], axis=0)
+    weights = crossfade_phones(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
+    gap = np.sum([SHAPES[name].opening * weight for name, weight in weights.items()], axis=0) * WIDEST_GAP
+    spread = np.sum([SHAPES[name].spread * weight for name, weight in weights.items()], axis=0)
     width = mouth_template().width * (1 + WIDENING * spread)
     values = np.stack([gap_to_opening(np.where(gap < 1e-6, 0.0, gap)), width], axis=1)
     return Motion(values, RATE_HZ, (Channel("opening"), Channel("width"))), units

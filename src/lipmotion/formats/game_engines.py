@@ -55,8 +55,8 @@ def _choose_keys(
     """Return times and values of the keys of a weight, and whether it is held between them."""
     motion, held = generation.motion, name in generation.stepped
     values: Array = np.round(full * motion[name].astype(np.float64), decimals) + 0.0
-    kept = key_frames(motion.time_s, values, tolerance, stepped=held)
-    return motion.time_s[kept], values[kept], held
+    frames = key_frames(motion.time_s, values, tolerance, stepped=held)
+    return motion.time_s[frames], values[frames], held
 
 
 def check_unity(motion: Motion) -> None:

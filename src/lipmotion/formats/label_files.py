@@ -254,7 +254,7 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
     try:
         if is_textgrid(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
-        elif (found := ROOT.match(text)) and found[1] in READ_ROOTS:
+        elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
             tiers = xml_tiers(text, where)
         elif is_subtitles(text):
             tiers = [subtitle_tier(text, where)]
@@ -332,8 +332,8 @@ def _name_speakers(tiers: list[LabelTier], where: str) -> None:
 
 def _choose_words(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ...]:
     """Return the words in time of the speaker of some phones; none where labels hold several."""
-    said = [tier for tier in tiers if tier.speaker == phones.speaker and not holds_phones(tier)]
-    words = next((tier.labels for role in (WORDS, "") for tier in said if tier.role == role), ())
+    spoken = [tier for tier in tiers if tier.speaker == phones.speaker and not holds_phones(tier)]
+    words = next((tier.labels for role in (WORDS, "") for tier in spoken if tier.role == role), ())
     return words if all(len(label.text.split()) < 2 for label in words) else ()
 
 

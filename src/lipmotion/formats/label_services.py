@@ -247,11 +247,11 @@ def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     if not isinstance(value, str):
         missing = value in (None, -1)  # some services write -1 where they have none
         return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
-    found, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
-    if found is None and not math.isnan(clock_s):
+    match, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
+    if match is None and not math.isnan(clock_s):
         return clock_s, 1
-    if found is not None:
-        value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
+    if match is not None:
+        value, per_s = match[1].replace(",", "."), {"s": 1, "ms": 1000}.get((match[2] or "").lower(), per_s)
     if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
         return math.nan, per_s
     return parse_number(value, f"{where}: a time is", "a number of seconds"), per_s
@@ -259,12 +259,12 @@ def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
 
 def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
     """Return a time in seconds. Raises InputError: it is missing, or no number."""
-    time, own = _parse_number(value, where)
+    time, stated_per_s = _parse_number(value, where)
     if math.isnan(time):
         raise InputError(f"{where} has no time")
-    if abs(time / (own or per_s)) > LATEST_S:
+    if abs(time / (stated_per_s or per_s)) > LATEST_S:
         raise InputError(f"{where}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
-    return time / (own or per_s)
+    return time / (stated_per_s or per_s)
 
 
 def _read_row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
@@ -295,20 +295,20 @@ def _read_row(item: dict[str, Any], place: str, where: str, name: str) -> Row | 
 
 def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
     """Return the start and the end of an item by the first row of ``TIMES`` that it has."""
-    stamp, given = item.get("timestamp"), item
+    stamp, members = item.get("timestamp"), item
     if isinstance(stamp, list) and len(stamp) == 2:
-        given = {**given, "timestampstart": stamp[0], "timestampend": stamp[1]}
+        members = {**members, "timestampstart": stamp[0], "timestampend": stamp[1]}
     for name in ("time", "offsets"):  # an object of both
         if isinstance(item.get(name), dict):
-            given = {**given, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
-    times = next((row for row in TIMES if (row.start or row.end) in given), UNTIMED)
+            members = {**members, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
+    times = next((row for row in TIMES if (row.start or row.end) in members), UNTIMED)
     if item.get("type") in POLLY_KINDS and times not in TIMES[:2]:
-        is_speechify = {"start", "starttime"} <= given.keys()
-        times = POLLY if given.get("time") is not None else SPEECHIFY if is_speechify else times
-    start, per_s = _parse_number(given.get(times.start), where, times.per_s)
-    end, per_s = _parse_number(given.get(times.end), where, per_s)
-    if math.isnan(end) and times.duration in given:
-        end = start + _parse_number(given[times.duration], where)[0]
+        is_speechify = {"start", "starttime"} <= members.keys()
+        times = POLLY if members.get("time") is not None else SPEECHIFY if is_speechify else times
+    start, per_s = _parse_number(members.get(times.start), where, times.per_s)
+    end, per_s = _parse_number(members.get(times.end), where, per_s)
+    if math.isnan(end) and times.duration in members:
+        end = start + _parse_number(members[times.duration], where)[0]
     return start, end, times._replace(per_s=per_s)
 
 
@@ -330,19 +330,19 @@ def _find_rows(value: Any, place: str, where: str, name: str = "", depth: int = 
     if depth > DEEPEST:
         return []
     if isinstance(value, dict):
-        said = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
-        return _read_object(value, place, where, name, depth) if said else []
+        spoken = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
+        return _read_object(value, place, where, name, depth) if spoken else []
     rows: list[Row] = []
     items = value if isinstance(value, list) else []
     for number, each in enumerate(items[:1] if name in ALTERNATIVES else items, 1):
         is_stamp = isinstance(each, list) and len(each) == 3 and isinstance(each[0], str)  # IBM's
         item = dict(zip(("word", "start", "end"), each, strict=True)) if is_stamp else each
-        found: list[Row] = []
+        item_rows: list[Row] = []
         if isinstance(item, dict):
-            found = _find_rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
+            item_rows = _find_rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
         elif name in ("segments", "words"):
             require(values.members({}), item, f"{where}: {name!r}, item {number}")
-        for row in found:  # a token that is a piece of a word goes on with the one ahead of it
+        for row in item_rows:  # a token that is a piece of a word goes on with the one ahead of it
             piece = name == "tokens" and row.times.pieces and not row.text[:1].isspace()
             if rows and piece and row.speaker == rows[-1].speaker:
                 end = rows[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end

@@ -147,13 +147,13 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
         for start, end, text in spans
         if math.inf > end > start and classify_label(text) is SpokenAs.SPEECH
     ]
-    whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
+    all_whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
     if len(lengths) < 1 + (usual == 1):
-        return usual if whole else 1
+        return usual if all_whole else 1
     times = median(lengths) / (TYPICAL_PHONE_S if role == PHONE_LABELS else TYPICAL_WORD_S)
-    limits = WHOLE_LIMITS if whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
+    limits = WHOLE_LIMITS if all_whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
     per_s = next((per_s for limit, per_s in limits if times < limit), TICKS_PER_S)
-    if not whole and per_s != 1000:
+    if not all_whole and per_s != 1000:
         return 1
     starts = [start for start, *_ in spans if not math.isnan(start)]
     if per_s == 0 or (per_s > 1 and len(lengths) > 2 and max(starts) - min(starts) < median(lengths)):
@@ -170,8 +170,8 @@ def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[
     per_s : how many of their units are a second; 0: how long words last decides
     Raises InputError: as ``unit_of_times``.
     """
-    said = [tier for tier in tiers if tier.role != OTHER]
-    judged = next((tier for tier in said if tier.role == WORDS or holds_phones(tier)), next(iter(said), None))
+    spoken = [tier for tier in tiers if tier.role != OTHER]
+    judged = next((tier for tier in spoken if tier.role == WORDS or holds_phones(tier)), next(iter(spoken), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
     role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
     per_s = per_s or unit_of_times(spans, role, where)
@@ -228,9 +228,9 @@ def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[
             edges = (span.start_s - timed[place].start_s, span.end_s - timed[place].end_s)
             inside = max(map(abs, edges)) <= WHOLE_WORD_S
         word = timed[place].text if inside else ""
-        said = word if is_line(word) and classify_label(word) is SpokenAs.SPEECH else ""
-        again = place > before and bool(spans) and said == spans[-1].label.word != ""
-        spans.append(replace(span, label=replace(span.label, word=said, again=again)))
+        spoken_word = word if is_line(word) and classify_label(word) is SpokenAs.SPEECH else ""
+        again = place > before and bool(spans) and spoken_word == spans[-1].label.word != ""
+        spans.append(replace(span, label=replace(span.label, word=spoken_word, again=again)))
     return Timeline(tuple(spans))
 
 
@@ -301,8 +301,8 @@ def phone_timeline(
     for label in labels:
         phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
         if phone is None:
-            found = f"{label.position} is {label.text[:40]!r}"
-            raise InputError(f"{where}: {found}, which is no phone; the phones are: {' '.join(PHONES)}")
+            which_label = f"{label.position} is {label.text[:40]!r}"
+            raise InputError(f"{where}: {which_label}, which is no phone; the phones are: {' '.join(PHONES)}")
         phones.append(phone)
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words and not marked:

@@ -36,8 +36,8 @@ MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
 
 def measure_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:
     """Return the channels of markers in the head's frame, and the distances between those of the lips."""
-    points = {int(found[1]): places for name, places in markers.items() if (found := MARKER.match(name))}
-    names = [str(int(found[1])) if (found := MARKER.match(name)) else name for name in markers]
+    points = {int(match[1]): places for name, places in markers.items() if (match := MARKER.match(name))}
+    names = [str(int(match[1])) if (match := MARKER.match(name)) else name for name in markers]
     curves = {
         name: np.linalg.norm(points[one] - points[other], axis=1)
         for name, (one, other) in DISTANCES.items()

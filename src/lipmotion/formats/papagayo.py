@@ -46,10 +46,10 @@ def project_text(sheet: CueSheet, sound_file: str) -> str:
     starts = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame]]
     ends = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame + 2]]
     phrases = [find_words_of_run(sheet, first, last) for first, last in zip(starts, ends, strict=True)]
-    said = [" ".join(word for *_, word in phrase) for phrase in phrases]
+    texts = [" ".join(word for *_, word in phrase) for phrase in phrases]
     lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(shown)}"]
-    lines += ["1", "\tVoice 1", f"\t{'|'.join(said)}", f"\t{len(phrases)}"]
-    for phrase, words in zip(phrases, said, strict=True):
+    lines += ["1", "\tVoice 1", f"\t{'|'.join(texts)}", f"\t{len(phrases)}"]
+    for phrase, words in zip(phrases, texts, strict=True):
         lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]
         for first, last, word in phrase:
             changes = [frame for frame in range(first, last + 1) if frame == first or shown[frame] != shown[frame - 1]]

@@ -64,8 +64,8 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 def is_subtitles(text: str) -> bool:
     """Return whether a text is a file of subtitles or lyrics, or Whisper's table of lines."""
-    found = (form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
-    return text.startswith(("WEBVTT", HEADER)) or any(found)
+    matches = (form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
+    return text.startswith(("WEBVTT", HEADER)) or any(matches)
 
 
 def subtitle_tier(text: str, where: str) -> LabelTier:
@@ -91,8 +91,8 @@ def subtitle_words(text: str) -> str:
 def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
     """Yield the lines of lyrics in order, each to the next; several times before a line repeat it."""
     cues: list[TimedLabel] = []
-    found = re.search(r"\[offset:\s?([+-]?\d{1,7})\s?\]", text)
-    early_s = int(found[1]) / 1000 if found else 0.0
+    offset = re.search(r"\[offset:\s?([+-]?\d{1,7})\s?\]", text)
+    early_s = int(offset[1]) / 1000 if offset else 0.0
     for number, row in enumerate(StringIO(text), 1):
         line = row.strip()
         timed = LYRICS_LINE.fullmatch(line)
@@ -150,10 +150,10 @@ def _read_table(text: str, where: str) -> Iterator[TimedLabel]:
         if number == 1 or not line.strip():
             continue
         check_count(number, where)
-        found = ROW.fullmatch(line)
-        if found is None:
+        match = ROW.fullmatch(line)
+        if match is None:
             raise InputError(f"{where}: line {number} is {shortened(line)!r}; required: start, end and text, with tabs")
-        yield TimedLabel(int(found[1]) / 1000, int(found[2]) / 1000, found[3], f"line {number}")
+        yield TimedLabel(int(match[1]) / 1000, int(match[2]) / 1000, match[3], f"line {number}")
 
 
 def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:

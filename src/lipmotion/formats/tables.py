@@ -316,47 +316,50 @@ def _parse_timecode(text: str, line: int) -> Timecode:
 
 def _codes_to_seconds(codes: list[Timecode]) -> Array:
     """Return timecodes as seconds since the midnight before the first [shape=(N,)]."""
-    whole = np.array([code.seconds for code in codes], float)
+    seconds = np.array([code.seconds for code in codes], float)
     frames = np.array([code.frames for code in codes])
     day_s, mark = DAY_S, codes[0].mark
     if mark == "." and len(codes) > MISREAD_ROWS and (frames == frames[0]).all():
         mark = ""
-    if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(whole)) == 1:
+    if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(seconds)) == 1:
         LOG.warning("rows are a second apart: the last field of the timecodes is taken for frames (MM:SS:FF)")
-        whole, frames, mark = whole // 60, whole % 60, ":"
+        seconds, frames, mark = seconds // 60, seconds % 60, ":"
     if not mark:
-        starts = np.flatnonzero(np.diff(whole)) + 1
+        starts = np.flatnonzero(np.diff(seconds)) + 1
         if len(starts) < 2:
             raise ValueError(
                 "the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet has shortened them"
             )
-        rate = (starts[-1] - starts[0]) / ((whole[starts[-1]] - whole[starts[0]]) % DAY_S)
-        LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(whole), rate)
-        return np.asarray(np.arange(len(whole)) / rate)
+        rate = (starts[-1] - starts[0]) / ((seconds[starts[-1]] - seconds[starts[0]]) % DAY_S)
+        LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(seconds), rate)
+        return np.asarray(np.arange(len(seconds)) / rate)
     if mark == ".":
-        time_s = whole + frames
+        time_s = seconds + frames
     else:
-        passed = np.flatnonzero(np.diff(whole) == 1)
+        passed = np.flatnonzero(np.diff(seconds) == 1)
         last = int(frames[passed].max() if len(passed) == 1 else frames.max())
         if last >= TIMECODE_RATES[-1]:
             raise InputError(f"a timecode has frame {last}, required less than {TIMECODE_RATES[-1]}")
         shown = next(rate for rate in TIMECODE_RATES if rate > last)
         rate = shown if len(passed) else max(shown, APP_RATE)
-        time_s = whole + frames / rate
+        time_s = seconds + frames / rate
         # every full minute but each tenth follows the last frame of a second with frame 2 (4 of 60)
-        first = np.flatnonzero((np.diff(whole) == 1) & (whole[1:] % 60 == 0) & (whole[1:] % 600 != 0)) + 1
+        first = np.flatnonzero((np.diff(seconds) == 1) & (seconds[1:] % 60 == 0) & (seconds[1:] % 600 != 0)) + 1
         jumps = (frames[first - 1] >= rate - 1) & (np.floor(frames[first]) == rate // 15)
         if mark == ";" or (rate in {30, 60} and len(first) and jumps.all()):
-            time_s, day_s = _drop_frames(whole, frames, rate), float(_drop_frames(np.array(DAY_S), np.array(0.0), rate))
+            time_s, day_s = (
+                _drop_frames(seconds, frames, rate),
+                float(_drop_frames(np.array(DAY_S), np.array(0.0), rate)),
+            )
     over = np.concatenate([[0.0], np.cumsum(np.diff(time_s) < -DAY_S / 2)])
     return time_s + day_s * over
 
 
-def _drop_frames(whole: Array, frames: Array, rate: int) -> Array:
+def _drop_frames(seconds: Array, frames: Array, rate: int) -> Array:
     """Return drop-frame timecodes in seconds: every minute but each tenth leaves out numbers 0 and 1 (SMPTE 12M)."""
-    minutes = np.floor(whole / 60)
+    minutes = np.floor(seconds / 60)
     dropped = rate / 15 * (minutes - np.floor(minutes / 10))
-    return (whole * rate + frames - dropped) * 1001 / (1000 * rate)
+    return (seconds * rate + frames - dropped) * 1001 / (1000 * rate)
 
 
 TABLE = MotionFormat(write_table, read_table_motion, check_table)

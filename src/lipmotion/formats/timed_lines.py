@@ -73,15 +73,15 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     columns = _find_columns(first)
     if columns or LRS_TEXT.match(text):
         return _read_table(text, columns, where) if columns else _read_lrs(text, where)
-    whole, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
+    span, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
     if SECONDS.fullmatch(first):
         return [_read_spans(text, SECONDS, where)]
-    if whole:  # times, if they are large, or in order and last too long for seconds
+    if span:  # times, if they are large, or in order and last too long for seconds
         matches = [WHOLE.fullmatch(line) for _, line in islice(_lines(text), 1000)]
         spans = [(int(match[1]), int(match[2])) for match in matches if match and len(match[1]) < 15 > len(match[2])]
         in_order = len(matches) == len(spans) > 2 and all(a <= b for a, b in spans) and spans == sorted(spans)
         long = in_order and median(end - start for start, end in spans) > LONG_SPAN
-        if long or float(whole[2]) >= SHORTEST_TICKS:
+        if long or float(span[2]) >= SHORTEST_TICKS:
             return [_read_spans(text, WHOLE, where)]
     lines = [line for _, line in islice(_lines(text), MAX_LABELS + 1)] if starts else []
     last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None

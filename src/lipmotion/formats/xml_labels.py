@@ -59,9 +59,9 @@ def _read_elan(root: Element, where: str) -> list[LabelTier]:
         timed = [(spans_s.get(aligned, (math.nan, math.nan)), " ".join(parts)) for aligned, parts in texts.items()]
         rows = enumerate(sorted(timed, key=lambda row: (math.isnan(row[0][0]), row[0])), 1)
         labels = [TimedLabel(*span_s, text, f"tier {name!r}, annotation {number}") for number, (span_s, text) in rows]
-        found = find_tier(name, labels, tier.get("PARTICIPANT") or "")
-        role = found.role or (OTHER if tier.get("PARENT_REF") else LINES if found.speaker else "")
-        tiers.append(LabelTier(name, found.labels, role, found.speaker))
+        named = find_tier(name, labels, tier.get("PARTICIPANT") or "")
+        role = named.role or (OTHER if tier.get("PARENT_REF") else LINES if named.speaker else "")
+        tiers.append(LabelTier(name, named.labels, role, named.speaker))
     return tiers
 
 

@@ -174,12 +174,12 @@ def _key(
     where = {"index": index} if index >= 0 else {}
     curve = fcurves.find(path, **where) or fcurves.new(path, **where)
     last = first + len(values) - 1
-    kept = [
+    others = [
         (point.co[0], point.co[1], point.interpolation)
         for point in curve.keyframe_points
         if not replace and not first - 0.5 < point.co[0] < last + 0.5
     ]
-    points = sorted([*kept, *((first + number, value, interpolation) for number, value in enumerate(values))])
+    points = sorted([*others, *((first + number, value, interpolation) for number, value in enumerate(values))])
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(points))
     curve.keyframe_points.foreach_set("co", [number for point in points for number in point[:2]])

@@ -76,12 +76,12 @@ def timecode_seconds(codes: list[str]) -> list[float]:
         shown = next(rate for rate in TIMECODE_RATES if rate > last)
         rate = shown if passed else max(shown, APP_RATE)
     passed_s = 0.0
-    for (whole, *_), frame in zip(parts, frames):  # noqa: B905
-        time_s = whole + frame / rate
+    for (seconds, *_), frame in zip(parts, frames):  # noqa: B905
+        time_s = seconds + frame / rate
         if mark == ";":
-            minutes = whole // 60
+            minutes = seconds // 60
             dropped = rate / 15 * (minutes - minutes // 10)
-            time_s = (whole * rate + frame - dropped) * 1001 / (1000 * rate)
+            time_s = (seconds * rate + frame - dropped) * 1001 / (1000 * rate)
         if times and time_s + passed_s - times[-1] < -DAY_S / 2:
             passed_s += DAY_S
         times.append(time_s + passed_s)

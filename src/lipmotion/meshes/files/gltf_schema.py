@@ -63,7 +63,7 @@ _VRM = {
 
 def gltf_schema(json: Mapping[str, Any]) -> Schema:
     """Return the schema of one document: its references must be to items that it has."""
-    counts = {name: len(found) for name in _LISTS if isinstance(found := json.get(name), list)}
+    counts = {name: len(listed) for name in _LISTS if isinstance(listed := json.get(name), list)}
 
     def to(name: str) -> Schema:
         count = counts.get(name, 0)

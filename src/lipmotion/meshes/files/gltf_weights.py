@@ -158,9 +158,9 @@ def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Arra
     try:
         for number, track in turns.items():
             if number in placed:
-                own = Rotation.from_quat(document.items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
+                local = Rotation.from_quat(document.items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
                 at_rest = Rotation.from_matrix(placed[number].matrix[:3, :3])
-                turned = turned * (at_rest * own.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
+                turned = turned * (at_rest * local.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
     except ValueError as error:  # a quaternion of zeros, a bone without size
         raise InputError(f"a rotation of the head is none ({error}); export the animation again") from error
     return np.asarray(np.broadcast_to(turned.as_quat(), (len(time_s), 4)))

@@ -62,11 +62,11 @@ def prim_names(names: Iterable[str]) -> list[str]:
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name) or "part"
         plain = f"_{plain}" if plain[0].isdigit() else plain
-        number, found = 1, plain
-        while found in taken:
+        number, unused = 1, plain
+        while unused in taken:
             number += 1
-            found = f"{plain}_{number}"
-        taken[found] = None
+            unused = f"{plain}_{number}"
+        taken[unused] = None
     return list(taken)
 
 
@@ -77,7 +77,7 @@ def tokens(names: Iterable[str]) -> str:
     ["a\\"b", "c\\x0ad"]
     """
     escaped = (as_text(name).replace("\\", "\\\\").replace('"', '\\"') for name in names)
-    plain = (_CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", name) for name in escaped)
+    plain = (_CONTROL.sub(lambda match: f"\\x{ord(match[0]):02x}", name) for name in escaped)
     return "[" + ", ".join(f'"{name}"' for name in plain) + "]"
 
 

@@ -110,9 +110,9 @@ def solve_shape_weights(
     options = options or SolverOptions()
     points = move_points(motion, units)
     mouth, channels = points.mouth, tuple(Channel(name, WEIGHT) for name in shapes.names)
-    own, mood = find_own_weights(motion, shapes), mood_weights(mouth, shapes)
-    if own is not None:
-        weights = _close_own_weights(own.values.astype(np.float64), with_mouth(motion), mouth, shapes, mood)
+    own_weights, mood = find_own_weights(motion, shapes), mood_weights(mouth, shapes)
+    if own_weights is not None:
+        weights = _close_own_weights(own_weights.values.astype(np.float64), with_mouth(motion), mouth, shapes, mood)
         return Motion(weights, motion.rate_hz, channels)
     matrix = _weigh_rows(shapes.moved, shapes.gap)
     if shapes.style == "visemes":

@@ -71,7 +71,7 @@ def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSur
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # weighted by their areas
     each = mesh.triangles.reshape(-1)
     sums = [np.bincount(each, np.repeat(faces[:, axis], 3), len(mesh.vertices)) for axis in range(3)]
-    normals = np.stack(sums, axis=1)
+    normals: NDArray[np.float64] = np.stack(sums, axis=1)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(lengths > 0, lengths, 1.0)
     places = _number_places(mesh, normals)
