@@ -110,10 +110,9 @@ def open_before_speech(
     """Return means and precisions of ranges of frames, with the mouth open before speech begins.
 
     statistics, reliability, voice : as of ``LearnedMotion.generate``; at ``voice`` 1 and 0 nothing changes
-    All dimensions are drawn towards their median in speech. Precisions stay those of the model. A voice of which nothing
-    is known may be a known
-    one in noise, and its recording may begin anywhere. A model of few phones half knows its own speaker's voice, too:
-    the fewer it was trained on, the less changes.
+    All dimensions are drawn towards their median in speech. Precisions stay those of the model. A voice of which
+    nothing is known may be a known one in noise, and its recording may begin anywhere. A model of few phones half knows
+    its own speaker's voice, too: the fewer it was trained on, the less changes.
     Source: Scobbie, Schaeffler & Mennen 2011 (lips part and breath is taken before the first sound).
     """
     first_s = next((span.start_s for span in units if not is_silent(span.label.phone)), 0.0)
