@@ -23,7 +23,7 @@ from lipmotion.types import (
     TokenPosteriors,
 )
 
-TRAINED_RECURRENT = posterior_network._trained_recurrent
+TRAINED_RECURRENT = posterior_network._train_recurrent
 """The tests of all else train none (``conftest``)."""
 TOKENS, FRAMES, SOURCE = 30, 200, "hama 1.7.0 abc"
 
@@ -71,8 +71,8 @@ def trained(examples: list[Example]) -> PosteriorNetwork:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(posterior_network, "STEPS", 15.0)
         patched.setattr(posterior_network, "RECURRENT_STEPS", 8.0)
-        patched.setattr(posterior_network, "_trained_recurrent", TRAINED_RECURRENT)
-        return PosteriorNetwork.trained(PredictorTraining(examples, values, 2))
+        patched.setattr(posterior_network, "_train_recurrent", TRAINED_RECURRENT)
+        return PosteriorNetwork.train(PredictorTraining(examples, values, 2))
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
-from lipmotion.stats.rounding import varies
+from lipmotion.stats.curves import measure_modulation_spectrum, varies
 
 HIGHEST_HZ = 12.5
 """Frequencies above it hold noise of trackers rather than speech, and cameras of 25 Hz do not show them."""

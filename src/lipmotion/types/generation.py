@@ -20,7 +20,7 @@ from lipmotion.types.motion import Motion, interpolate_rows
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.voice_event import VoiceEvent
 
-KeptT = TypeVar("KeptT")
+CachedT = TypeVar("CachedT")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Speech:
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     voice       : 0 to 1, how well the model's training knows the voice
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
-    kept        : what was computed of the sound alone (``once``); speech with other units shares it
+    cache       : what was computed of the sound alone (``cached``); speech with other units shares it
     parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
                   empty: nothing is said. Beside it, features, spectrum and posteriors may be ``JoinedRows``
     """
@@ -68,20 +68,20 @@ class Speech:
     voice: float = 1.0
     posteriors: TokenPosteriors | None = None
     times_given: bool = False
-    kept: dict[Any, Any] = field(default_factory=dict, repr=False)
+    cache: dict[Any, Any] = field(default_factory=dict, repr=False)
     parts: tuple[SpeechPart, ...] | None = None
 
-    def once(self, of: Any, make: Callable[[], KeptT]) -> KeptT:
+    def cached(self, of: Any, make: Callable[[], CachedT]) -> CachedT:
         """Return what a function makes of the sound; speech of the same sound with other units shares it.
 
         of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
         """
         sound = (self.features, self.log_f0, self.spectrum, self.posteriors)
-        found = self.kept.get(of)
-        if found is None or any(ours is not theirs for ours, theirs in zip(sound, found[0], strict=True)):
-            found = self.kept[of] = (sound, make())
-        made: KeptT = found[1]
-        return made
+        entry = self.cache.get(of)
+        if entry is None or any(ours is not theirs for ours, theirs in zip(sound, entry[0], strict=True)):
+            entry = self.cache[of] = (sound, make())
+        result: CachedT = entry[1]
+        return result
 
     def with_arrays(self) -> Speech:
         """Return the same with an array in place of all ``JoinedRows``, for an engine that takes it as one passage."""

@@ -56,7 +56,7 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
         own,
         config=replace(own.config, bigram_weight=BIGRAM_WEIGHT, insertion=INSERTION_SCORE),
         table=table,
-        mixtures=own.mixtures.selected(sources),
+        mixtures=own.mixtures.select(sources),
         log_stay=own.log_stay[sources[: plain + len(added)]],
         bigram=_bigram(own.bigram, table.units),
     )
