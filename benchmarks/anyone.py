@@ -25,7 +25,7 @@ from scipy.signal import butter, fftconvolve, sosfilt
 from scipy.stats import spearmanr
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.corpora.layouts import words_of_name
+from lipmotion.corpora.layouts import spell_name
 from lipmotion.motion.articulation import read_articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
@@ -131,7 +131,7 @@ def strangers(options: argparse.Namespace, model: Model) -> None:
     for condition in ("audio only", "transcript"):
         each = {}
         for clip in clips:
-            words = " ".join(words_of_name(clip.stem) or ()) if condition == "transcript" else None
+            words = " ".join(spell_name(clip.stem) or ()) if condition == "transcript" else None
             request = Request(clip, transcript=words, recogniser=options.recogniser, pauses="natural")
             each[clip.stem] = best_lag(animate(request, model=model).motion, tracks[clip], 0.06)
         show_means(f"grid-others, {condition}", each)

@@ -24,13 +24,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.formats.blender import write_addon
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
 from lipmotion.types import Generation
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
-from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.shape_fit import mouth_weights
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, head_scene, write_scene
@@ -54,7 +54,7 @@ def main() -> None:
         print(json.dumps(fit(result)), flush=True)
         makers = {"head": lambda: head_scene(result, prosody=prosody)}
         for path in options.characters:
-            makers[path.stem] = lambda path=path: character_scene(result, driven_character(path), prosody=prosody)
+            makers[path.stem] = lambda path=path: character_scene(result, load_character(path), prosody=prosody)
         for name, make in makers.items():
             started = time.process_time()
             scene = make()

@@ -33,7 +33,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion import animate, load_model
-from lipmotion.corpora.layouts import words_of_name
+from lipmotion.corpora.layouts import spell_name
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
@@ -79,7 +79,7 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
         for clip in clips:
             for condition, words in (
                 ("audio only", None),
-                ("with transcript", " ".join(words_of_name(clip.stem) or ())),
+                ("with transcript", " ".join(spell_name(clip.stem) or ())),
             ):
                 motion = animate(Request(clip, transcript=words, recogniser=kind), model=model).motion
                 seen, recorded = tracks[clip].seen, tracks[clip].motion

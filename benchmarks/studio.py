@@ -41,7 +41,7 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 
 from lipmotion.formats.sound import write_sound  # noqa: E402
 from lipmotion.kernels.compiler import numba_works  # noqa: E402
-from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
+from lipmotion.meshes.fitting.driven import load_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import step_of  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
@@ -53,9 +53,8 @@ from lipmotion.types import Audio, Timeline  # noqa: E402
 from lipmotion_faces.mesh import MeshFace  # noqa: E402
 from lipmotion_faces.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
 from lipmotion_faces.registry import face_named  # noqa: E402
-from lipmotion_studio.folder import opened_folder  # noqa: E402
-from lipmotion_studio.line import OpenLine  # noqa: E402
-from lipmotion_studio.understanding import open_line, understand_line  # noqa: E402
+from lipmotion_studio.folder import open_folder  # noqa: E402
+from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
 from studio.attack import attacked  # noqa: E402
 from studio.served import Served, lost_edits, random_edit, served, undone_edits  # noqa: E402
@@ -83,12 +82,12 @@ def main() -> None:
         print(json.dumps(WHAT[options.what](sound, options), indent=1))
 
 
-def opened(sound: Path) -> OpenLine:
+def opened(sound: Path) -> OpenRecording:
     """Return a line of a new project, open."""
     model = load_model()
-    with opened_folder(sound) as folder:
-        line = folder.line(1)
-        return open_line(folder, line, model, understand_line(folder, line, model))
+    with open_folder(sound) as folder:
+        line = folder.recording(1)
+        return open_recording(folder, line, model, analyse_recording(folder, line, model))
 
 
 def times(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
@@ -138,7 +137,7 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
 def own_character(path: Path) -> ShownFace:
     """Return a head with 16 blendshapes, as a character of a user's own."""
     write_glb(path, head())
-    return shown_face(MeshFace(driven_character(path)))
+    return shown_face(MeshFace(load_character(path)))
 
 
 def lasting(sound: Path, seconds: float) -> tuple[Path, float]:
@@ -174,16 +173,16 @@ def in_browsers(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
-def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenLine:
+def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenRecording:
     """Return the line of a recording that is repeated, open, with the phones of the recording again and again."""
     units = opened(sound).file.units
     assert units is not None
     spans = [span for n in range(int(seconds / each_s)) for span in units.shifted(n * each_s)]
     spans[-1] = replace(spans[-1], end_s=seconds)
-    with opened_folder(part) as folder:
-        line, model = folder.line(1), load_model()
+    with open_folder(part) as folder:
+        line, model = folder.recording(1), load_model()
         folder.write_edits(line, EditFile(named=Request(part), units=Timeline(tuple(spans)), sha256=line.sha256))
-        return open_line(folder, line, model)
+        return open_recording(folder, line, model)
 
 
 def phone_edit(chance: Random, phones: list[dict[str, Any]], number: int) -> str:
@@ -201,11 +200,11 @@ def timed(do: Callable[[], object]) -> float:
     return 1000 * (time.process_time() - started_s)
 
 
-def timed_edit(line: OpenLine, step: str) -> tuple[dict[str, float] | None, float]:
+def timed_edit(line: OpenRecording, step: str) -> tuple[dict[str, float] | None, float]:
     """Return what an edit moved, None: nothing, or it was refused; and the milliseconds that it took."""
     started_s = time.process_time()
     try:
-        changed = line.edited(line.revision, (step,))["changed"]
+        changed = line.edit(line.revision, (step,))["changed"]
     except ValueError:
         changed = None
     return changed, 1000 * (time.process_time() - started_s)
@@ -240,7 +239,7 @@ def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
         os.waitpid(child, 0)
         with os.fdopen(reading, encoding="utf-8") as file:
             told = [json.loads(row) for row in file.read().splitlines(keepends=True) if row.endswith("\n")]
-        line.file = replace(line.folder.read_edits(line.folder.line(line.number)), named=line.file.named)
+        line.file = replace(line.folder.read_edits(line.folder.recording(line.number)), named=line.file.named)
         steps = list(line.file.edits.sentences)
         done = [each["done"] for each in told if "done" in each]
         found["kills"] += 1
@@ -251,7 +250,7 @@ def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
-def edit_for_ever(line: OpenLine, chance: Random, writing: int) -> NoReturn:
+def edit_for_ever(line: OpenRecording, chance: Random, writing: int) -> NoReturn:
     """Make random edits, and write what was tried and what was done into a pipe."""
 
     def tell(**told: list[str]) -> None:
@@ -263,11 +262,11 @@ def edit_for_ever(line: OpenLine, chance: Random, writing: int) -> NoReturn:
         with suppress(ValueError):
             if len(steps) > 20:
                 tell(tried=[])
-                line.undone(line.revision, len(steps))
+                line.undo(line.revision, len(steps))
             else:
                 step = random_edit(chance, line.state())
                 tell(tried=[*steps, str(step_of(step))])
-                line.edited(line.revision, (step,))
+                line.edit(line.revision, (step,))
             tell(done=list(line.file.edits.sentences))
 
 

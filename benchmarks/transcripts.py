@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from robust import SPOKEN
 
 import lipmotion
-from lipmotion.corpora.layouts import words_of_name
+from lipmotion.corpora.layouts import spell_name
 from lipmotion.errors import AlignmentError
 from lipmotion.formats.label_files import read_transcript
 from lipmotion.pipeline.request import Request
@@ -317,7 +317,7 @@ def _doubts(phones: Recogniser, audio: AnalysedAudio, words: tuple[str, ...], he
 def _clips(folder: Path, split: str) -> list[Said]:
     """Return the clips of a list of GRID s1, with their words."""
     names = (folder / f"{split}.txt").read_text("utf-8").split()
-    return [(read_audio(folder / "clips" / f"{name}.mkv").samples, words_of_name(name) or ()) for name in names]
+    return [(read_audio(folder / "clips" / f"{name}.mkv").samples, spell_name(name) or ()) for name in names]
 
 
 def _open_recordings(folder: Path) -> list[Said]:

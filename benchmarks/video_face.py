@@ -74,7 +74,7 @@ from lipmotion_faces.filmed.face import load_face
 from lipmotion_faces.tracking.frames import open_video
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.video.mp4 import write_mp4
-from lipmotion_lab.evaluation.figures import BILABIAL
+from lipmotion_lab.evaluation.evaluate import BILABIAL
 
 Array = NDArray[np.float64]
 Span = tuple[float, float]

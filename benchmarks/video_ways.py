@@ -23,14 +23,14 @@ from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.candidates import squared_distances
 from lipmotion_faces.appearance.placing import inverse_map, place
 from lipmotion_faces.film import filmed_video
-from lipmotion_faces.film.background import open_background, placed_maps
-from lipmotion_faces.film.filmed_video import FILM, film_of
+from lipmotion_faces.film.background import open_background, steady_face
+from lipmotion_faces.film.filmed_video import FILM, make_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion_faces.registry import face_named
 from lipmotion_faces.tracking.footage import footage_frames, track_footage
-from lipmotion_faces.tracking.landmarks import LIP_POINTS
-from lipmotion_faces.tracking.mouth_pictures import region_to_image
+from lipmotion_faces.tracking.head_pose import region_to_image
+from lipmotion_faces.tracking.trackers import LIP_POINTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -118,7 +118,7 @@ def recorded_clip(corpus: Corpus, name: str, path: Path) -> RecordedClip:
     utterance = corpus.utterance(name)
     if len(frames) != len(utterance.track.seen):
         raise InputError(f"{path}: {len(frames)} frames, required {len(utterance.track.seen)}, as in the corpus")
-    return RecordedClip(utterance, path, frames, placed_maps(footage))
+    return RecordedClip(utterance, path, frames, steady_face(footage))
 
 
 def video_of(clips: Path, name: str) -> Path:
@@ -297,7 +297,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
             with_clip = replace(options, background=clip.path)
             sound = clip.utterance.audio
             model = None if eigenlips is None else replace(load_model(), eigenlips=eigenlips)
-            return film_of(face, shown, sound=sound, model=model, options=with_clip).frames
+            return make_film(face, shown, sound=sound, model=model, options=with_clip).frames
 
         mask = lower_face.mouth_ellipse(1) if options.jaw == "none" else _replaced(face)
         return Way(f"filmed, {name}", source, render, np.pad(mask, AROUND_PX))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,8 @@ from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
-from lipmotion_faces.tracking.landmarks import LIP_POINTS
 from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.trackers import LIP_POINTS
 
 Source = str | Path | Motion | Track | Generation
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "ey
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """Motion that is compared: its name, its curves, which frames were measured."""
+    """Motion that is compared, and which of its frames were measured."""
 
     name: str
     motion: Motion
@@ -63,12 +63,12 @@ def compare(reference: Source, *others: Source, monitor: Monitor = silent_monito
     if not others:
         raise InputError("there is nothing to compare the reference with; give another motion file or video")
     items = list(enumerate((reference, *others)))
-    first, *rest = [_side(item, number) for number, item in with_progress(items, "reading", monitor)]
-    return nan_as_null({"reference": first.name, "others": [_figures(first, other) for other in rest]})
+    first, *rest = [_read_side(item, number) for number, item in with_progress(items, "reading", monitor)]
+    return nan_as_null({"reference": first.name, "others": [_compare_pair(first, other) for other in rest]})
 
 
-def _side(source: Source, number: int) -> _Side:
-    """Return the motion of a file, or that is given. Raises InputError: as ``compare``."""
+def _read_side(source: Source, number: int) -> _Side:
+    """Return the motion of a file, or that is given, with ARKit's names of what programs spell otherwise."""
     name = str(source) if isinstance(source, str | Path) else f"motion {number}" if number else "the reference"
     if isinstance(source, str | Path):
         path = Path(source)
@@ -79,58 +79,60 @@ def _side(source: Source, number: int) -> _Side:
     if not np.isfinite(motion.values).all():
         raise InputError(f"{name}: there are values that are not finite; interpolate them first")
     seen = np.asarray(source.seen) if isinstance(source, Track) else np.ones(len(motion.values), bool)
-    return _Side(name, _with_arkit_names(motion), seen)
-
-
-def _with_arkit_names(motion: Motion) -> Motion:
-    """Return the motion with ARKit's names of the blendshapes that programs spell otherwise."""
     names = [(arkit_name(each.name) if each.unit == WEIGHT else None) or each.name for each in motion.channels]
-    if len(set(names)) < len(names):  # two spellings of one
-        return motion
-    return replace(
-        motion, channels=tuple(replace(each, name=name) for each, name in zip(motion.channels, names, strict=True))
-    )
+    if len(set(names)) == len(names):  # else there are two spellings of one
+        channels = (replace(each, name=name) for each, name in zip(motion.channels, names, strict=True))
+        motion = replace(motion, channels=tuple(channels))
+    return _Side(name, motion, seen)
 
 
-def _figures(reference: _Side, other: _Side) -> dict[str, Any]:
+def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
     """Return the figures of one pair. Raises InputError: as ``compare``."""
     names, notes = _common_channels(reference, other)
     rate_hz = min(reference.motion.rate_hz, other.motion.rate_hz, HIGHEST_RATE_HZ)
-    count, more = _common_frames(reference, other, rate_hz)
-    time_s = np.arange(count) / rate_hz
-    seen = _seen(reference, time_s) & _seen(other, time_s)
-    if seen.sum() < LEAST_FRAMES:
-        raise InputError(f"{reference.name}, {other.name}: {seen.sum()} common frames, required {LEAST_FRAMES} or more")
-    if not seen.all():
-        more.append(f"{count - seen.sum()} of {count} frames are left out: the face was not measured")
-    made, original = (side.motion.at(time_s)[seen][:, _columns(side.motion, names)] for side in (other, reference))
-    channels = tuple(reference.motion.channels[column] for column in _columns(reference.motion, names))
-    pair = (Motion(made, rate_hz, channels), Motion(original, rate_hz, channels))
-    points = _points(names)
-    coordinates = {axis for axes in points.values() for axis in axes}
-    curve_figures, still = _channel_figures(*(_part(side, set(names) - coordinates) for side in pair))
+    time_s, time_notes = _common_times(reference, other, rate_hz)
+    notes += time_notes
+    measured = np.ones(len(time_s), bool)
+    for side in (reference, other):  # the frame next to each time
+        nearest = np.floor(time_s * side.motion.rate_hz + 0.5).astype(int)
+        measured &= side.seen[np.minimum(nearest, len(side.seen) - 1)]
+    count = int(measured.sum())
+    if count < LEAST_FRAMES:
+        raise InputError(f"{reference.name}, {other.name}: {count} common frames, required {LEAST_FRAMES} or more")
+    if count < len(time_s):
+        notes.append(f"{len(time_s) - count} of {len(time_s)} frames are left out: the face was not measured")
+    channels = tuple(reference.motion.channels[reference.motion.column(name)] for name in names)
+    made, original = (
+        Motion(side.motion.at(time_s)[measured][:, [side.motion.column(name) for name in names]], rate_hz, channels)
+        for side in (other, reference)
+    )
+    axes = {name[2:]: tuple(f"{axis}_{name[2:]}" for axis in "xyz") for name in names if name.startswith("x_")}
+    points = {point: parts for point, parts in axes.items() if set(names).issuperset(parts)}
+    coordinates = {axis for parts in points.values() for axis in parts}
+    channel_figures, still = _channel_figures(made, original, [name for name in names if name not in coordinates])
     if still:
-        more.append(f"left out, for they do not move in the reference: {', '.join(still)}")
-    accuracies = [row["acc"] for row in curve_figures.values()]
+        notes.append(f"left out, for they do not move in the reference: {', '.join(still)}")
+    accuracies = [row["acc"] for row in channel_figures.values()]
     figures = {
         "name": other.name,
         "rate_hz": rate_hz,
-        "frames": int(seen.sum()),
-        "notes": notes + more,
-        "channels": curve_figures,
+        "frames": count,
+        "notes": notes,
+        "channels": channel_figures,
         "acc": float(np.mean(accuracies)) if accuracies else None,
     }
-    figures |= {"closures": _closures(*pair)} if OPENING in curve_figures else {}
-    figures |= {"points": _point_figures(*pair, points)} if points else {}
-    upper = [name for name in UPPER_FACE if name in names]
-    return figures | ({"upper_face": _upper_face(*pair, upper)} if upper else {})
-
-
-def _part(motion: Motion, names: Collection[str]) -> Motion:
-    """Return the channels with some names, in the order of the motion."""
-    columns = [column for column, name in enumerate(motion.names) if name in names]
-    channels = tuple(motion.channels[column] for column in columns)
-    return Motion(motion.values[:, columns], motion.rate_hz, channels)
+    if OPENING in channel_figures:
+        generated, recorded = ([_values(side, [OPENING])[:, 0]] for side in (made, original))
+        threshold = closed_threshold(recorded)
+        closures = asdict(closure_figures(generated, recorded, threshold, rate_hz))
+        figures["closures"] = closures | {"closed_under": threshold}
+    if points:
+        figures["points"] = _point_figures(made, original, points)
+    if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
+        generated, recorded = ([_values(side, upper)[:, :, None]] for side in (made, original))
+        deviation = vertices.upper_face_deviation(generated, recorded, rest=np.zeros((len(upper), 1)))
+        figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
+    return figures
 
 
 def _common_channels(reference: _Side, other: _Side) -> tuple[list[str], list[str]]:
@@ -138,28 +140,25 @@ def _common_channels(reference: _Side, other: _Side) -> tuple[list[str], list[st
     units = {channel.name: channel.unit for channel in other.motion.channels}
     same = [each.name for each in reference.motion.channels if units.get(each.name) == each.unit]
     if not same:
+        some = []
+        for side in (other, reference):
+            first = [f"{channel.name} ({channel.unit})" for channel in side.motion.channels[:4]]
+            some.append(", ".join(first) + (", ..." if len(side.motion.channels) > len(first) else ""))
         raise InputError(
-            f"{other.name} has no channel of {reference.name} in the same unit: it has {_some(other)}, required one of "
-            f"{_some(reference)}"
+            f"{other.name} has no channel of {reference.name} in the same unit: it has {some[0]}, required one of "
+            f"{some[1]}"
         )
     missing = [name for name in reference.motion.names if name not in same]
     notes = [f"left out, for the other has no such channel in the same unit: {', '.join(missing)}"] if missing else []
     return same, notes
 
 
-def _some(side: _Side) -> str:
-    """Return the first channels of a side, with their units."""
-    shown = [f"{channel.name} ({channel.unit})" for channel in side.motion.channels[:4]]
-    return ", ".join(shown) + (", ..." if len(side.motion.channels) > len(shown) else "")
-
-
-def _common_frames(reference: _Side, other: _Side, rate_hz: float) -> tuple[int, list[str]]:
-    """Return the number of frames at a rate that both have, and notes on what is resampled and left out."""
+def _common_times(reference: _Side, other: _Side, rate_hz: float) -> tuple[Array, list[str]]:
+    """Return the times of the frames that both have, and notes on what is resampled and left out."""
     lengths = [(len(side.motion.values) - 1) / side.motion.rate_hz for side in (reference, other)]
-    what = ("the reference", "the other")
     notes = [
         f"{name} is resampled from {side.motion.rate_hz:g} to {rate_hz:g} frames a second"
-        for name, side in zip(what, (reference, other), strict=True)
+        for name, side in (("the reference", reference), ("the other", other))
         if side.motion.rate_hz != rate_hz
     ]
     if abs(lengths[0] - lengths[1]) * rate_hz >= 1:
@@ -167,27 +166,19 @@ def _common_frames(reference: _Side, other: _Side, rate_hz: float) -> tuple[int,
             f"the reference lasts {lengths[0]:.2f} s, the other {lengths[1]:.2f} s: the first {min(lengths):.2f} s are "
             "compared"
         )
-    return int(np.floor(min(lengths) * rate_hz + 1e-6)) + 1, notes
-
-
-def _seen(side: _Side, time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which times lie next to a frame that was measured [shape=(len(time_s),)]."""
-    nearest = np.floor(time_s * side.motion.rate_hz + 0.5).astype(int)
-    return side.seen[np.minimum(nearest, len(side.seen) - 1)]
-
-
-def _columns(motion: Motion, names: Sequence[str]) -> list[int]:
-    return [motion.column(name) for name in names]
+    return np.arange(int(np.floor(min(lengths) * rate_hz + 1e-6)) + 1) / rate_hz, notes
 
 
 def _values(motion: Motion, names: Sequence[str]) -> Array:
     """Return the values of some channels [shape=(T, len(names))]."""
-    return np.asarray(motion.values[:, _columns(motion, names)], np.float64)
+    return np.asarray(motion.values[:, [motion.column(name) for name in names]], np.float64)
 
 
-def _channel_figures(made: Motion, original: Motion) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """Return the figures of every channel that moves in the original, and the names of the others."""
-    names, rate_hz = original.names, made.rate_hz
+def _channel_figures(
+    made: Motion, original: Motion, names: Sequence[str]
+) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Return the figures of every channel of these that moves in the original, and the names of the others."""
+    rate_hz, channels = made.rate_hz, [original.channels[original.column(name)] for name in names]
     if not names:
         return {}, []
     generated, reference = [_values(made, names)], [_values(original, names)]
@@ -199,30 +190,17 @@ def _channel_figures(made: Motion, original: Motion) -> tuple[dict[str, dict[str
         "jerk": curves.jerk_ratio(generated, reference),
         "modulation_db": modulation_distance_db(generated, reference, rate_hz),
     }
-    moves = curves.moving(reference, [channel.unit for channel in original.channels])
+    moves = curves.select_moving(reference, [channel.unit for channel in channels])
     rows = {
         channel.name: {
             "unit": channel.unit,
             **{name: float(values[column]) for name, values in figures.items()},
             "lag_ms": curves.lag_ms([generated[0][:, column:]], [reference[0][:, column:]], rate_hz),
         }
-        for column, channel in enumerate(original.channels)
+        for column, channel in enumerate(channels)
         if moves[column]
     }
     return rows, [name for name in names if name not in rows]
-
-
-def _closures(made: Motion, original: Motion) -> dict[str, Any]:
-    """Return the figures of closures; the mouth is closed as far as the original's opening says."""
-    generated, reference = ([_values(side, [OPENING])[:, 0]] for side in (made, original))
-    threshold = closed_threshold(reference)
-    return asdict(closure_figures(generated, reference, threshold, made.rate_hz)) | {"closed_under": threshold}
-
-
-def _points(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the coordinates of every point that has all three, by its own name."""
-    axes = {name[2:]: tuple(f"{axis}_{name[2:]}" for axis in "xyz") for name in names if name.startswith("x_")}
-    return {point: parts for point, parts in axes.items() if set(names).issuperset(parts)}
 
 
 def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
@@ -249,10 +227,3 @@ def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[st
         "lip_vertex_error_mm": vertices.lip_vertex_error(*both(lips)) if lips else None,
         "upper_face_deviation_mm": vertices.upper_face_deviation(*both(upper), rest) if upper else None,
     }
-
-
-def _upper_face(made: Motion, original: Motion, names: Sequence[str]) -> dict[str, Any]:
-    """Return the upper-face deviation of weights, which are 0 at rest."""
-    generated, reference = ([_values(side, names)[:, :, None]] for side in (made, original))
-    deviation = vertices.upper_face_deviation(generated, reference, rest=np.zeros((len(names), 1)))
-    return {"curves": len(names), "deviation": deviation}

@@ -21,11 +21,7 @@ LEAST_DIFFERENCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ClipStatistic:
-    """A statistic that is a function of sums over clips, so that bootstrap samples of clips are cheap.
-
-    sums       : contribution of each clip [all of one shape]
-    from_total : the statistic as a function of the sum of contributions
-    """
+    """A function ``from_total`` of the sum of each clip's contribution, so that bootstrap samples are cheap."""
 
     sums: Sequence[Array]
     from_total: Callable[[Array], float]
@@ -58,7 +54,13 @@ def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
         a, b = np.where(still, 0, g - middle), o - middle
         return np.stack([np.full(a.shape[1], float(len(a))), *(x.sum(axis=0) for x in (a, b, a * a, b * b, a * b))])
 
-    return ClipStatistic([moments(g, o) for g, o in zip(generated, original, strict=True)], _mean_correlation)
+    def mean_correlation(total: Array) -> float:
+        count, a, b, aa, bb, ab = total
+        squares = np.maximum(aa - a * a / count, 0) * np.maximum(bb - b * b / count, 0)
+        correlations = (ab - a * b / count) / np.where(squares > 0, np.sqrt(squares), np.inf)
+        return float(correlations.mean())
+
+    return ClipStatistic([moments(g, o) for g, o in zip(generated, original, strict=True)], mean_correlation)
 
 
 def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
@@ -98,10 +100,3 @@ def sign_of_difference(interval: Sequence[float | None]) -> int:
 def significance_mark(gain: Sequence[float | None]) -> str:
     """Return ``*`` if the interval of a difference does not contain 0, else an empty text."""
     return "*" if sign_of_difference(gain) else ""
-
-
-def _mean_correlation(total: Array) -> float:
-    count, a, b, aa, bb, ab = total
-    squares = np.maximum(aa - a * a / count, 0) * np.maximum(bb - b * b / count, 0)
-    correlations = (ab - a * b / count) / np.where(squares > 0, np.sqrt(squares), np.inf)
-    return float(correlations.mean())

@@ -23,18 +23,18 @@ from lipmotion.measures.curves import pooled_correlation
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
     PartKey,
-    channels_with_opening,
+    check_opening,
     clips_from_arrays,
-    finished_parts,
-    opening_row,
+    clips_to_arrays,
+    open_parts,
+    opening_row_with_rates,
     shuffled,
-    stored_clips,
     train_and_generate,
 )
 
@@ -66,7 +66,7 @@ class _GeneratedFold:
         about = [list(self.clips), self.speakers, self.used, self.closed_under]
         arrays = {_ABOUT: np.array(json.dumps(about))}
         for number, clips in enumerate(self.clips.values()):
-            arrays |= {f"{number}/{name}": array for name, array in stored_clips(clips).items()}
+            arrays |= {f"{number}/{name}": array for name, array in clips_to_arrays(clips).items()}
         return arrays
 
 
@@ -103,15 +103,17 @@ def folds(
     Raises AlignmentError: a transcript does not fit its recording.
     """
     names = corpus.required("train")
-    whole = _of_each_speaker(corpus) if by_speaker else [(name,) for name in names]
-    count = count if count is not None else len(whole) if by_speaker else FOLDS
-    if not 2 <= count <= len(whole):
+    groups: list[tuple[str, ...]] = [(name,) for name in names]  # of what is never divided
+    if by_speaker:  # those without a speaker are one more
+        groups = [found for speaker in corpus.speakers if (found := corpus.names("train", [speaker]))]
+    count = count if count is not None else len(groups) if by_speaker else FOLDS
+    if not 2 <= count <= len(groups):
         what = "speakers" if by_speaker else "utterances"
-        raise InputError(f"{count} folds; required: from 2 to {len(whole)}, which is how many {what} there are")
-    channels_with_opening(corpus, names)
-    mixed = shuffled(whole, settings.seed)
+        raise InputError(f"{count} folds; required: from 2 to {len(groups)}, which is how many {what} there are")
+    check_opening(corpus, names)
+    mixed = shuffled(groups, settings.seed)
     key = PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
-    kept, results = finished_parts(work, corpus, settings, key), []
+    kept, results = open_parts(work, corpus, settings, key), []
     for fold in range(count):
         stage = f"fold-{fold}"
         arrays = kept.load(stage)
@@ -127,38 +129,28 @@ def folds(
         if work is not None:
             kept.save(stage, results[-1].as_arrays())
     about: dict[str, Any] = {"folds": count, "seed": settings.seed, "clips": len(names)}
-    about |= {"trained_on": [result.used for result in results]}
-    about |= {"closed_under": results[0].closed_under}
+    about |= {"trained_on": [result.used for result in results], "closed_under": results[0].closed_under}
     shared = [name for name in results[0].clips if all(name in result.clips for result in results)]
-    conditions = {name: _row(results, name, settings.seed) for name in shared}
-    if by_speaker:
-        conditions = {name: row | {"speakers": _acc_of_speakers(results, name)} for name, row in conditions.items()}
+    conditions = {name: _row(results, name, settings.seed, by_speaker=by_speaker) for name in shared}
     return nan_as_null(about | {"conditions": conditions})
 
 
-def _of_each_speaker(corpus: Corpus) -> list[tuple[str, ...]]:
-    """Return the names of each speaker's utterances in the training list; those without a speaker are one more."""
-    return list(filter(None, (corpus.names("train", [speaker]) for speaker in corpus.speakers)))
-
-
-def _row(results: Sequence[_GeneratedFold], condition: str, seed: int) -> dict[str, Any]:
-    """Return the figures of the clips of all folds in one condition."""
+def _row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, by_speaker: bool) -> dict[str, Any]:
+    """Return the figures of the clips of all folds in one condition, and the correlation of each speaker's opening."""
     pooled = [clip for result in results for clip in result.clips[condition]]
     figures = figures_of(pooled, results[0], seed)
-    lips = figures["closures_p_b_m"]
-    return opening_row(figures) | {name: lips[name] for name in ("false_per_minute", "original_per_minute")}
-
-
-def _acc_of_speakers(results: Sequence[_GeneratedFold], condition: str) -> dict[str, float]:
-    """Return the correlation of the opening of all clips of each speaker, by name."""
+    row = opening_row_with_rates(figures)
+    if not by_speaker:
+        return row
     clips: dict[str, list[ComparedClip]] = {}
     for result in results:
         for speaker, clip in zip(result.speakers, result.clips[condition], strict=True):
             clips.setdefault(speaker or "unknown", []).append(clip)
-    return {
-        speaker: float(pooled_correlation([clip.generated for clip in of], [clip.original for clip in of])[0])
-        for speaker, of in sorted(clips.items())
+    acc = {
+        speaker: float(pooled_correlation([clip.generated for clip in own], [clip.original for clip in own])[0])
+        for speaker, own in sorted(clips.items())
     }
+    return row | {"speakers": acc}
 
 
 def table(figures: Mapping[str, Any]) -> str:
@@ -180,17 +172,12 @@ def table(figures: Mapping[str, Any]) -> str:
             f"{figure_text(row['precision'], '.1f')} % of {row['generated_closings']}, "
             f"timing {figure_text(row['timing_ms'], '+.0f')} ms",
             f"  opening: ACC {acc}, nRMSE {row['nrmse']:.3f}, variance {row['global_variance']:.2f}",
-            *_speaker_lines(row.get("speakers", {})),
         ]
+        known = sorted((acc, speaker) for speaker, acc in row.get("speakers", {}).items() if acc is not None)
+        if known:
+            (low, worst), (high, best), mean = known[0], known[-1], sum(value for value, _ in known) / len(known)
+            lines.append(
+                f"  {len(known)} speakers unknown to the model: mean ACC {mean:.3f}, {low:.3f} ({worst}) to {high:.3f} "
+                f"({best})"
+            )
     return "\n".join(lines)
-
-
-def _speaker_lines(acc: Mapping[str, float | None]) -> list[str]:
-    """Return a line on how well speakers are generated by models of the others; none without speakers."""
-    known = sorted((value, speaker) for speaker, value in acc.items() if value is not None)
-    if not known:
-        return []
-    (low, worst), (high, best), mean = known[0], known[-1], sum(value for value, _ in known) / len(known)
-    return [
-        f"  {len(known)} speakers unknown to the model: mean ACC {mean:.3f}, {low:.3f} ({worst}) to {high:.3f} ({best})"
-    ]

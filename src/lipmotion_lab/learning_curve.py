@@ -18,14 +18,14 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
     HeldOutResult,
     PartKey,
-    channels_with_opening,
-    finished_parts,
+    check_opening,
+    open_parts,
     opening_row,
     shuffled,
     train_and_generate,
@@ -63,11 +63,11 @@ def learning_curve(
     """
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), settings.seed)
     held_out = corpus.required(split)
-    steps = training_sizes(sizes, len(listed))
+    steps = choose_sizes(sizes, len(listed))
     check_training_names(corpus, listed, held_out)
-    channels = channels_with_opening(corpus, held_out)
+    channels = check_opening(corpus, held_out)
     shares = np.cumsum([0, *steps]) / sum(steps)
-    kept = finished_parts(work, corpus, settings, PartKey(engine_named("trajectory"), (*listed, *held_out)))
+    kept = open_parts(work, corpus, settings, PartKey(engine_named("trajectory"), (*listed, *held_out)))
     rows = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
         found = kept.load(str(count))
@@ -87,7 +87,7 @@ def learning_curve(
     return nan_as_null(about | {"rows": rows})
 
 
-def training_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
+def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
     """Return the sizes, each once, in rising order; the default ones where none are given.
 
     listed : number of names in the list
@@ -117,20 +117,19 @@ def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequen
 
 
 def _row(corpus: Corpus, result: HeldOutResult, seed: int) -> dict[str, Any]:
-    """Return the figures of one model, by condition."""
-    conditions = {name: figures_of(clips, result.recordings, seed) for name, clips in result.clips.items()}
+    """Return the figures of one model, by condition; None for channels that the corpus does not have."""
+    conditions = {}
+    for name, clips in result.clips.items():
+        figures = figures_of(clips, result.recordings, seed)
+        channels = figures["channels"]
+        accs = {f"acc_{other}": channels[other]["acc"] if other in channels else None for other in OTHERS}
+        conditions[name] = opening_row(figures) | accs
     return {
         "used": len(result.used),
         "minutes": sum(corpus.utterance(name).audio.duration_s for name in result.used) / 60,
         "seconds": result.seconds,
-        "conditions": {name: opening_row(figures) | _other_accs(figures) for name, figures in conditions.items()},
+        "conditions": conditions,
     }
-
-
-def _other_accs(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ACC of the other channels; None where the corpus does not have them."""
-    channels = figures["channels"]
-    return {f"acc_{name}": channels[name]["acc"] if name in channels else None for name in OTHERS}
 
 
 def table(figures: Mapping[str, Any]) -> str:

@@ -40,7 +40,7 @@ class NoiseConditions:
             raise InputError(f"a babble of {len(self.talkers)} talkers; required at least {FEWEST_TALKERS}: --talkers")
 
 
-def recordings_in_noise(
+def add_noise(
     recordings: HeldOutRecordings,
     kind: str,
     snr_db: float,

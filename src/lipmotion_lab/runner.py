@@ -29,9 +29,9 @@ from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,
     HeldOutRecordings,
-    compared_channels,
-    compared_clips,
-    held_out_recordings,
+    choose_channels,
+    generate_clips,
+    load_held_out,
 )
 
 ItemT = TypeVar("ItemT")
@@ -111,7 +111,7 @@ def train_and_generate(
     )
     seconds = perf_counter() - start_s
     phones, recognising = cached_recogniser(model.phones), sub_monitor(monitor, 0.8, 0.95)
-    recordings = held_out_recordings(
+    recordings = load_held_out(
         corpus,
         phones,
         selection=Selection(names=sorted(held_out)),
@@ -122,17 +122,17 @@ def train_and_generate(
     )
     conditions = with_progress(list(recordings.conditions), "comparing", sub_monitor(monitor, 0.95, 1))
     generated = {
-        condition: compared_clips(recordings, condition, model.engine, model.learned) for condition in conditions
+        condition: generate_clips(recordings, condition, model.engine, model.learned) for condition in conditions
     }
     return HeldOutResult(recordings, generated, report.used, seconds)
 
 
-def channels_with_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
+def check_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
     """Return the channels to compare in some utterances: called before the long work.
 
     Raises CorpusError: the opening is not among them, or the utterances have different channels.
     """
-    channels, _ = compared_channels([corpus.utterance(name) for name in names])
+    channels, _ = choose_channels([corpus.utterance(name) for name in names])
     if OPENING not in channels:
         raise CorpusError(f"{corpus.path}: systems are compared by the channel {OPENING!r}, which is not in it")
     return channels
@@ -143,7 +143,7 @@ def shuffled(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
     return tuple(items[i] for i in np.random.default_rng(seed).permutation(len(items)))
 
 
-def quick_part(corpus: Corpus, seed: int) -> Corpus:
+def take_quick_part(corpus: Corpus, seed: int) -> Corpus:
     """Return a corpus with a few utterances of each list: those of every quick run with this seed."""
     return corpus.part([name for split in SPLITS for name in shuffled(corpus.names(split), seed)[: QUICK_CLIPS[split]]])
 
@@ -166,7 +166,7 @@ class PartKey:
     others: str = ""
 
 
-def finished_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSettings, key: PartKey) -> Checkpoint:
+def open_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSettings, key: PartKey) -> Checkpoint:
     """Return the finished parts of an experiment, from which a call goes on after a stop.
 
     folder : made if need be, in one that exists; None: nothing is kept
@@ -179,7 +179,7 @@ def finished_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSett
     return Checkpoint(folder, f"{of_input} {settings.seed} {key.others}")
 
 
-def stored_clips(clips: Sequence[ComparedClip]) -> dict[str, NDArray[Any]]:
+def clips_to_arrays(clips: Sequence[ComparedClip]) -> dict[str, NDArray[Any]]:
     """Return what a system generated as arrays, from which ``clips_from_arrays`` makes it again."""
     arrays = {name: np.concatenate([getattr(clip, name) for clip in clips]) for name in _CURVES}
     about = [(len(clip.time_s), clip.spoken) for clip in clips]
@@ -187,12 +187,18 @@ def stored_clips(clips: Sequence[ComparedClip]) -> dict[str, NDArray[Any]]:
 
 
 def clips_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[ComparedClip]:
-    """Return the clips that ``stored_clips`` stored."""
+    """Return the clips that ``clips_to_arrays`` stored."""
     about = json.loads(str(arrays[_ABOUT]))
     edges = np.cumsum([frames for frames, _ in about])[:-1]
     original, generated, time_s = (np.split(arrays[name], edges) for name in _CURVES)
     spoken = [tuple((start_s, end_s, phone) for start_s, end_s, phone in phones) for _, phones in about]
     return list(map(ComparedClip, original, generated, time_s, spoken))
+
+
+def opening_row_with_rates(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the figures of ``opening_row``, and how many closings there are outside p, b and m a minute of speech."""
+    lips = figures["closures_p_b_m"]
+    return opening_row(figures) | {name: lips[name] for name in ("false_per_minute", "original_per_minute")}
 
 
 def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:

@@ -38,7 +38,7 @@ class Stamp:
 
     def __init__(self) -> None:
         self._begun = datetime.now(timezone.utc)
-        self._start_s = perf_counter(), _processor_seconds()
+        self._start_s = perf_counter(), sum(os.times()[:4])
 
     def content(self, command: Sequence[str], corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         """Return command, time, corpus, seed, options, commit, engines, machine and versions, by name.
@@ -48,11 +48,15 @@ class Stamp:
         Processor seconds are those of this process and of its processes that have ended. None: not known, or not
         installed.
         """
-        seconds, used = perf_counter() - self._start_s[0], _processor_seconds() - self._start_s[1]
+        seconds, used = perf_counter() - self._start_s[0], sum(os.times()[:4]) - self._start_s[1]
+        words = (word.rpartition("=") for word in command)
         lists = {split: len(corpus.names(split)) for split in SPLITS}
         lexicon = "the user's" if settings.lexicon else "none but the dictionary"
         return {
-            "command": shlex.join(map(_without_folders, command)),
+            "command": shlex.join(
+                f"{option}{equals}{Path(value).name if Path(value).is_absolute() else value}"
+                for option, equals, value in words
+            ),
             "begun": self._begun.isoformat(timespec="seconds"),
             "seconds": round(seconds, 1),
             "processor seconds": round(used, 1),
@@ -71,30 +75,25 @@ def engine_digest(name: str) -> str:
     return hashlib.sha256(options.encode()).hexdigest()[:DIGITS]
 
 
-def _without_folders(word: str) -> str:
-    option, equals, value = word.rpartition("=")
-    return f"{option}{equals}{Path(value).name}" if Path(value).is_absolute() else word
-
-
-def _processor_seconds() -> float:
-    return sum(os.times()[:4])
-
-
 def _machine() -> dict[str, Any]:
     try:
         lines = CPU_INFO.read_text(encoding="utf-8").splitlines()
     except OSError:
         lines = []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return {
-        "machine": {
-            "cores": os.cpu_count(),
-            "processor": named[0] if named else platform.processor() or platform.machine(),
-            "system": platform.platform(),
-            "linear algebra": ", ".join(map(str, blas_kernels())),
-        },
-        "versions": {"Python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
+    versions: dict[str, str | None] = {"Python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            versions[package] = None
+    machine = {
+        "cores": os.cpu_count(),
+        "processor": named[0] if named else platform.processor() or platform.machine(),
+        "system": platform.platform(),
+        "linear algebra": ", ".join(map(str, blas_kernels())),
     }
+    return {"machine": machine, "versions": versions}
 
 
 def commit(root: Path) -> str | None:
@@ -103,16 +102,9 @@ def commit(root: Path) -> str | None:
     if git is None or not (root / ".git").exists():
         return None
 
-    def said(*arguments: str) -> str | None:
+    def ask(*arguments: str) -> str | None:
         done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, check=False)
         return done.stdout.strip() if done.returncode == 0 else None
 
-    found = said("rev-parse", "HEAD")
-    return f"{found}, changed since" if found and said("status", "--porcelain", "--", "src") else found
-
-
-def _version(package: str) -> str | None:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
+    head = ask("rev-parse", "HEAD")
+    return f"{head}, changed since" if head and ask("status", "--porcelain", "--", "src") else head

@@ -1,12 +1,15 @@
 """The studio as a web application: a page, and what it asks for (docs/extend/studio.md); an ASGI application.
 
-No part of an address and no text of a request is used as a path of a file: lines, faces and files of the page are
+No part of an address and no text of a request is used as a path of a file: recordings, faces and files of the page are
 looked up by number or name among those that there are, and what is dropped gets a name of the server's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -14,19 +17,47 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from lipmotion_studio.access import Access
+from lipmotion.formats.web_page import colour_code
 from lipmotion_studio.folder import RevisionError
-from lipmotion_studio.line_replies import LineReplies
-from lipmotion_studio.page_files import page_files
 from lipmotion_studio.project_replies import ProjectReplies
+from lipmotion_studio.recording_replies import RecordingReplies
+from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
-from lipmotion_studio.training_replies import TrainingReplies
 from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, failed
 
+FIRST = "studio.html"
+"""The page itself, whose address is empty."""
+KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".mjs": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".txt": "text/plain; charset=utf-8",
+    ".md": "text/plain; charset=utf-8",
+    ".woff2": "font/woff2",
+    ".wasm": "application/wasm",
+}
+"""What files are served as, by their suffixes; others are not served."""
 PAGE_POLICY = HEADERS["content-security-policy"] + (
     "; img-src 'self' blob: data:; media-src 'self' blob:; worker-src 'self' blob:; connect-src 'self' blob:"
 )
 """Pictures, sounds and textures of models become objects of the page, whose addresses begin with ``blob:``."""
+
+
+def read_page(folder: Traversable, before: str = "") -> Iterator[tuple[str, tuple[bytes, str]]]:
+    """Yield the files of the page: address, without the first slash, content, and what it is served as."""
+    for each in folder.iterdir():
+        kind = KINDS.get(f".{each.name.rpartition('.')[2].lower()}")
+        if each.is_dir():
+            yield from read_page(each, f"{before}{each.name}/")
+        elif kind is not None:
+            content = each.read_bytes()
+            if each.name.endswith(".css"):
+                content = colour_code(content.decode("utf-8")).encode()
+            yield f"{before}{each.name}", (content, kind)
 
 
 def studio_application(studio: Studio, access: Access) -> Starlette:
@@ -34,14 +65,14 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
 
     access : the token, and the addresses that the server has
     """
-    lines, project, training = LineReplies(studio, access), ProjectReplies(studio), TrainingReplies(studio)
-    page = page_files()
+    recordings, project = RecordingReplies(studio, access), ProjectReplies(studio)
+    page = dict(read_page(files("lipmotion_studio") / "page"))
 
     async def packaged(request: Request) -> Response:
-        found = page.get(request.path_params.get("name", ""))
-        if found is None:
+        file = page.get(request.path_params.get("name", "") or FIRST)
+        if file is None:
             raise HTTPException(404, "no such page")
-        return Response(found.content, headers=FRESH | {"content-type": found.kind})
+        return Response(file[0], headers=FRESH | {"content-type": file[1]})
 
     post = partial(Route, methods=["POST"])
     one = "/api/lines/{number}"
@@ -50,38 +81,38 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         Route("/api/progress", project.progress),
         post("/api/understand", project.understand),
         post("/api/lines", project.dropped),
-        Route(one, lines.line),
-        post(f"{one}/edits", lines.edits),
-        post(f"{one}/undo", lines.undo),
-        post(f"{one}/redo", lines.redo),
-        post(f"{one}/settle", lines.settle),
-        post(f"{one}/transcript", lines.transcript),
-        post(f"{one}/restore", lines.restore),
-        post(f"{one}/versions", lines.keep),
-        post(f"{one}/versions/forget", lines.forget),
-        post(f"{one}/versions/back", lines.back),
+        Route(one, recordings.recording),
+        post(f"{one}/edits", recordings.edits),
+        post(f"{one}/undo", recordings.undo),
+        post(f"{one}/redo", recordings.redo),
+        post(f"{one}/settle", recordings.settle),
+        post(f"{one}/transcript", recordings.transcript),
+        post(f"{one}/restore", recordings.restore),
+        post(f"{one}/versions", recordings.keep),
+        post(f"{one}/versions/forget", recordings.forget),
+        post(f"{one}/versions/back", recordings.back),
         post(f"{one}/mark", project.mark),
         post(f"{one}/remove", project.remove),
-        post(f"{one}/export", project.export_line),
-        post(f"{one}/video", lines.video),
-        Route(f"{one}/sound.wav", lines.sound),
-        Route(f"{one}/recorded", lines.recorded),
-        post(f"{one}/votes", lines.vote),
-        Route(f"{one}/motion", lines.motion),
-        Route(f"{one}/weights", lines.weights),
-        Route(f"{one}/picture", lines.picture),
-        Route(f"{one}/why", lines.why),
-        Route(f"{one}/doubts", lines.doubts),
+        post(f"{one}/export", project.export_one),
+        post(f"{one}/video", recordings.video),
+        Route(f"{one}/sound.wav", recordings.sound),
+        Route(f"{one}/recorded", recordings.recorded),
+        post(f"{one}/votes", recordings.vote),
+        Route(f"{one}/motion", recordings.motion),
+        Route(f"{one}/weights", recordings.weights),
+        Route(f"{one}/picture", recordings.picture),
+        Route(f"{one}/why", recordings.why),
+        Route(f"{one}/doubts", recordings.doubts),
         post("/api/export", project.export_all),
         Route("/api/faces/{name}.glb", project.mesh),
         Route("/api/lexicon", project.pronunciations),
         post("/api/lexicon", project.pronounce),
-        Route("/api/training", training.training),
-        post("/api/training", training.begin),
-        post("/api/training/stop", training.after(studio.trainer.stop)),
-        post("/api/training/again", training.after(studio.trainer.again, 201)),
-        post("/api/training/restore", training.after(studio.trainer.restore)),
-        post("/api/voice", training.voice),
+        Route("/api/training", project.training),
+        post("/api/training", project.begin_training),
+        post("/api/training/stop", project.training_after(studio.trainer.stop)),
+        post("/api/training/again", project.training_after(studio.trainer.retry, 201)),
+        post("/api/training/restore", project.training_after(studio.trainer.restore)),
+        post("/api/voice", project.voice),
         Route("/", packaged),
         Route("/{name:path}", packaged),
     ]

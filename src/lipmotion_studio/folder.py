@@ -42,8 +42,8 @@ from lipmotion.units import Lexicon
 from lipmotion_studio.project import (
     EDITS_SUFFIX,
     Project,
-    ProjectLine,
-    check_lines,
+    ProjectRecording,
+    check_recordings,
     digest_of,
     project_document,
     project_from,
@@ -58,9 +58,9 @@ VOTES = "votes.json"
 SUFFIX = ".studio"
 """How the folder of a project ends, beside the recording or the folder of recordings that it was made of."""
 UNTITLED = Path(f"untitled{SUFFIX}")
-LARGEST_PROJECT_BYTES = 1 << 28
-LONGEST_NAME = 80
-"""Most characters of the name of a line that was dropped."""
+MAX_PROJECT_BYTES = 1 << 28
+MAX_NAME = 80
+"""Most characters of the name of a recording that was dropped."""
 
 
 class RevisionError(LipMotionError):
@@ -69,10 +69,10 @@ class RevisionError(LipMotionError):
 
 @dataclass(frozen=True)
 class EditsSummary:
-    """What a line's file of edits holds, but for its phones.
+    """What a recording's file of edits holds, but for its phones.
 
     count  : how many edits
-    digest : of their sentences
+    digest : of their commands
     state  : digest of all that changes with an edit, and with taking it back; empty: there is no file yet
     error  : why the file cannot be read, and how it is restored; empty: it can
     """
@@ -92,17 +92,17 @@ def summary_of(file: EditFile) -> EditsSummary:
     return EditsSummary(len(steps), digest_of(steps), digest_of((*steps, "", *map(str, file.undone))))
 
 
-def revision_of(line: ProjectLine, edits: EditsSummary) -> int:
-    """Return the revision of a line: another number after every change that somebody can make of it.
+def revision_of(recording: ProjectRecording, edits: EditsSummary) -> int:
+    """Return the revision of a recording: another number after every change that somebody can make of it.
 
     It follows from the content, and is the same after a restart: a change names the revision that its author saw.
     """
-    versions = [[version.number, *version.steps] for version in line.versions]
-    return _revision([line.transcript, line.mark, versions, edits.state])
+    versions = [[version.number, *version.steps] for version in recording.versions]
+    return _revision([recording.transcript, recording.mark, versions, edits.state])
 
 
-def _revision(seen: Any) -> int:
-    return int(sha256(as_json(seen).encode()).hexdigest()[:8], 16) >> 1
+def _revision(content: Any) -> int:
+    return int(sha256(as_json(content).encode()).hexdigest()[:8], 16) >> 1
 
 
 def check_revision(what: str, now: int, seen: int) -> None:
@@ -125,159 +125,168 @@ class ProjectFolder:
         self.lock = threading.RLock()
         self._summaries: dict[int, tuple[object, EditsSummary]] = {}
         file = path / PROJECT
-        self.project = _read(file) if file.exists() else Project()
+        self.project = Project()
+        if file.exists():
+            text = read_text_file(file, "project", MAX_PROJECT_BYTES)
+            try:
+                self.project = project_from(from_json(text))
+            except ValueError as error:  # InputError is one
+                raise InputError(f"{file}: {error}") from error
 
-    def line(self, number: int) -> ProjectLine:
-        """Return a line. Raises InputError: there is none of that number."""
-        found = self.project.lines.get(number)
-        if found is None:
-            raise InputError(f"there is no line {number} in the project")
-        return found
+    def recording(self, number: int) -> ProjectRecording:
+        """Return a recording. Raises InputError: there is none of that number."""
+        recording = self.project.lines.get(number)
+        if recording is None:
+            raise InputError(f"there is no recording {number} in the project")
+        return recording
 
-    def sound(self, line: ProjectLine) -> Path:
-        """Return the path of a line's recording."""
-        return Path(os.path.normpath(self.path / line.sound))
+    def sound(self, recording: ProjectRecording) -> Path:
+        """Return the path of a recording's sound."""
+        return Path(os.path.normpath(self.path / recording.sound))
 
-    def edits(self, line: ProjectLine) -> Path:
-        """Return the path of a line's file of edits, which is there once the line is understood."""
-        return self.path / EDITS / f"{line.name}.{EDITS_SUFFIX}"
+    def edits(self, recording: ProjectRecording) -> Path:
+        """Return the path of a recording's file of edits, which is there once it is analysed."""
+        return self.path / EDITS / f"{recording.name}.{EDITS_SUFFIX}"
 
-    def _copy(self, line: ProjectLine) -> Path:
-        return self.path / COPIES / f"{line.name}.{EDITS_SUFFIX}"
+    def _copy(self, recording: ProjectRecording) -> Path:
+        return self.path / COPIES / f"{recording.name}.{EDITS_SUFFIX}"
 
-    def checked_sound(self, line: ProjectLine) -> Path:
-        """Return the path of a line's recording. Raises InputError: it is not there, or another one than it was."""
-        path = self.sound(line)
-        if line.sha256:
-            check_sound(path, line.sha256)
+    def check_sound(self, recording: ProjectRecording) -> Path:
+        """Return the path of a recording's sound. Raises InputError: it is not there, or another one than it was."""
+        path = self.sound(recording)
+        if recording.sha256:
+            check_sound(path, recording.sha256)
         return path
 
     @contextmanager
-    def changing(self, number: int, revision: int) -> Iterator[ProjectLine]:
-        """Give a line to be changed by somebody who saw this revision of it; nobody else changes it meanwhile.
+    def check_out(self, number: int, revision: int) -> Iterator[ProjectRecording]:
+        """Give a recording to be changed by somebody who saw this revision; nobody else changes it in the meantime.
 
-        Raises RevisionError: it has changed since. InputError: there is no such line any more.
+        Raises RevisionError: it has changed since. InputError: there is no such recording any more.
         """
         with self.lock:
-            line = self.line(number)
-            check_revision("the line", revision_of(line, self.summary(line)), revision)
-            yield line
+            recording = self.recording(number)
+            check_revision("the recording", revision_of(recording, self.summary(recording)), revision)
+            yield recording
 
-    def summary(self, line: ProjectLine) -> EditsSummary:
-        """Return what is said of a line's edits; ``NO_EDITS`` where it is not understood yet.
+    def summary(self, recording: ProjectRecording) -> EditsSummary:
+        """Return what a recording's file of edits holds; ``NO_EDITS`` where it is not analysed yet.
 
         What this process writes is known; a file is read again where others have written it: else it is the same value.
         """
         with self.lock:
-            written, known = self._written(line), self._summaries.get(line.number)
-            if known is None or known[0] != written:
-                known = written, self._read_summary(line) if written else NO_EDITS
-                self._summaries[line.number] = known
-            return known[1]
+            state, cached = self._file_state(recording), self._summaries.get(recording.number)
+            if cached is None or cached[0] != state:
+                summary = NO_EDITS
+                if state:
+                    try:
+                        summary = summary_of(read_edits(self.edits(recording), phones=False))
+                    except InputError as error:
+                        summary = EditsSummary(0, "", f"damaged: {error}", str(self._damage(recording, error)))
+                cached = self._summaries[recording.number] = state, summary
+            return cached[1]
 
-    def _written(self, line: ProjectLine) -> object:
+    def _file_state(self, recording: ProjectRecording) -> object:
         """Return what tells a file of edits from an earlier one; a copy without its file counts. None: neither."""
         try:
-            status = self.edits(line).stat()
+            status = self.edits(recording).stat()
             return status.st_ino, status.st_size, status.st_mtime_ns
         except FileNotFoundError:
-            return self._copy(line).exists() or None
+            return self._copy(recording).exists() or None
         except OSError as error:  # it is there, and its reading says why it cannot be read
             return str(error)
 
-    def _read_summary(self, line: ProjectLine) -> EditsSummary:
-        try:
-            return summary_of(read_edits(self.edits(line), phones=False))
-        except InputError as error:
-            return EditsSummary(0, "", f"damaged: {error}", str(self._damaged(line, error)))
-
-    def _damaged(self, line: ProjectLine, error: InputError) -> InputError:
-        """Return what is said of a file of edits that cannot be read."""
-        copy = self._copy(line)
+    def _damage(self, recording: ProjectRecording, error: InputError) -> InputError:
+        """Return the error of a file of edits that cannot be read, with the way out."""
+        copy = self._copy(recording)
         try:
             count = len(read_edits(copy).edits.steps)
+            way_out = (
+                f"the last good copy, with {count} edits, is {copy}: restore it on the page, or put it in its place"
+            )
         except InputError:
-            export = self.path / EXPORTS / f"{line.name}.{EDITS_SUFFIX}"
-            told = f"there is no good copy, but perhaps that of the last export, {export}; put it in its place"
-        else:
-            told = f"the last good copy, with {count} edits, is {copy}: restore it on the page, or put it in its place"
-        return InputError(f"the edits of the line are damaged, and are left as they are: {error}; {told}")
+            export = self.path / EXPORTS / f"{recording.name}.{EDITS_SUFFIX}"
+            way_out = f"there is no good copy, but perhaps that of the last export, {export}; put it in its place"
+        return InputError(f"the edits of the recording are damaged, and are left as they are: {error}; {way_out}")
 
-    def read_edits(self, line: ProjectLine) -> EditFile:
-        """Return a line's file of edits. Raises InputError: it is damaged, and where a copy is; or of another sound."""
+    def read_edits(self, recording: ProjectRecording) -> EditFile:
+        """Return a recording's file of edits.
+
+        Raises InputError: it is damaged, and where a copy is; or it is of another sound.
+        """
         with self.lock:
             try:
-                file = read_edits(self.edits(line))
+                file = read_edits(self.edits(recording))
             except InputError as error:
-                raise self._damaged(line, error) from error
-        if line.sha256 and file.sha256 not in ("", line.sha256):
+                raise self._damage(recording, error) from error
+        if recording.sha256 and file.sha256 not in ("", recording.sha256):
             raise InputError(
-                f"{self.edits(line)}: are edits of another recording than {self.sound(line)}; put the file of this "
-                "line in its place, or add the recording again, under another name"
+                f"{self.edits(recording)}: are edits of another recording than {self.sound(recording)}; put the right "
+                "file in its place, or add the recording again, under another name"
             )
         return file
 
-    def has_edits(self, line: ProjectLine) -> bool:
-        """Return whether a line is understood, and edited since. Raises InputError: as ``read_edits``."""
-        return self.summary(line) is not NO_EDITS and bool(self.read_edits(line).edits.steps)
+    def has_edits(self, recording: ProjectRecording) -> bool:
+        """Return whether a recording is analysed, and edited since. Raises InputError: as ``read_edits``."""
+        return self.summary(recording) is not NO_EDITS and bool(self.read_edits(recording).edits.steps)
 
-    def write_edits(self, line: ProjectLine, file: EditFile) -> None:
-        """Write a line's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
-        path, copy = self.edits(line), self._copy(line)
+    def write_edits(self, recording: ProjectRecording, file: EditFile) -> None:
+        """Write a recording's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
+        path, copy = self.edits(recording), self._copy(recording)
         with self.lock, made_folders([path.parent, copy.parent]):
-            write_twice(path, copy, lambda first: write_edits(file, first))
-            self._summaries[line.number] = self._written(line), summary_of(file)
+            write_with_copy(path, copy, lambda first: write_edits(file, first))
+            self._summaries[recording.number] = self._file_state(recording), summary_of(file)
 
-    def adopt(self, line: ProjectLine, file: EditFile) -> EditFile:
-        """Return a line's edits with the digest of its sound, where a project of an earlier version has none, or half.
+    def adopt(self, recording: ProjectRecording, file: EditFile) -> EditFile:
+        """Return a recording's edits with the digest of its sound, where a project of an earlier version has none.
 
         From then on another sound is refused; a warning says so. The copy becomes that of the file.
-        Raises InputError: the recording cannot be read. ExportError: it cannot be written.
+        Raises InputError: the sound cannot be read. ExportError: it cannot be written.
         """
-        path, copy, digest = self.edits(line), self._copy(line), line.sha256 or file.sha256
-        if not (line.sha256 and file.sha256):
-            LOG.warning("%s: is taken to be the recording that was edited; from now on no other is", self.sound(line))
-            digest = digest or sha256_of(self.sound(line))
-            self.change_line(line.number, lambda now: replace(now, sha256=digest))
+        path, copy, digest = self.edits(recording), self._copy(recording), recording.sha256 or file.sha256
+        if not (recording.sha256 and file.sha256):
+            sound = self.sound(recording)
+            LOG.warning("%s: is taken to be the recording that was edited; from now on no other is", sound)
+            digest = digest or sha256_of(sound)
+            self.change_recording(recording.number, lambda now: replace(now, sha256=digest))
         if not file.sha256:
             file = replace(file, sha256=digest)
-            self.write_edits(line, file)
+            self.write_edits(recording, file)
         elif not copy.exists() or copy.read_bytes() != path.read_bytes():  # others may have edited it
             with self.lock, made_folders([copy.parent]):
                 copy_file(path, copy)
         return file
 
-    def remove_edits(self, line: ProjectLine) -> None:
-        """Remove a line's file of edits, and its copy. Raises ExportError: it cannot be removed."""
+    def remove_edits(self, recording: ProjectRecording) -> None:
+        """Remove a recording's file of edits, and its copy. Raises ExportError: it cannot be removed."""
         with self.lock:
-            for path in (self._copy(line), self.edits(line)):  # a copy without its file would be a damage
+            for path in (self._copy(recording), self.edits(recording)):  # a copy without its file would be a damage
                 remove(path)
                 if path.exists():
                     raise ExportError(f"{path}: cannot be removed")
 
-    def is_restorable(self, line: ProjectLine) -> bool:
-        """Return whether a line's edits are damaged, or those of another sound, and there is a good copy."""
+    def is_restorable(self, recording: ProjectRecording) -> bool:
+        """Return whether a recording's edits are damaged, or those of another sound, and there is a good copy."""
         with self.lock:
             try:
-                self.read_edits(line)
+                self.read_edits(recording)
             except InputError:
                 try:
-                    return read_edits(self._copy(line)).sha256 == line.sha256
+                    return read_edits(self._copy(recording)).sha256 == recording.sha256
                 except InputError:
                     pass
             return False
 
-    def restore_edits(self, line: ProjectLine) -> None:
+    def restore_edits(self, recording: ProjectRecording) -> None:
         """Put the last good copy in the place of a damaged file of edits, which stays beside it under another name.
 
         Raises InputError: the file is not damaged, or there is no good copy. ExportError: it cannot be written.
         """
-        path = self.edits(line)
         with self.lock:
-            if not self.is_restorable(line):
-                self.read_edits(line)  # says what is damaged
-                raise InputError("the edits of the line are not damaged; nothing is restored")
-            restore(path, self._copy(line))
+            if not self.is_restorable(recording):
+                self.read_edits(recording)  # says what is damaged
+                raise InputError("the edits of the recording are not damaged; nothing is restored")
+            restore_copy(self.edits(recording), self._copy(recording))
 
     def change(self, changed: Callable[[Project], Project], *, save: bool = True) -> None:
         """Replace the project by what a function makes of it; ``save``: write it at once.
@@ -296,11 +305,13 @@ class ProjectFolder:
                 self.project = before
                 raise
 
-    def change_line(self, number: int, changed: Callable[[ProjectLine], ProjectLine], *, save: bool = True) -> None:
-        """Replace a line, if it is still there, as ``change`` does."""
+    def change_recording(
+        self, number: int, changed: Callable[[ProjectRecording], ProjectRecording], *, save: bool = True
+    ) -> None:
+        """Replace a recording, if it is still there, as ``change`` does."""
         with self.lock:
             if number in self.project.lines:
-                self.change(lambda project: project.with_lines([changed(project.lines[number])]), save=save)
+                self.change(lambda project: project.with_recordings([changed(project.lines[number])]), save=save)
 
     def save(self) -> None:
         """Write the project. Raises ExportError: it cannot be written."""
@@ -310,27 +321,26 @@ class ProjectFolder:
                 temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
-        """Add a recording, or those of a folder or a list, which stay where they are; return the new lines' numbers.
+        """Add a recording, or those of a folder or a list, which stay where they are; return their numbers.
 
-        Recordings that are lines already are left out.
+        Those that the project has already are left out.
         Raises InputError: no recordings. ExportError: as ``change``; or names that no folder can hold.
         """
         with self.lock:
-            found = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
-            named = [(Path(line.recording), line.name, line.transcript) for line in found] or [
-                (source, portable_name(source.stem), "")
-            ]
-            known = {os.path.realpath(self.sound(line)) for line in self.project.lines.values()}
-            new = [each for each in named if os.path.realpath(each[0]) not in known]
-            taken, file = {_key(line.name) for line in self.project.lines.values()}, self.path.absolute() / PROJECT
-            added = []
-            for number, (sound, name, said) in enumerate(new, self.project.next_number):
-                line = ProjectLine(number, name, sound_reference(sound.absolute(), file), sha256_of(sound), said)
-                added.append(self._named(line, taken))
-            project = self.project.with_lines(added)
-            check_lines(project)
+            listed = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
+            sources = [(Path(each.recording), each.name, each.transcript) for each in listed]
+            known = {os.path.realpath(self.sound(each)) for each in self.project.lines.values()}
+            taken, file = self._taken_names(), self.path.absolute() / PROJECT
+            added: list[ProjectRecording] = []
+            for sound, name, transcript in sources or [(source, portable_name(source.stem), "")]:
+                if os.path.realpath(sound) not in known:
+                    number, reference = self.project.next_number + len(added), sound_reference(sound.absolute(), file)
+                    recording = ProjectRecording(number, name, reference, sha256_of(sound), transcript)
+                    added.append(self._choose_name(recording, taken))
+            project = self.project.with_recordings(added)
+            check_recordings(project)
             self.change(lambda _: project)
-            return [line.number for line in added]
+            return [each.number for each in added]
 
     def drop(self, name: str, content: Path, transcript: str) -> int:
         """Add a recording that was dropped on the page, as a file of the project; return its number.
@@ -344,44 +354,47 @@ class ProjectFolder:
         with self.lock:
             folder = self.path / SOUNDS
             make_folder(folder)
-            taken = {_key(line.name) for line in self.project.lines.values()}
-            taken |= {_key(each.stem) for each in folder.iterdir()}  # also those of lines that were removed
-            line = ProjectLine(self.project.next_number, plain_name(Path(name).stem), "", digest, transcript)
-            line = self._named(line, taken)
-            line = replace(line, sound=f"{SOUNDS}/{line.name}{suffix}")
-            check_lines(self.project.with_lines([line]))
-            with whole_file(self.sound(line)) as temporary:
+            taken = self._taken_names() | {_key(each.stem) for each in folder.iterdir()}  # also of what was removed
+            number = self.project.next_number
+            recording = ProjectRecording(number, clean_name(Path(name).stem), "", digest, transcript)
+            recording = self._choose_name(recording, taken)
+            recording = replace(recording, sound=f"{SOUNDS}/{recording.name}{suffix}")
+            check_recordings(self.project.with_recordings([recording]))
+            with whole_file(self.sound(recording)) as temporary:
                 content.replace(temporary)
-            self.change(lambda project: project.with_lines([line]))
-            return line.number
+            self.change(lambda project: project.with_recordings([recording]))
+            return number
 
-    def _named(self, line: ProjectLine, taken: set[str]) -> ProjectLine:
-        """Return a new line with a name that is free, and take it; a number is added if needed.
+    def _taken_names(self) -> set[str]:
+        return {_key(recording.name) for recording in self.project.lines.values()}
 
-        A name under which edits of another sound lie, as of a line that was removed, is not free.
+    def _choose_name(self, recording: ProjectRecording, taken: set[str]) -> ProjectRecording:
+        """Return a new recording with a name that is free, and take it; a number is added if needed.
+
+        A name under which edits of another sound lie, as of a recording that was removed, is not free.
         """
 
-        def is_free(named: ProjectLine) -> bool:
+        def is_free(named: ProjectRecording) -> bool:
             if _key(named.name) in taken:
                 return False
             files = [path for path in (self.edits(named), self._copy(named)) if path.exists()]
             try:
-                return all(read_edits(path, phones=False).sha256 == line.sha256 for path in files)
+                return all(read_edits(path, phones=False).sha256 == recording.sha256 for path in files)
             except InputError:
                 return False
 
-        named, number = line, 1
+        named, number = recording, 1
         while not is_free(named):
             number += 1
-            named = replace(line, name=f"{line.name}-{number}")
+            named = replace(recording, name=f"{recording.name}-{number}")
         taken.add(_key(named.name))
         return named
 
     @property
     def recordings(self) -> Path | None:
         """The folder of recordings that voices may be trained on; None: none was given."""
-        given = self.project.recordings
-        return Path(os.path.normpath(self.path / given)) if given else None
+        folder = self.project.recordings
+        return Path(os.path.normpath(self.path / folder)) if folder else None
 
     @property
     def model_file(self) -> Path | None:
@@ -396,9 +409,9 @@ class ProjectFolder:
 
     def lexicon(self) -> Lexicon:
         """Return the project's own pronunciations, ahead of those of its language. Raises InputError: unreadable."""
-        own = Lexicon.from_file(self.lexicon_file) if self.lexicon_file else Lexicon()
+        lexicon = Lexicon.from_file(self.lexicon_file) if self.lexicon_file else Lexicon()
         language = self.project.language
-        return own if language in (ENGLISH, AUTO) else LanguageLexicon(own.user, language)
+        return lexicon if language in (ENGLISH, AUTO) else LanguageLexicon(lexicon.user, language)
 
     def add_vote(self, vote: Vote) -> tuple[Vote, ...]:
         """Write a vote behind those that were cast before; return all. Raises InputError, ExportError: not possible."""
@@ -410,11 +423,11 @@ class ProjectFolder:
 
     @property
     def voice_revision(self) -> int:
-        """The revision of the voice that moves the lines, as ``revision_of`` is that of a line."""
+        """The revision of the voice that moves the recordings, as ``revision_of`` is that of a recording."""
         return _revision(self.project.model)
 
     def word_revision(self, word: str) -> int:
-        """Return the revision of the project's pronunciations of a word, as ``revision_of`` is that of a line."""
+        """Return the revision of the project's pronunciations of a word, as ``revision_of`` is that of a recording."""
         return _revision([word, self.lexicon().user.get(word, ())])
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...], revision: int) -> None:
@@ -432,15 +445,7 @@ class ProjectFolder:
                 temporary.write_text("".join(rows), encoding="utf-8")
 
 
-def _read(file: Path) -> Project:
-    text = read_text_file(file, "project", LARGEST_PROJECT_BYTES)
-    try:
-        return project_from(from_json(text))
-    except ValueError as error:  # InputError is one
-        raise InputError(f"{file}: {error}") from error
-
-
-def folder_for(source: Path | None, out: Path | None = None) -> Path:
+def project_path(source: Path | None, out: Path | None = None) -> Path:
     """Return the folder of the project of a recording, of a folder or a list of recordings, or of the project itself.
 
     A path that ends as projects do, and is not there, is that of an empty project.
@@ -470,12 +475,12 @@ def _is_new(source: Path) -> bool:
 
 
 @contextmanager
-def opened_folder(source: Path | None, out: Path | None = None) -> Iterator[ProjectFolder]:
-    """Open the project of ``folder_for``, created if needed, with the recordings of the source as its lines.
+def open_folder(source: Path | None, out: Path | None = None) -> Iterator[ProjectFolder]:
+    """Open the project of ``project_path``, created if needed, with the recordings of the source.
 
     Raises ExportError: another process works on it, or it cannot be written.  Raises InputError: it cannot be read.
     """
-    path = folder_for(source, out)
+    path = project_path(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with locked(path):
         remove_unfinished(path)  # what was dropped on a studio that was killed
@@ -497,7 +502,7 @@ def copy_file(source: Path, target: Path) -> None:
         shutil.copyfile(source, temporary)
 
 
-def write_twice(path: Path, copy: Path, write: Callable[[Path], object]) -> None:
+def write_with_copy(path: Path, copy: Path, write: Callable[[Path], object]) -> None:
     """Write a file and its copy. Raises ExportError: one of them cannot be written.
 
     What fails between the two leaves what was acknowledged, and never a copy alone: that would be a damage.
@@ -507,7 +512,7 @@ def write_twice(path: Path, copy: Path, write: Callable[[Path], object]) -> None
     copy_file(first, second)
 
 
-def restore(path: Path, copy: Path) -> None:
+def restore_copy(path: Path, copy: Path) -> None:
     """Put a copy in the place of a damaged file, which stays beside it under another name. Raises ExportError."""
     with whole_file(path) as temporary:
         shutil.copyfile(copy, temporary)
@@ -516,11 +521,11 @@ def restore(path: Path, copy: Path) -> None:
     LOG.warning("%s: was damaged, and is restored from %s", path, copy)
 
 
-def plain_name(given: str, usual: str = "line") -> str:
-    """Return a name that the page gives as the name of a file: letters, digits and a few signs; ``usual``: of none.
+def clean_name(name: str, default: str = "line") -> str:
+    """Return a name that the page gives as the name of a file: letters, digits and a few signs.
 
-    >>> plain_name("../Anna's take"), plain_name("..", "voice")
+    >>> clean_name("../Anna's take"), clean_name("..", "voice")
     ('Anna_s take', 'voice')
     """
-    plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", given)).strip(" ._")
-    return portable_name(plain[:LONGEST_NAME]) or usual
+    plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", name)).strip(" ._")
+    return portable_name(plain[:MAX_NAME]) or default

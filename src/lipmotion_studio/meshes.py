@@ -9,7 +9,7 @@ import numpy as np
 
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.errors import InputError, shortened
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
@@ -47,22 +47,22 @@ class Faces:
     @property
     def names(self) -> dict[str, bool]:
         """The names of all faces, and whether each is a mesh."""
-        own = {name: path.suffix.lower() != SUFFIX for name, path in self._characters.items()}
-        return {name: name == HEAD for name in FACES.names} | own
+        added = {name: path.suffix.lower() != SUFFIX for name, path in self._characters.items()}
+        return {name: name == HEAD for name in FACES.names} | added
 
     def is_filmed(self, name: str) -> bool:
         """Return whether a face is a filmed one, which is shown as a video alone."""
-        own = self._characters.get(name)
-        return own is not None and own.suffix.lower() == SUFFIX
+        path = self._characters.get(name)
+        return path is not None and path.suffix.lower() == SUFFIX
 
     def shown(self, name: str) -> ShownFace:
         """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
         if name not in self._shown:
             if name not in self.names:
                 raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
-            own = self._characters.get(name)
-            found = name if own is None else own if self.is_filmed(name) else MeshFace(driven_character(own))
-            self._shown[name] = shown_face(found)
+            path = self._characters.get(name)
+            face = name if path is None else path if self.is_filmed(name) else MeshFace(load_character(path))
+            self._shown[name] = shown_face(face)
         return self._shown[name]
 
     def mesh_name(self, name: str, motion: Motion) -> str:
@@ -71,26 +71,24 @@ class Faces:
 
     def mesh(self, name: str) -> bytes:
         """Return the ``.glb`` of a face at rest. Raises InputError: there is none of that name, or it is no mesh."""
-        if name not in self._meshes:
-            self._meshes[name] = self._written(name)
-        return self._meshes[name]
-
-    def _written(self, name: str) -> bytes:
-        own = self._characters.get(name)
+        if name in self._meshes:
+            return self._meshes[name]
+        path = self._characters.get(name)
         if self.is_filmed(name):
             raise InputError(f"{name} is a filmed face, and no mesh; ask for a video of it")
-        if own is not None and own.suffix.lower() in KEPT:
-            return Budget().file_bytes(own, "character")
-        if own is not None:
+        if path is not None and path.suffix.lower() in KEPT:
+            self._meshes[name] = Budget().file_bytes(path, "character")
+            return self._meshes[name]
+        if path is not None:
             scene = self.shown(name).scene(_still(), OutputSettings(self.shown(name)), None)
         elif name in (HEAD, HEAD_OF_MOODS):
             scene = head_scene(_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
         else:
             raise InputError(f"no mesh {shortened(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
         with temporary_folder() as folder:
-            path = folder / "face.glb"
-            write_scene(path, scene)
-            return path.read_bytes()
+            write_scene(folder / "face.glb", scene)
+            self._meshes[name] = (folder / "face.glb").read_bytes()
+        return self._meshes[name]
 
 
 def _still(*keys: MoodKey) -> Generation:

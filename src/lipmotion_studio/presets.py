@@ -71,5 +71,5 @@ def preset_of(name: str, files: tuple[str, ...]) -> Preset:
 
 def suffixes() -> tuple[str, ...]:
     """Return the suffixes of all files that can be exported."""
-    found = output_suffixes(OutputSettings(shown_face("head")))
-    return tuple(suffix for suffix in found if _SUFFIX.fullmatch(suffix))
+    everything = output_suffixes(OutputSettings(shown_face("head")))
+    return tuple(suffix for suffix in everything if _SUFFIX.fullmatch(suffix))

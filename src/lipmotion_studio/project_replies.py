@@ -1,7 +1,10 @@
-"""What is replied to requests for the project and for several lines (docs/extend/studio.md)."""
+"""What is replied to requests for the project: its recordings, voices and faces (docs/extend/studio.md)."""
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import fields
+from typing import Any
 from urllib.parse import unquote
 
 from starlette.exceptions import HTTPException
@@ -10,128 +13,183 @@ from starlette.responses import Response
 
 from lipmotion.errors import InputError
 from lipmotion.types import values
+from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items
-from lipmotion.units import PHONES
-from lipmotion_studio.asked import content_of, member, text, texts, whole
+from lipmotion.units import PHONES, split_words
 from lipmotion_studio.presets import preset_of
-from lipmotion_studio.project import APPROVED
+from lipmotion_studio.project import APPROVED, MAX_RECORDINGS
+from lipmotion_studio.requests import content_of, member, text, texts, whole
 from lipmotion_studio.studio import Studio
-from lipmotion_studio.web.replies import FRESH, JSONResponse, write_body
+from lipmotion_studio.trainer import MAX_LISTED
+from lipmotion_studio.training import FACE, VOICE, VoiceOptions, check_options
+from lipmotion_studio.web.replies import FRESH, json_reply, write_body
 
-LARGEST_UPLOAD_BYTES = 1 << 29
+MAX_UPLOAD_BYTES = 1 << 29
 UPLOAD_S = 600.0
 """How long a recording may take to arrive."""
-LONGEST_WORD, MOST_PHONES = 60, 60
+MAX_WORD, MAX_PHONES = 60, 60
 ALL = "all"
+NUMBER = values.whole(0, 1 << 31)
 
 
 class ProjectReplies:
-    """Replies to requests for the project and its lines together."""
+    """Replies to requests for the project, its recordings together, and voices and faces that are made here."""
 
     def __init__(self, studio: Studio) -> None:
-        self._studio, self._desk = studio, studio.desk
+        self._studio, self._trainer, self._run_apart = studio, studio.trainer, studio.workspace.run_apart
 
     async def project(self, request: Request) -> Response:
-        """The lines, page by page, and what forms need."""
+        """The recordings, page by page, and what forms need."""
         query = request.query_params
         first, count = whole(query, "from", 0), whole(query, "count", 200, most=2000)
         chosen = {name: text(query, name, "") for name in ("order", "status", "mark")}
-        found = await self._desk.beside(lambda: self._studio.listed(first, count, **chosen))
-        return JSONResponse(found | {"largest_upload_bytes": LARGEST_UPLOAD_BYTES}, headers=FRESH)
+        document = await self._run_apart(lambda: self._studio.list_recordings(first, count, **chosen))
+        return json_reply(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
 
     async def progress(self, _: Request) -> Response:
         """What is at work."""
-        return JSONResponse(self._studio.progress(), headers=FRESH)
+        return json_reply(self._studio.progress())
 
     async def understand(self, request: Request) -> Response:
-        """Lines that are to be understood."""
+        """Recordings that are to be analysed."""
         content = await content_of(request)
-        lines = None if content.get("lines") == ALL else member(content, "lines", None, items(values.whole(0, 1 << 31)))
-        return JSONResponse({"waiting": self._studio.understand(lines)}, headers=FRESH)
+        numbers = None if content.get("lines") == ALL else member(content, "lines", None, items(NUMBER))
+        return json_reply({"waiting": self._studio.queue_analysis(numbers)})
 
     async def dropped(self, request: Request) -> Response:
         """A recording that was dropped on the page, as body."""
         name = text(request.query_params, "name", longest=500)
-        said = unquote(request.headers.get("x-lipmotion-transcript", ""), errors="replace")
-        with self._studio.arriving() as file:
+        transcript = unquote(request.headers.get("x-lipmotion-transcript", ""), errors="replace")
+        with self._studio.temporary_upload() as file:
             with file.open("wb") as content:
-                await write_body(request, content, LARGEST_UPLOAD_BYTES, UPLOAD_S)
-            number = await self._desk.beside(lambda: self._studio.folder.drop(name, file, said))
-        self._desk.queue([number])
-        return JSONResponse(self._studio.row(self._studio.folder.line(number)), 201, headers=FRESH)
+                await write_body(request, content, MAX_UPLOAD_BYTES, UPLOAD_S)
+            number = await self._run_apart(lambda: self._studio.folder.drop(name, file, transcript))
+        self._studio.workspace.queue([number])
+        return json_reply(self._studio.row(self._studio.folder.recording(number)), 201)
 
     async def mark(self, request: Request) -> Response:
-        """A mark of a line."""
+        """A mark of a recording."""
         number, content = self._number(request), await content_of(request)
         mark, revision = text(content, "mark"), whole(content, "revision")
-        row = await self._desk.beside(lambda: self._studio.mark(number, revision, mark))
-        return JSONResponse(row, headers=FRESH)
+        return json_reply(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
 
     async def remove(self, request: Request) -> Response:
-        """A line that leaves the project."""
+        """A recording that leaves the project."""
         number = self._number(request)
         self._studio.remove(number, whole(await content_of(request), "revision"))
-        return JSONResponse({"removed": number}, headers=FRESH)
+        return json_reply({"removed": number})
 
-    async def export_line(self, request: Request) -> Response:
-        """Files of one line."""
+    async def export_one(self, request: Request) -> Response:
+        """Files of one recording."""
         number = self._number(request)
-        return await self._exported(await content_of(request), [number])
+        return await self._export(await content_of(request), [number])
 
     async def export_all(self, request: Request) -> Response:
-        """Files of the lines that are approved, or of all."""
+        """Files of the recordings that are approved, or of all."""
         content = await content_of(request)
         only = text(content, "only", APPROVED)
         if only not in (APPROVED, ALL):
             raise InputError(f"only is {only!r}, required {APPROVED} or {ALL}")
-        lines = self._studio.folder.project.lines.values()
-        return await self._exported(content, [line.number for line in lines if only == ALL or line.mark == APPROVED])
+        recordings = self._studio.folder.project.lines.values()
+        return await self._export(content, [each.number for each in recordings if only == ALL or each.mark == APPROVED])
 
-    async def _exported(self, content: dict[str, object], numbers: list[int]) -> Response:
+    async def _export(self, content: dict[str, object], numbers: list[int]) -> Response:
         files = texts(content, "files", most=20, longest=40) if "files" in content else ()
         preset, face = preset_of(text(content, "preset", ""), files), text(content, "face", "")
-        found = await self._desk.beside(lambda: self._studio.export_several(numbers, preset, face))
-        return JSONResponse(found, headers=FRESH)
+        return json_reply(await self._run_apart(lambda: self._studio.export_several(numbers, preset, face)))
 
     async def mesh(self, request: Request) -> Response:
         """The ``.glb`` of a face."""
         name = str(request.path_params["name"])
         try:
-            content = await self._desk.beside(lambda: self._studio.faces.mesh(name))
+            content = await self._run_apart(lambda: self._studio.faces.mesh(name))
         except InputError as error:
             raise HTTPException(404, str(error)) from error
         return Response(content, headers=FRESH, media_type="model/gltf-binary")
 
     async def pronunciations(self, request: Request) -> Response:
         """How a word is pronounced."""
-        return self._pronounced(_word(text(request.query_params, "word", longest=LONGEST_WORD)))
+        return self._reply_word(_word(request.query_params))
 
     async def pronounce(self, request: Request) -> Response:
         """A pronunciation that the project keeps."""
         content = await content_of(request)
-        word, phones = _word(text(content, "word", longest=LONGEST_WORD)), texts(content, "phones", most=MOST_PHONES)
-        revision = whole(content, "revision")
-        unknown = [phone for phone in phones if phone not in PHONES]
-        if unknown or not phones:
+        word, phones, revision = _word(content), texts(content, "phones", most=MAX_PHONES), whole(content, "revision")
+        if not phones or not set(phones) <= set(PHONES):
             raise InputError(f"the phones of a word are some of: {' '.join(PHONES)}")
-        await self._desk.beside(lambda: self._studio.folder.add_pronunciation(word, phones, revision))
-        return self._pronounced(word)
+        await self._run_apart(lambda: self._studio.folder.add_pronunciation(word, phones, revision))
+        return self._reply_word(word)
 
-    def _pronounced(self, word: str) -> Response:
+    def _reply_word(self, word: str) -> Response:
         with self._studio.folder.lock:
             lexicon, revision = self._studio.folder.lexicon(), self._studio.folder.word_revision(word)
         known = {"word": word, "known": lexicon.known(word), "own": word in lexicon.user}
-        found = [list(phones) for phones in lexicon.pronunciations(word)]
-        return JSONResponse(known | {"pronunciations": found, "revision": revision}, headers=FRESH)
+        pronunciations = [list(phones) for phones in lexicon.pronunciations(word)]
+        return json_reply(known | {"pronunciations": pronunciations, "revision": revision})
+
+    async def training(self, _: Request) -> Response:
+        """What is being made, or was made last; what can be made, and of what."""
+        return await self._reply_training()
+
+    async def begin_training(self, request: Request) -> Response:
+        """A voice or a face that is to be made."""
+        content = await content_of(request)
+        kind, name = text(content, "kind"), text(content, "name", "")
+        numbers = list(dict.fromkeys(member(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
+        options = check_options(content.get("options", {}))
+        await self._run_apart(lambda: self._trainer.begin(kind, name, numbers, options))
+        return await self._reply_training(201)
+
+    def training_after(self, act: Callable[[], None], status: int = 200) -> Callable[[Request], Awaitable[Response]]:
+        """Return what replies once something was done: what is made was stopped, gone on with, or restored."""
+
+        async def reply(request: Request) -> Response:
+            await content_of(request)
+            await self._run_apart(act)
+            return await self._reply_training(status)
+
+        return reply
+
+    async def voice(self, request: Request) -> Response:
+        """The voice that the project uses from now on."""
+        content = await content_of(request)
+        name, revision = text(content, "voice"), whole(content, "revision")
+        path, voice = await self._run_apart(lambda: self._studio.load_voice(name))
+        self._studio.use_voice(path, voice, revision)
+        return await self._reply_training()
+
+    async def _reply_training(self, status: int = 200) -> Response:
+        return json_reply(await self._run_apart(self._training_document), status)
+
+    def _training_document(self) -> dict[str, Any]:
+        folder, trainer = self._studio.folder, self._trainer
+        videos, used = trainer.videos(), folder.project.model
+        options = []
+        for each in fields(VoiceOptions):
+            row = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
+            options.append(row | {"choices": list(each.metadata["rule"].choices)})
+        return {
+            "job": trainer.document(),
+            "damage": trainer.damage,
+            "restorable": bool(trainer.damage) and trainer.is_restorable,
+            "earlier": trainer.earlier(),
+            "voices": [{"name": name, "used": path == used} for name, path in self._studio.voices().items()],
+            "revision": folder.voice_revision,
+            "faces": [path.relative_to(folder.path).as_posix() for path in trainer.files(FACE).values()],
+            "videos": [{"id": v.number, "name": v.name, "duration_s": v.duration_s} for v in videos[:MAX_LISTED]],
+            "count": len(videos),
+            "recordings": folder.recordings.name if folder.recordings else "",
+            "kinds": [VOICE, FACE],
+            "options": options,
+        }
 
     def _number(self, request: Request) -> int:
         return self._studio.number(str(request.path_params["number"]))
 
 
-def _word(given: str) -> str:
-    """Return a word as lexicons have it. Raises InputError: it is none, or several."""
-    from lipmotion.units import split_words
-
+def _word(content: Mapping[str, Any]) -> str:
+    """Return the word of a request as lexicons have it. Raises InputError: it is none, or several."""
+    given = text(content, "word", longest=MAX_WORD)
     words = split_words(given)
     if len(words) != 1:
         raise InputError(f"{given!r} is {len(words)} words, required one")

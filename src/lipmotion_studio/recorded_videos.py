@@ -1,4 +1,4 @@
-"""The real video of a line: its recording, where that is a video, or a video of the same name beside its sound."""
+"""The real video of a recording: its recording, where that is a video, or a video of the same name beside its sound."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.storage.media import has_video, open_media, video_streams
 from lipmotion_faces.outputs.drawn_video import read_sound
-from lipmotion_faces.tracking.footage import untracked_frames
+from lipmotion_faces.tracking.footage import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
 
 PLAYED = {
@@ -34,11 +34,11 @@ def video_of(recording: Path) -> Path | None:
     """
     if recording.suffix.lower() in VIDEO_SUFFIXES:
         return recording if has_video(recording) else None
-    beside = (recording.with_suffix(suffix) for suffix in sorted(VIDEO_SUFFIXES))
-    return next((path for path in beside if path.is_file() and has_video(path)), None)
+    siblings = (recording.with_suffix(suffix) for suffix in sorted(VIDEO_SUFFIXES))
+    return next((path for path in siblings if path.is_file() and has_video(path)), None)
 
 
-def played_as(path: Path) -> str | None:
+def media_type(path: Path) -> str | None:
     """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew.
 
     What begins later than 0 is written anew, too, so that no browser has to say what its times are.
@@ -52,27 +52,23 @@ def played_as(path: Path) -> str | None:
 
 
 def sound_begins_s(video: Path, sound: Path) -> float:
-    """Return when in a real video the sound of its line begins, in seconds from the beginning of the video.
+    """Return when in a real video the sound of its recording begins, in seconds from the beginning of the video.
 
     sound : the recording: the video itself, of which the readers have silence before a sound that begins later than
             the pictures; or another file, which begins with the video or, as programs that extract sound leave that
             silence out, with the sound in it: where it is more like the sound of the video
     Raises InputError: one of both cannot be read.
     """
-    late_s = 0.0 if sound == video else _late_s(video)
+    late_s = 0.0
+    if sound != video:
+        with open_media(video) as container:
+            for stream in list(container.streams.audio)[:1]:
+                start_s = float((stream.start_time or 0) * stream.time_base)
+                late_s = max(start_s - (container.start_time or 0) / 1e6, 0.0)
     if late_s < IN_STEP_S:
         return 0.0
-    own, given = map(_loudness, (video, sound))
-    return late_s if _alike(own[round(late_s * LOUDNESS_HZ) :], given) > _alike(own, given) else 0.0
-
-
-def _late_s(video: Path) -> float:
-    """Return how much later than a video its sound begins, in seconds; without sound 0."""
-    with open_media(video) as container:
-        for stream in container.streams.audio:
-            start_s = float((stream.start_time or 0) * stream.time_base)
-            return max(start_s - (container.start_time or 0) / 1e6, 0.0)
-    return 0.0
+    whole, other = map(_loudness, (video, sound))
+    return late_s if _correlate(whole[round(late_s * LOUDNESS_HZ) :], other) > _correlate(whole, other) else 0.0
 
 
 def _loudness(path: Path) -> NDArray[np.float64]:
@@ -81,7 +77,7 @@ def _loudness(path: Path) -> NDArray[np.float64]:
     return np.sqrt(samples[: len(samples) // each * each].reshape(-1, each).mean(axis=1, dtype=float))
 
 
-def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def _correlate(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """Return the correlation of two courses that begin together, over what both have."""
     count = min(len(one), len(other))
     one, other = one[:count] - one[:count].mean(), other[:count] - other[:count].mean()
@@ -89,10 +85,10 @@ def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 
 def write_playable(video: Path, sound: Path, path: Path) -> None:
-    """Write a video as browsers play it, with the sound of a line. Raises InputError: it cannot be read.
+    """Write a video as browsers play it, with the sound of a recording. Raises InputError: it cannot be read.
 
     Raises ExportError: it cannot be written.
     """
-    frames, rate_hz = untracked_frames(video)
+    frames, rate_hz = read_video_frames(video)
     even = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame in frames)
     write_mp4(path, even, fps=rate_hz, audio=read_sound(sound))

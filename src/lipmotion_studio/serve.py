@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from secrets import token_urlsafe
 from threading import Thread
+from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import sound_reference
@@ -45,33 +46,35 @@ def serve_studio(  # noqa: PLR0913
     check_installed("the studio", "studio")
     if recordings is not None and not recordings.is_dir():
         raise InputError(f"{recordings}: no such folder; give a folder of videos of one person")
-    from lipmotion_studio.access import Access
     from lipmotion_studio.application import studio_application
-    from lipmotion_studio.folder import PROJECT, opened_folder
-    from lipmotion_studio.known_model import known_model
-    from lipmotion_studio.studio import Studio
+    from lipmotion_studio.folder import PROJECT, open_folder
+    from lipmotion_studio.requests import Access
+    from lipmotion_studio.studio import Studio, known_model
 
-    with listening(HOST, port) as place, opened_folder(source, out) as folder:
+    def prepare() -> None:
+        """Load what the first edit will need, while the page is opened."""
+        from lipmotion.kernels.compiler import numba_works
+        from lipmotion_faces.head.stage import mesh_of_figure
+
+        numba_works()
+        mesh_of_figure()
+
+    with listening(HOST, port) as place, open_folder(source, out) as folder:
         file = folder.path.absolute() / PROJECT
-        own = {name: sound_reference(path.absolute(), file) for name, path in (characters or {}).items()}
-        chosen = sound_reference(model.absolute(), file) if model else folder.project.model
-        spoken = sound_reference(recordings.absolute(), file) if recordings else folder.project.recordings
-        if own or model or recordings:
-            together = {**folder.project.characters, **own}
-            folder.change(lambda now: replace(now, characters=together, model=chosen, recordings=spoken))
+        changes: dict[str, Any] = {}
+        if characters:
+            added = {name: sound_reference(path.absolute(), file) for name, path in characters.items()}
+            changes["characters"] = {**folder.project.characters, **added}
+        if model:
+            changes["model"] = sound_reference(model.absolute(), file)
+        if recordings:
+            changes["recordings"] = sound_reference(recordings.absolute(), file)
+        if changes:
+            folder.change(lambda now: replace(now, **changes))
         other = known_model(against) if against else None
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
         with closing(Studio(folder, against=other)) as studio:
-            Thread(target=_prepare, name="prepare", daemon=True).start()
+            Thread(target=prepare, name="prepare", daemon=True).start()
             application = studio_application(studio, Access(token, hosts))
             serve(application, place, started=lambda address: started(f"{address}#{token}") if started else None)
-
-
-def _prepare() -> None:
-    """Load what the first edit will need, while the page is opened."""
-    from lipmotion.kernels.compiler import numba_works
-    from lipmotion_faces.head.stage import mesh_of_figure
-
-    numba_works()
-    mesh_of_figure()

@@ -1,12 +1,12 @@
-"""The studio: a project, the lines of it that are at work, its faces, what is exported."""
+"""The studio: a project, the recordings of it that are at work, its faces, what is exported."""
 
 from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -20,6 +20,7 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
 from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run
+from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
 from lipmotion.storage.files import TEMPORARY, made_folders, remove, sha256_of, temporary_folder
@@ -27,32 +28,56 @@ from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
 from lipmotion.types.staging import Staging
-from lipmotion.units import PHONES, Pronunciation, is_silent, split_words
+from lipmotion.units import PHONES, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
-from lipmotion_studio.desk import FAILED, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, revision_of
-from lipmotion_studio.known_model import KnownModel, known_model
-from lipmotion_studio.line import LONGEST_VIDEO_S, OpenLine
 from lipmotion_studio.meshes import Faces
 from lipmotion_studio.presets import PRESETS, Preset, suffixes
-from lipmotion_studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine, digest_of
-from lipmotion_studio.recorded_videos import MP4, played_as, sound_begins_s, video_of, write_playable
+from lipmotion_studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectRecording, digest_of
+from lipmotion_studio.recorded_videos import MP4, media_type, sound_begins_s, video_of, write_playable
+from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer
 from lipmotion_studio.training import FACE, VOICE
 from lipmotion_studio.votes import Side
+from lipmotion_studio.workspace import FAILED, READY, WAITING, WORKING, NotReadyError, Work, Workspace
 
 LOG = logging.getLogger("lipmotion")
 ORDERS = ("", "doubt")
 OTHER = "other"
 """What requests call the model that the project's is compared with."""
+DIGEST_DIGITS = 8
+"""Figures of a digest that people see."""
+
+
+@dataclass(frozen=True)
+class KnownModel:
+    """A model, and what tells it from others.
+
+    name   : of its file, without suffix: what its owner calls it
+    digest : of its file (SHA-256)
+    """
+
+    model: Model
+    name: str
+    digest: str
+
+    def name_beside(self, other: KnownModel) -> str:
+        """Return its name, with the beginning of its digest where another model has the same name."""
+        return self.name if self.name != other.name else f"{self.name} ({self.digest[:DIGEST_DIGITS]})"
+
+
+def known_model(file: Path | None) -> KnownModel:
+    """Return the model of a file; None: the one that ships. Raises as ``load_model``."""
+    model, path = load_model(file), file or shipped_path()
+    return KnownModel(model, path.stem, sha256_of(path))
 
 
 class Studio:
     """A project that is open.
 
     folder : the project
-    used   : the model that moves its lines; None: as the project says
+    used   : the model that moves its recordings; None: as the project says, or, where that is gone, the one that ships
     against : a model with which its motion is compared; None: there is none
     """
 
@@ -62,122 +87,128 @@ class Studio:
         self.folder, self.against = folder, against
         self._videos: dict[Path, tuple[Path, float] | None] = {}
         self._writing_video = Lock()
-        self.used = used or known_model(_model_file(folder))
-        self.desk = Desk(folder, self.used.model)
+        file = folder.model_file
+        if used is None and file is not None and not file.exists():
+            LOG.warning("%s: the model of the project is not there; the one that ships is used", file)
+            file = None
+        self.used = used or known_model(file)
+        self.workspace = Workspace(folder, self.used.model)
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.trainer = Trainer(folder)
-        self.faces = Faces(places, lambda: self.trainer.made(FACE))
-        self._kept = ExitStack()
-        self._sounds = self._kept.enter_context(temporary_folder())
+        self.faces = Faces(places, lambda: self.trainer.files(FACE))
+        self._run = ExitStack()
+        self._sounds = self._run.enter_context(temporary_folder())
         self._exporting: dict[str, int] | None = None
 
     def close(self) -> None:
-        """Write what is not written, and remove what was kept for this run alone."""
+        """Write what is not written, and remove what was cached for this run alone."""
         self.trainer.close()
-        self.desk.close()
-        self._kept.close()
+        self.workspace.close()
+        self._run.close()
 
-    def number(self, given: str) -> int:
-        """Return the number of a line that an address gives. Raises HTTPException: there is no such line."""
-        number = int(given) if given.isascii() and given.isdecimal() and len(given) < 10 else 0
+    def number(self, text: str) -> int:
+        """Return the number of a recording in an address. Raises HTTPException: there is no such recording."""
+        number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
         if number not in self.folder.project.lines:
-            raise HTTPException(404, "no such line")
+            raise HTTPException(404, "no such recording")
         return number
 
-    def listed(self, first: int, count: int, *, order: str = "", status: str = "", mark: str = "") -> dict[str, Any]:
-        """Return the project, and so many of its lines from one on, for the list.
+    def list_recordings(
+        self, first: int, count: int, *, order: str = "", status: str = "", mark: str = ""
+    ) -> dict[str, Any]:
+        """Return the project, and so many of its recordings from one on, for the list.
 
         order  : ``doubt``: what is least sure first; empty: that of the project
-        status, mark : only lines with these; empty: all
+        status, mark : only recordings with these; empty: all
         """
         if order not in ORDERS:
             raise InputError(f"order is {shortened(repr(order))}, required doubt, or nothing")
         with self.folder.lock:
             project, revision = self.folder.project, self.folder.revision
-        lines = [
-            line
-            for line in project.lines.values()
-            if (not mark or line.mark == mark) and (not status or self.desk.status(line) == status)
+        recordings = [
+            each
+            for each in project.lines.values()
+            if (not mark or each.mark == mark) and (not status or self.workspace.status(each) == status)
         ]
         if order == "doubt":
-            lines.sort(key=lambda line: -1.0 if line.doubt is None else line.doubt, reverse=True)
+            recordings.sort(key=lambda each: -1.0 if each.doubt is None else each.doubt, reverse=True)
         return {
             "name": self.folder.path.absolute().name,
             "folder": str(self.folder.path.absolute()),
             "revision": revision,
-            "count": len(lines),
+            "count": len(recordings),
             "from": first,
-            "lines": [self.row(line) for line in lines[first : first + count]],
-            "forms": self.forms(),
+            "lines": [self.row(each) for each in recordings[first : first + count]],
+            "forms": self._forms(),
             "version": installed_version(),
             "model": {"name": self.used.name, "engine": self.used.model.engine.name},
         }
 
-    def row(self, line: ProjectLine) -> dict[str, Any]:
-        """Return what the list says of a line, which may have left the project meanwhile."""
-        summary = self.folder.summary(line)
-        made = (summary.digest, self.used.digest)
-        changed = bool(line.exports) and (line.exports[-1].steps, line.exports[-1].model) != made
+    def row(self, recording: ProjectRecording) -> dict[str, Any]:
+        """Return a row of the list, of a recording that may have left the project since."""
+        summary, exports = self.folder.summary(recording), recording.exports
+        changed = bool(exports) and (exports[-1].steps, exports[-1].model) != (summary.digest, self.used.digest)
         return {
-            "id": line.number,
-            "name": line.name,
-            "status": self.desk.status(line),
-            "revision": revision_of(line, summary),
-            "mark": line.mark,
-            "marked": line.marked,
+            "id": recording.number,
+            "name": recording.name,
+            "status": self.workspace.status(recording),
+            "revision": revision_of(recording, summary),
+            "mark": recording.mark,
+            "marked": recording.marked,
             "edits_digest": summary.digest,
-            "doubt": line.doubt,
-            "duration_s": line.duration_s,
+            "doubt": recording.doubt,
+            "duration_s": recording.duration_s,
             "edits": summary.count,
-            "exported": "changed" if changed else "yes" if line.exports else "no",
-            "error": self.desk.error(line),
+            "exported": "changed" if changed else "yes" if exports else "no",
+            "error": self.workspace.error(recording),
         }
 
-    def line_document(self, number: int) -> dict[str, Any]:
-        """Return what is said of a line, ready or not."""
+    def recording_document(self, number: int) -> dict[str, Any]:
+        """Return what the page shows of a recording, ready or not."""
         with self.folder.lock:
-            line, work = self.folder.line(number), self.desk.work(number)
-            known: dict[str, Any] = {"id": number, "name": line.name, "mark": line.mark, "transcript": line.transcript}
-            known["revision"] = revision_of(line, self.folder.summary(line))
-        known["versions"] = [
+            recording, work = self.folder.recording(number), self.workspace.work(number)
+            document: dict[str, Any] = {"id": number, "name": recording.name, "mark": recording.mark}
+            document |= {"transcript": recording.transcript}
+            document["revision"] = revision_of(recording, self.folder.summary(recording))
+        document["versions"] = [
             {"name": each.name, "number": each.number, "edits": len(each.steps), "digest": each.digest}
-            for each in line.versions
+            for each in recording.versions
         ]
-        status, error = self.desk.status(line), self.desk.error(line)
+        status, error = self.workspace.status(recording), self.workspace.error(recording)
         if work is None or status == FAILED:
-            restorable = status == FAILED and self.folder.is_restorable(line)
-            return known | {"status": status, "progress": None, "error": error, "restorable": restorable}
-        status = WORKING if work.status == READY and work.line is None else work.status
-        return known | {"status": status, "progress": _progress(work), "error": work.error}
+            restorable = status == FAILED and self.folder.is_restorable(recording)
+            return document | {"status": status, "progress": None, "error": error, "restorable": restorable}
+        status = WORKING if work.status == READY and work.recording is None else work.status
+        return document | {"status": status, "progress": _progress(work), "error": work.error}
 
     def progress(self) -> dict[str, Any]:
-        """Return which lines wait, or are at work, or were until a short while ago."""
-        works = self.desk.at_work()
-        lines = [{"id": work.number, "status": work.status, **_progress(work), "error": work.error} for work in works]
+        """Return which recordings wait, or are at work, or were until a short while ago."""
+        works = self.workspace.current_work()
+        rows = [{"id": work.number, "status": work.status, **_progress(work), "error": work.error} for work in works]
         waiting = sum(work.status == WAITING for work in works)
-        told = {"lines": lines, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
-        return told | {"training": self.trainer.short_document()}
+        document = {"lines": rows, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
+        return document | {"training": self.trainer.short_document()}
 
     def voices(self) -> dict[str, str]:
-        """Return the models that the project may use by name, as paths from its folder; of the one that ships empty.
+        """Return the models that the project may use by the names of their files, as paths from its folder.
 
-        The names are those of files; that of the one that ships is empty.
+        Name and path of the one that ships are empty.
         """
         project = self.folder.project
-        own = {name: path.relative_to(self.folder.path).as_posix() for name, path in self.trainer.made(VOICE).items()}
-        others = [path for path in (project.given_model, project.model) if path and path not in own.values()]
-        return {"": ""} | {Path(path).name: path for path in others} | own
+        made = {name: path.relative_to(self.folder.path).as_posix() for name, path in self.trainer.files(VOICE).items()}
+        others = [path for path in (project.given_model, project.model) if path and path not in made.values()]
+        return {"": ""} | {Path(path).name: path for path in others} | made
 
-    def voice_model(self, name: str) -> tuple[str, KnownModel]:
+    def load_voice(self, name: str) -> tuple[str, KnownModel]:
         """Return path and model of a voice. Raises InputError: none of that name. Others as ``load_model``."""
-        known = self.voices()
-        if name not in known:
-            raise InputError(f"no voice {shortened(repr(name))}; required one of: {', '.join(filter(None, known))}")
-        file = Path(os.path.normpath(self.folder.path / known[name])) if known[name] else None
-        return known[name], known_model(file)
+        voices = self.voices()
+        if name not in voices:
+            raise InputError(f"no voice {shortened(repr(name))}; required one of: {', '.join(filter(None, voices))}")
+        file = Path(os.path.normpath(self.folder.path / voices[name])) if voices[name] else None
+        return voices[name], known_model(file)
 
     def use_voice(self, path: str, voice: KnownModel, revision: int) -> None:
-        """Let another model move the lines of the project, from now on; their phones and edits stay.
+        """Let another model move the recordings of the project, from now on; their phones and edits stay.
 
         path     : from the folder of the project; empty: the one that ships
         revision : of the voice, as it was seen
@@ -186,19 +217,23 @@ class Studio:
 
         def with_model(project: Project) -> Project:
             check_revision("the voice", self.folder.voice_revision, revision)
-            given = project.model if self.is_given(project.model) else project.given_model
+            was_given = project.model and not project.model.startswith(f"{VOICES}/")  # and not trained here
+            given = project.model if was_given else project.given_model
             return replace(project, model=path, given_model=given)
 
         self.folder.change(with_model)
         self.used = voice
-        self.desk.use(voice.model)
+        self.workspace.use(voice.model)
 
-    def is_given(self, path: str) -> bool:
-        """Return whether a model was given, and not trained here."""
-        return bool(path) and not path.startswith(f"{VOICES}/")
-
-    def forms(self) -> dict[str, Any]:
+    def _forms(self) -> dict[str, Any]:
         """Return what can be chosen, from the registries and configurations."""
+        controls = []  # what edits can set of delivery and staging
+        for part in (Delivery, Staging):
+            for each in fields(part):
+                rule = each.metadata.get("rule", ANY)
+                control = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
+                control |= {"least": rule.least, "most": rule.most, "help": each.metadata.get("help", "")}
+                controls.append(control)
         return {
             "phones": [{"name": phone, "silent": is_silent(phone)} for phone in PHONES],
             "moods": list(MOODS),
@@ -215,143 +250,154 @@ class Studio:
             "preset": self.folder.project.preset,
             "suffixes": list(suffixes()),
             "edit_forms": list(FORMS),
-            "controls": list(_controls()),
+            "controls": controls,
             "marks": list(MARKS),
             "longest_video_s": LONGEST_VIDEO_S,
         }
 
-    def understand(self, numbers: Sequence[int] | None) -> int:
-        """Let lines be understood; None: all that are new. Returns how many wait. Raises HTTPException: no such."""
+    def queue_analysis(self, numbers: Sequence[int] | None) -> int:
+        """Queue recordings for analysis; None: all new ones. Returns how many wait. Raises HTTPException: no such."""
         known = self.folder.project.lines
         if numbers is not None and not set(numbers) <= known.keys():
-            raise HTTPException(404, "no such line")
-        return self.desk.queue(known if numbers is None else numbers)
+            raise HTTPException(404, "no such recording")
+        return self.workspace.queue(known if numbers is None else numbers)
 
     @contextmanager
-    def arriving(self) -> Iterator[Path]:
-        """Give the path of a file that something dropped is written to; afterwards it is gone."""
+    def temporary_upload(self) -> Iterator[Path]:
+        """Give the path of a file that something dropped is written to; afterwards it is removed."""
         path = self.folder.path / f"{TEMPORARY}{uuid4().hex}"
         try:
             yield path
         finally:
             remove(path)
 
-    def with_pronunciations(self, sentences: Sequence[str]) -> tuple[str | Step, ...]:
-        """Return edits that say words of the project's lexicon with their phones, which then stand in the edits.
+    def add_phones(self, sentences: Sequence[str]) -> tuple[Step, ...]:
+        """Return edits; those that say words of the project's lexicon with the phones, which then stand in the edits.
 
         Raises InputError: a sentence is no edit.
         """
         steps = [step_of(sentence) for sentence in sentences]
         if not any(isinstance(step, WordIs | WordsSaid) for step in steps):
             return tuple(steps)
-        own = self.folder.lexicon().user
-        return tuple(_pronounced(step, own) for step in steps)
+        user = self.folder.lexicon().user
+        for place, step in enumerate(steps):
+            if isinstance(step, WordIs):
+                words = split_words(step.word)
+                if user.keys() >= {*words}:
+                    phones = " ".join(phone for word in words for phone in user[word][0])
+                    steps[place] = WordSaid(step.number, step.word, Text(phones))
+            elif type(step) is WordsSaid:  # and not one that brings phones along
+                words = tuple(dict.fromkeys(split_words(step.words)))
+                variants = [f"{word} {' '.join(user[word][0])}" for word in words if word in user]
+                if variants:
+                    steps[place] = WordsSaidSo(step.words, step.start_s, step.end_s, Text(", ".join(variants)))
+        return tuple(steps)
 
-    def say(self, number: int, revision: int, transcript: str) -> bool:
-        """Let a line without edits be understood again, with its words; without any, they are recognised.
+    def analyse_again(self, number: int, revision: int, transcript: str) -> bool:
+        """Analyse a recording without edits again, with its words; without any, they are recognised.
 
         Returns whether it has no edits; else nothing has been done.
-        Raises NotReadyError: it is being understood. RevisionError: somebody else has changed it. InputError: its edits
+        Raises NotReadyError: it is being analysed. RevisionError: somebody else has changed it. InputError: its edits
         are damaged. ExportError: it cannot be written.
         """
-        with self.folder.changing(number, revision) as line:
-            if self.desk.status(line) in (WAITING, WORKING):
+        with self.folder.check_out(number, revision) as recording:
+            if self.workspace.status(recording) in (WAITING, WORKING):
                 raise NotReadyError
-            if self.folder.has_edits(line):
+            if self.folder.has_edits(recording):
                 return False
-            self.folder.remove_edits(line)
-            self.folder.change_line(number, lambda now: replace(now, transcript=transcript.strip()))
-            self.desk.forget(number)
-        self.desk.opened(number)
+            self.folder.remove_edits(recording)
+            self.folder.change_recording(number, lambda now: replace(now, transcript=transcript.strip()))
+            self.workspace.forget(number)
+        self.workspace.open(number)
         return True
 
     def mark(self, number: int, revision: int, mark: str) -> dict[str, Any]:
-        """Mark a line as its edits are now; return what the list says of it.
+        """Mark a recording as its edits are now; return its row.
 
         Raises InputError: no such mark, or its edits are damaged. RevisionError: somebody else has changed it.
         """
-        with self.folder.changing(number, revision) as line:
-            self.folder.has_edits(line)  # which is refused where they are damaged
-            marked = replace(line, mark=mark, marked=self.folder.summary(line).digest)
-            self.folder.change_line(number, lambda _: marked)
+        with self.folder.check_out(number, revision) as recording:
+            self.folder.has_edits(recording)  # which is refused where they are damaged
+            marked = replace(recording, mark=mark, marked=self.folder.summary(recording).digest)
+            self.folder.change_recording(number, lambda _: marked)
             return self.row(marked)
 
     def remove(self, number: int, revision: int) -> None:
-        """Take a line out of the project; its files stay where they are. Raises RevisionError: it has been changed."""
-        with self.folder.changing(number, revision):
-            self.folder.change(lambda project: project.without_line(number))
-            self.desk.forget(number)
+        """Take a recording out of the project; its files stay. Raises RevisionError: it has been changed."""
+        with self.folder.check_out(number, revision):
+            self.folder.change(lambda project: project.without_recording(number))
+            self.workspace.forget(number)
 
     def restore(self, number: int, revision: int) -> None:
-        """Put the last good copy in the place of a line's damaged edits, and open it.
+        """Put the last good copy in the place of a recording's damaged edits, and open it.
 
         Raises InputError: they are not damaged, or there is no copy. RevisionError: somebody else has changed it.
         """
-        with self.folder.changing(number, revision) as line:
-            self.folder.restore_edits(line)
-            self.desk.forget(number)
-        self.desk.opened(number)
+        with self.folder.check_out(number, revision) as recording:
+            self.folder.restore_edits(recording)
+            self.workspace.forget(number)
+        self.workspace.open(number)
 
-    def drawn(self, name: str) -> str | Face:
+    def drawn_face(self, name: str) -> str | Face:
         """Return a face of which pictures are drawn. Raises InputError: there is none of that name, or a filmed one."""
         if self.faces.is_filmed(name):
             raise InputError("a filmed face is made as a video, not picture by picture; make the video of a selection")
-        shown = self.faces.shown(name)
-        return getattr(shown, "face", name)
+        return getattr(self.faces.shown(name), "face", name)
 
-    def played(self, number: int) -> Path:
-        """Return the path of a line's sound as it is played. Raises InputError: it cannot be read, or is another."""
-        path, sound = self._sounds / f"{number}.wav", self.folder.checked_sound(self.folder.line(number))
+    def prepare_sound(self, number: int) -> Path:
+        """Return the path of a recording's sound as it is played. Raises InputError: unreadable, or another one."""
+        path, sound = self._sounds / f"{number}.wav", self.folder.check_sound(self.folder.recording(number))
         if not path.exists():
             write_sound(path, read_sound(sound))
         return path
 
-    def video_of(self, number: int) -> tuple[Path, float] | None:
-        """Return the path of a line's real video, and when in it the line's sound begins [s]; None: there is none."""
-        recording = self.folder.sound(self.folder.line(number))
-        if recording not in self._videos:
-            video = video_of(recording)
-            self._videos[recording] = (video, sound_begins_s(video, recording)) if video else None
-        return self._videos[recording]
+    def find_video(self, number: int) -> tuple[Path, float] | None:
+        """Return the path of a recording's real video, and when in it the sound begins [s]; None: there is none."""
+        sound = self.folder.sound(self.folder.recording(number))
+        if sound not in self._videos:
+            video = video_of(sound)
+            self._videos[sound] = (video, sound_begins_s(video, sound)) if video else None
+        return self._videos[sound]
 
-    def played_video(self, number: int) -> tuple[Path, str]:
-        """Return the path of a line's real video as browsers play it, and its media type.
+    def prepare_video(self, number: int) -> tuple[Path, str]:
+        """Return the path of a recording's real video as browsers play it, and its media type.
 
         Raises HTTPException: it has none. InputError: it cannot be read.
         """
-        video, _ = self.video_of(number) or (None, 0.0)
+        video, _ = self.find_video(number) or (None, 0.0)
         if video is None or not video.is_file():
-            raise HTTPException(404, "the line has no video")
-        kind = played_as(video)
+            raise HTTPException(404, "the recording has no video")
+        kind = media_type(video)
         if kind is not None:
             return video, kind
         path = self._sounds / f"{number}.mp4"
         with self._writing_video:
             if not path.exists():
-                write_playable(video, self.folder.sound(self.folder.line(number)), path)
+                write_playable(video, self.folder.sound(self.folder.recording(number)), path)
         return path, MP4
 
-    def line_as(self, number: int, line: OpenLine, by: str, face: str = "") -> OpenLine:
-        """Return an open line as it once was, or as the other model moves it, or mapped onto another person.
+    def vary(self, number: int, recording: OpenRecording, by: str, face: str = "") -> OpenRecording:
+        """Return an open recording as it once was, or as the other model moves it, or mapped onto another person.
 
-        by   : the name of a version that was kept; ``OTHER``: the model it is compared with; empty: the line as it is
+        by   : the name of a version that was kept; ``OTHER``: the model it is compared with; empty: as it is
         face : the name of the face that is shown; a filmed one may be of another person
         Raises InputError: there is no such version or model, or it cannot make an edit.
         """
         if by not in ("", OTHER):
-            return self.line_as(number, line.with_edits(self.folder.line(number).version(by).steps), "", face)
-        model = self._called(by).model
-        onto = self.faces.shown(face).other_person(model, line.file.named.speaker) if face else None
-        return line if model is self.used.model and onto is None else line.moved_by(model, onto)
+            return self.vary(number, recording.with_edits(self.folder.recording(number).version(by).steps), "", face)
+        model = self._model_called(by).model
+        onto = self.faces.shown(face).other_person(model, recording.file.named.speaker) if face else None
+        return recording if model is self.used.model and onto is None else recording.with_model(model, onto)
 
     def side(self, number: int, by: str) -> Side:
-        """Return what identifies a motion of a line in a comparison; ``by``: as in ``line_as``. Raises as that."""
+        """Return what identifies a motion of a recording in a comparison; ``by``: as in ``vary``. Raises as that."""
+        recording = self.folder.recording(number)
         if by not in ("", OTHER):
-            return Side(self.used.name, self.used.digest, self.folder.line(number).version(by).digest)
-        model = self._called(by)
-        return Side(model.name, model.digest, self.folder.summary(self.folder.line(number)).digest)
+            return Side(self.used.name, self.used.digest, recording.version(by).digest)
+        model = self._model_called(by)
+        return Side(model.name, model.digest, self.folder.summary(recording).digest)
 
-    def _called(self, by: str) -> KnownModel:
+    def _model_called(self, by: str) -> KnownModel:
         """Return the model that requests call so. Raises InputError: there is none."""
         if not by:
             return self.used
@@ -360,23 +406,24 @@ class Studio:
         return self.against
 
     def export(self, number: int, preset: Preset, face: str = "") -> dict[str, Any]:
-        """Write files of a line, and record what was written from which edits; return their paths.
+        """Write files of a recording, and record what was written from which edits; return their paths.
 
         face : the name of that which videos show; empty: the usual one
-        Raises InputError: it is not understood yet, its edits are damaged, its sound is another one, or there is no
+        Of exports of the same files only the last one is recorded.
+        Raises InputError: it is not analysed yet, its edits are damaged, its sound is another one, or there is no
         such face. ExportError: a file cannot be written.
         Others as ``Job.run``.
         """
-        line = self.folder.line(number)
-        if self.folder.summary(line) is NO_EDITS:
-            raise InputError(f"{line.name}: is not understood yet; open it first")
+        recording = self.folder.recording(number)
+        if self.folder.summary(recording) is NO_EDITS:
+            raise InputError(f"{recording.name}: is not analysed yet; open it first")
         out = self.folder.path / EXPORTS
-        copy = out / f"{line.name}.{EDITS_SUFFIX}"
-        files = tuple(str(out / f"{line.name}{suffix}") for suffix in preset.files)
-        file = replace(self.folder.read_edits(line), undone=(), sha256=line.sha256)
+        copy = out / f"{recording.name}.{EDITS_SUFFIX}"
+        files = tuple(str(out / f"{recording.name}{suffix}") for suffix in preset.files)
+        file = replace(self.folder.read_edits(recording), undone=(), sha256=recording.sha256)
         with made_folders([copy.parent]):
             write_edits(file, copy)
-            request = replace(file.named, recording=self.folder.checked_sound(line), edits=copy)
+            request = replace(file.named, recording=self.folder.check_sound(recording), edits=copy)
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
             job, shown = Job(request, outputs), open_face(outputs)
             if face and any(isinstance(each, VideoOutput) for each in check_outputs(job, shown, request.recording)):
@@ -391,11 +438,16 @@ class Studio:
             self.used.digest,
             installed_version(),
         )
-        self.folder.change_line(number, lambda now: _with_export(now, record))
+
+        def add_record(now: ProjectRecording) -> ProjectRecording:
+            others = tuple(each for each in now.exports if set(each.files) != set(record.files))
+            return replace(now, exports=(*others, record))
+
+        self.folder.change_recording(number, add_record)
         return {"id": number, "files": list(digests), "edits": record.edits}
 
     def export_several(self, numbers: Sequence[int], preset: Preset, face: str = "") -> dict[str, Any]:
-        """Write files of several lines, as ``export``; what fails is told, and the others are written."""
+        """Write files of several recordings, as ``export``; what fails is reported, and the others are written."""
         exported, failed = [], []
         try:
             for done, number in enumerate(numbers):
@@ -410,41 +462,5 @@ class Studio:
         return {"exported": exported, "failed": failed}
 
 
-def _pronounced(step: Step, own: Mapping[str, Sequence[Pronunciation]]) -> Step:
-    """Return an edit of words with the phones of those that a lexicon has; other edits as they are."""
-    if isinstance(step, WordIs):
-        words = split_words(step.word)
-        phones = [phone for word in words if word in own for phone in own[word][0]]
-        return WordSaid(step.number, step.word, Text(" ".join(phones))) if own.keys() >= {*words} else step
-    if type(step) is WordsSaid:  # and not one that brings phones along
-        said = [f"{word} {' '.join(own[word][0])}" for word in dict.fromkeys(split_words(step.words)) if word in own]
-        return WordsSaidSo(step.words, step.start_s, step.end_s, Text(", ".join(said))) if said else step
-    return step
-
-
-def _with_export(line: ProjectLine, record: ExportRecord) -> ProjectLine:
-    """Return a line with one export more; of those with the same files only the last one is kept."""
-    kept = tuple(each for each in line.exports if set(each.files) != set(record.files))
-    return replace(line, exports=(*kept, record))
-
-
 def _progress(work: Work) -> dict[str, Any]:
     return {"stage": work.stage, "share": round(work.share, 3)}
-
-
-def _controls() -> Iterator[dict[str, Any]]:
-    """Yield what edits can set of delivery and staging."""
-    for part in (Delivery, Staging):
-        for each in fields(part):
-            rule = each.metadata.get("rule", ANY)
-            told = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
-            yield told | {"least": rule.least, "most": rule.most, "help": each.metadata.get("help", "")}
-
-
-def _model_file(folder: ProjectFolder) -> Path | None:
-    """Return the file of a project's model; None: the one that ships, with a warning where the project's is gone."""
-    file = folder.model_file
-    if file is not None and not file.exists():
-        LOG.warning("%s: the model of the project is not there; the one that ships is used", file)
-        return None
-    return file

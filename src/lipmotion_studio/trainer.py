@@ -1,4 +1,4 @@
-"""Training of a project's own voices and faces: one at a time, in a process of its own, told as it goes on."""
+"""Training of a project's own voices and faces: one at a time, in a process of its own, which reports its progress."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from lipmotion.types.values import (
     whole,
 )
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
-from lipmotion_studio.folder import ProjectFolder, copy_file, plain_name, restore, write_twice
-from lipmotion_studio.project import ProjectLine
-from lipmotion_studio.training import FACE, KINDS, VOICE, LearnedLine, TrainingOrder, VoiceOptions, carry_out
+from lipmotion_studio.folder import ProjectFolder, clean_name, copy_file, restore_copy, write_with_copy
+from lipmotion_studio.project import ProjectRecording
+from lipmotion_studio.training import FACE, KINDS, VOICE, TrainingOrder, TrainingRecording, VoiceOptions, run_training
 
 LOG = logging.getLogger("lipmotion")
 TRAINING, STATE, STATE_COPY = "training", "state.json", "state.copy.json"
@@ -43,21 +43,21 @@ PLACES = {VOICE: (VOICES, ".lipmotion"), FACE: (FACES, FACE_SUFFIX)}
 """Folder and suffix of what is made, by its kind."""
 WORKING, DONE, FAILED, STOPPED, INTERRUPTED = "working", "done", "failed", "stopped", "interrupted"
 FORMAT, VERSION = "lipmotion.training", 1
-MOST_TOLD = 200
-"""Warnings, and recordings that are not used, of which the page is told."""
-MOST_LISTED = 500
+MAX_WARNINGS = 200
+"""Warnings, and recordings that are not used, that the page shows."""
+MAX_LISTED = 500
 """Videos of a project that the page lists."""
-MOST_UNFINISHED = 0.99
-"""The share of the work that is told, at most, until it is done."""
+MAX_UNFINISHED = 0.99
+"""The share of the work that is shown, at most, until it is done."""
 
 
 @dataclass(frozen=True)
-class Wanted:
+class TrainingRequest:
     """What was asked for.
 
     kind   : ``voice`` or ``face``
     name   : of what is made
-    lines  : numbers of the lines that are learned from; none: the folder of recordings is
+    lines  : numbers of the recordings that are learned from; none: the folder of recordings is
     options : values of ``VoiceOptions`` by name
     """
 
@@ -75,18 +75,22 @@ class Wanted:
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """What was asked for, and how it went."""
+    """What was asked for, and how it went (by the names of the file that keeps it)."""
 
-    wanted: Wanted
+    wanted: TrainingRequest
     told: dict[str, Any]
+
+    def document(self) -> dict[str, Any]:
+        """Return the job as the page shows it."""
+        return {**asdict(self.wanted), "lines": list(self.wanted.lines), "file": self.wanted.file, **self.told}
 
 
 class Trainer:
     """Makes voices and faces of a project, one at a time; may be used by several threads.
 
-    The last one is told until there is another: what was asked for, and how it went; and besides, the last voice and
-    the last face that were made. All is kept in the folder of the project, so that one that a killed studio was making
-    is told as interrupted, and can be made again.
+    The last job is shown until there is another; and besides, the last voice and the last face that were made. All is
+    kept in the folder of the project, so that one that a killed studio was making is shown as interrupted, and can be
+    made again.
 
     clock  : returns seconds, and only grows
     damage : why the file that keeps it cannot be read, and how it is restored; until then nothing is made. Empty: it
@@ -96,9 +100,9 @@ class Trainer:
     def __init__(self, folder: ProjectFolder, clock: Callable[[], float] = time.monotonic) -> None:
         self._folder, self._lock, self._clock = folder, threading.RLock(), clock
         self._file, self._copy = folder.path / TRAINING / STATE, folder.path / TRAINING / STATE_COPY
-        self._wanted: Wanted | None = None
-        self._told: dict[str, Any] = {}
-        self._made: dict[str, TrainingJob] = {}
+        self._request: TrainingRequest | None = None
+        self._status: dict[str, Any] = {}
+        self._finished: dict[str, TrainingJob] = {}
         self.damage = ""
         self._open()
         self._process: BaseProcess | None = None
@@ -110,213 +114,206 @@ class Trainer:
     @property
     def is_working(self) -> bool:
         """Whether something is being made."""
-        return self._told.get("state") == WORKING
+        return self._status.get("state") == WORKING
 
     def document(self) -> dict[str, Any] | None:
         """Return what was asked for last, and how it goes on or ended; None: nothing was."""
         with self._lock:
-            return None if self._wanted is None else {**_wanted_document(self._wanted), **self.short_document()}
+            return TrainingJob(self._request, self.short_document()).document() if self._request else None
 
     def short_document(self) -> dict[str, Any]:
-        """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s`` and what was told.
+        """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s``, warnings and the report.
 
         ``left_s`` is by the last estimate; 0: it takes longer than that; None: not known yet
         """
         with self._lock:
             left_s = None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
-            return dict(self._told) | ({"left_s": left_s} if self.is_working else {})
+            return dict(self._status) | ({"left_s": left_s} if self.is_working else {})
 
     def earlier(self) -> list[dict[str, Any]]:
         """Return the last voice and the last face that were made, as ``document``, where that is another one."""
         with self._lock:
-            last = self._wanted if self._told.get("state") == DONE else None
-            return [{**_wanted_document(job.wanted), **job.told} for job in self._made.values() if job.wanted != last]
+            last = self._request if self._status.get("state") == DONE else None
+            return [job.document() for job in self._finished.values() if job.wanted != last]
 
-    def videos(self) -> list[ProjectLine]:
-        """Return the lines of the project that are videos."""
-        return [
-            line for line in self._folder.project.lines.values() if Path(line.sound).suffix.lower() in VIDEO_SUFFIXES
-        ]
+    def videos(self) -> list[ProjectRecording]:
+        """Return the recordings of the project that are videos."""
+        recordings = self._folder.project.lines.values()
+        return [each for each in recordings if Path(each.sound).suffix.lower() in VIDEO_SUFFIXES]
 
-    def made(self, kind: str) -> dict[str, Path]:
+    def files(self, kind: str) -> dict[str, Path]:
         """Return the files of the voices or the faces of the project by their names."""
         folder, suffix = PLACES[kind]
-        found = sorted((self._folder.path / folder).glob(f"*{suffix}"))
-        return {path.stem: path for path in found if path.is_file() and not path.name.startswith(".")}
+        paths = sorted((self._folder.path / folder).glob(f"*{suffix}"))
+        return {path.stem: path for path in paths if path.is_file() and not path.name.startswith(".")}
 
-    def begin(self, kind: str, name: str, lines: Sequence[int], options: VoiceOptions) -> None:
+    def begin(self, kind: str, name: str, numbers: Sequence[int], options: VoiceOptions) -> None:
         """Begin to make a voice or a face.
 
-        name  : of its file, which is made one that is free
-        lines : numbers of lines that are videos; none: the project's folder of recordings
+        name    : of its file, which is made one that is free
+        numbers : of recordings that are videos; none: the project's folder of recordings
         Raises InputError: something is being made, no such kind, no name, no videos of these numbers, or no folder.
         ExportError: the folder of the project cannot be written.
         """
         if kind not in KINDS:
             raise InputError(f"no kind {shortened(repr(kind))}; required {' or '.join(KINDS)}")
-        folder, suffix = PLACES[kind]
-        plain, number = plain_name(name, ""), 1
+        plain = clean_name(name, "")
         if "/" in name or "\\" in name:
             raise InputError(f"the name {shortened(repr(name))} has a slash; give it a name without one, as Anna")
         if not plain:
             raise InputError(f"the {kind} has no name; give it a name, as that of the person")
-        while (self._folder.path / folder / f"{_numbered(plain, number)}{suffix}").exists():
+        request, number = TrainingRequest(kind, plain, tuple(numbers), options.as_mapping()), 1
+        while (self._folder.path / request.file).exists():
             number += 1
-        self._begin(Wanted(kind, _numbered(plain, number), tuple(lines), options.as_mapping()))
+            request = replace(request, name=f"{plain}-{number}")
+        self._begin(request)
 
-    def again(self) -> None:
+    def retry(self) -> None:
         """Begin again what was stopped, interrupted or has failed, where it was. Raises as ``begin``."""
-        if self.damage or self._wanted is None or self._told["state"] == DONE:
+        if self.damage or self._request is None or self._status["state"] == DONE:
             raise InputError(self.damage or "nothing was stopped; begin with a voice or a face")
-        self._begin(self._wanted)
+        self._begin(self._request)
 
     def stop(self) -> None:
-        """Stop what is being made, and wait for its end; what is finished of it is kept for ``again``."""
+        """Stop what is being made, and wait for its end; what is finished of it is kept for ``retry``."""
         with self._lock:
             process, thread = self._process, self._thread
             if self.is_working:
-                self._told["state"] = STOPPED
+                self._status["state"] = STOPPED
         if process is not None and thread is not None:
             process.kill()
             thread.join()
 
     def close(self) -> None:
-        """End what is being made, without a word: it is told as interrupted when the project is opened again."""
+        """End what is being made, silently: it is shown as interrupted when the project is opened again."""
         with self._lock:
             process, thread, self._thread = self._process, self._thread, None
         if process is not None and thread is not None:
             process.kill()
             thread.join()
 
-    def _begin(self, wanted: Wanted) -> None:
+    def _begin(self, request: TrainingRequest) -> None:
         with self._lock:
             if self.damage:
                 raise InputError(self.damage)
             if self.is_working or self._thread is not None:
                 raise InputError("a voice or a face is being made; wait for it, or stop it")
-            order = self._order(wanted)
-            self._remove_unfinished(order.target)
-            before = self._wanted, self._told
-            self._wanted, self._told = wanted, {"state": WORKING, **_nothing_told()}
+            order = self._order(request)
+            for folder, _ in PLACES.values():  # what was begun and will not be gone on with
+                for left in (self._folder.path / folder).glob(f"*{UNFINISHED}"):
+                    if left.name != work_folder(order.target).name:
+                        remove(left)
+            before = self._request, self._status
+            self._request, self._status = request, {"state": WORKING, **_empty_status()}
             try:
                 self._write()
             except ExportError:
-                self._wanted, self._told = before
+                self._request, self._status = before
                 raise
             self._begun_s, self._first_share, self._ends_s = self._clock(), None, None
-            self._process, pipe = begun_apart(carry_out, order)
-            self._thread = threading.Thread(
-                target=self._follow, args=(self._process, pipe), name="training", daemon=True
-            )
+            process, pipe = begun_apart(run_training, order)
+            self._process = process
+            self._thread = threading.Thread(target=self._follow, args=(process, pipe), name="training", daemon=True)
             self._thread.start()
 
-    def _order(self, wanted: Wanted) -> TrainingOrder:
-        project = self._folder
-        videos = {line.number: line for line in self.videos()}
-        missing = [number for number in wanted.lines if number not in videos]
+    def _order(self, request: TrainingRequest) -> TrainingOrder:
+        folder = self._folder
+        videos = {each.number: each for each in self.videos()}
+        missing = [number for number in request.lines if number not in videos]
         if missing:
-            raise InputError(f"line {missing[0]} is no video of this project; choose among its videos")
-        if not wanted.lines and project.recordings is None:
+            raise InputError(f"recording {missing[0]} is no video of this project; choose among its videos")
+        if not request.lines and folder.recordings is None:
             raise InputError(
-                "no recordings are chosen; choose lines that are videos, or give a folder: lipmotion studio "
+                "no recordings are chosen; choose some that are videos, or give a folder: lipmotion studio "
                 "--recordings FOLDER"
             )
-        chosen = [videos[number] for number in wanted.lines]
-        lines = tuple(
-            LearnedLine(project.sound(line).absolute(), line.name, line.transcript, line.sha256) for line in chosen
+        chosen = tuple(
+            TrainingRecording(folder.sound(each).absolute(), each.name, each.transcript, each.sha256)
+            for each in map(videos.__getitem__, request.lines)
         )
-        place = project.path.absolute()
+        place = folder.path.absolute()
         return TrainingOrder(
-            wanted.kind,
-            place / wanted.file,
+            request.kind,
+            place / request.file,
             place / TRAINING,
-            lines or (project.recordings or place).absolute(),
-            VoiceOptions.stored(wanted.options),
-            project.lexicon_file and project.lexicon_file.absolute(),
+            chosen or (folder.recordings or place).absolute(),
+            VoiceOptions.stored(request.options),
+            folder.lexicon_file and folder.lexicon_file.absolute(),
             max((os.cpu_count() or 2) - 1, 1),  # the page needs one
         )
 
-    def _remove_unfinished(self, target: Path) -> None:
-        """Remove what was begun and will not be gone on with."""
-        for folder, _ in PLACES.values():
-            for left in (self._folder.path / folder).glob(f"*{UNFINISHED}"):
-                if left.name != work_folder(target).name:
-                    remove(left)
-
     def _follow(self, process: BaseProcess, pipe: Connection) -> None:
-        """Take what the process tells until it ends."""
+        """Take what the process reports until it ends."""
         with pipe, suppress(EOFError, OSError):
             while True:
                 self._take(pipe.recv())
         process.join()
         with self._lock:
             is_closed, self._thread, self._process = self._thread is None, None, None
-            if is_closed and self._told["state"] == WORKING:
+            if is_closed and self.is_working:
                 return
-            if self._told["state"] == WORKING:
-                told = "it ended without a word; is there enough memory? What is finished is kept: run it again"
-                self._told |= {"state": FAILED, "error": told}
+            if self.is_working:
+                reason = "it ended without a word; is there enough memory? What is finished is kept: run it again"
+                self._status |= {"state": FAILED, "error": reason}
             try:
                 self._write()
             except ExportError as error:
                 LOG.warning("%s", error)
 
-    def _take(self, told: Mapping[str, Any]) -> None:
+    def _take(self, report: Mapping[str, Any]) -> None:
+        """Take a report; where the work has gone on, estimate anew when it will be done, if it goes on as until now."""
         with self._lock:
-            if "stage" in told:
-                self._go_on(told["stage"], min(told["share"], MOST_UNFINISHED))
-            elif "report" in told:
-                file = self._wanted.file if self._wanted else ""
-                self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": file}}
-                if self._wanted:
-                    self._made[self._wanted.kind] = TrainingJob(self._wanted, self._told)
-            elif "error" in told and self.is_working:
-                self._told |= {"state": FAILED, "error": told["error"]}
-            elif "warning" in told:
-                _append(self._told["warnings"], told["warning"])
-            elif "skipped" in told:
-                _append(self._told["skipped"], {"name": told["skipped"], "reason": told["reason"]})
-            elif "noted" in told:
-                _append(self._told["warnings"], f"{told['noted']}: {told['reason']}")
-
-    def _go_on(self, stage: str, share: float) -> None:
-        """Tell how far it is; where it has gone on, estimate anew when it will be done, if it goes on as until now."""
-        now_s = self._clock()
-        if self._first_share is None:
-            self._first_share = share
-        elif share > max(self._told["share"], self._first_share):
-            self._ends_s = now_s + (now_s - self._begun_s) * (1 - share) / (share - self._first_share)
-        self._told |= {"stage": stage, "share": max(share, self._told["share"])}
+            status = self._status
+            if "stage" in report:
+                now_s, share = self._clock(), min(report["share"], MAX_UNFINISHED)
+                if self._first_share is None:
+                    self._first_share = share
+                elif share > max(status["share"], self._first_share):
+                    self._ends_s = now_s + (now_s - self._begun_s) * (1 - share) / (share - self._first_share)
+                status |= {"stage": report["stage"], "share": max(share, status["share"])}
+            elif "report" in report:
+                file = self._request.file if self._request else ""
+                status |= {"state": DONE, "share": 1.0, "report": {**report["report"], "file": file}}
+                if self._request:
+                    self._finished[self._request.kind] = TrainingJob(self._request, status)
+            elif "error" in report and self.is_working:
+                status |= {"state": FAILED, "error": report["error"]}
+            elif "warning" in report:
+                _append(status["warnings"], report["warning"])
+            elif "skipped" in report:
+                _append(status["skipped"], {"name": report["skipped"], "reason": report["reason"]})
+            elif "noted" in report:
+                _append(status["warnings"], f"{report['noted']}: {report['reason']}")
 
     def _write(self) -> None:
         make_folder(self._file.parent)
-        wanted = {} if self._wanted is None else asdict(self._wanted)
-        made = [asdict(job) for job in self._made.values()]
-        document = {"format": FORMAT, "version": VERSION, "wanted": wanted, "told": self._told, "made": made}
+        request = {} if self._request is None else asdict(self._request)
+        made = [asdict(job) for job in self._finished.values()]
+        document = {"format": FORMAT, "version": VERSION, "wanted": request, "told": self._status, "made": made}
         text = as_json(document, indent=1, ensure_ascii=False)
 
         def write(path: Path) -> None:
             with whole_file(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
-        write_twice(self._file, self._copy, write)
+        write_with_copy(self._file, self._copy, write)
 
     def _open(self) -> None:
-        """Read what was made last, where there is a file of it; what is wrong with one is told."""
+        """Read what was made last, where there is a file of it; what is wrong with it is reported as damage."""
         self.damage = ""
         if not self._file.exists() and not self._copy.exists():
             return
         try:
-            last, made = _read(self._file)
+            last, made = _read_jobs(self._file)
         except InputError as error:
-            told = f"there is no good copy; remove the folder {self._file.parent}: voices and faces stay"
+            way_out = f"there is no good copy; remove the folder {self._file.parent}: voices and faces stay"
             if self.is_restorable:
-                told = f"restore the last good copy on the page, or put it in its place: {self._copy}"
-            self.damage = f"what is known of the training is damaged, and is left as it is: {error}; {told}"
+                way_out = f"restore the last good copy on the page, or put it in its place: {self._copy}"
+            self.damage = f"what is known of the training is damaged, and is left as it is: {error}; {way_out}"
             LOG.warning("%s", self.damage)
             return
-        self._wanted, self._told = last.wanted, last.told
-        self._made = {job.wanted.kind: job for job in (*made, last) if job.told["state"] == DONE}
+        self._request, self._status = last.wanted, last.told
+        self._finished = {job.wanted.kind: job for job in (*made, last) if job.told["state"] == DONE}
         if not self._copy.exists():
             with suppress(ExportError):
                 copy_file(self._file, self._copy)
@@ -325,7 +322,7 @@ class Trainer:
     def is_restorable(self) -> bool:
         """Whether there is a good copy of the file that keeps what was made."""
         try:
-            return bool(_read(self._copy))
+            return bool(_read_jobs(self._copy))
         except InputError:
             return False
 
@@ -337,53 +334,45 @@ class Trainer:
         with self._lock:
             if not self.damage or not self.is_restorable:
                 raise InputError(self.damage or "what is known of the training is not damaged; nothing is restored")
-            restore(self._file, self._copy)
+            restore_copy(self._file, self._copy)
             self._open()
 
 
-def _read(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
-    """Return what was made last, and before. Raises InputError: the file cannot be read, or is of a later version."""
+def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
+    """Return the last job, and earlier ones. Raises InputError: the file cannot be read, or is of a later version."""
+
+    def job(content: Mapping[str, Any]) -> TrainingJob:
+        request, status = content["wanted"], content["told"]
+        VoiceOptions.stored(request.options)  # raises where there are no such options
+        state = INTERRUPTED if status["state"] == WORKING else status["state"]
+        request = replace(request, name=clean_name(request.name))
+        return TrainingJob(request, {**_empty_status(), **status, "state": state})
+
     text = read_text_file(file, "training")
     try:
-        found = _STATE(from_json(text))
-        return _job(found), [_job(each) for each in found.get("made", ())]
+        content = _STATE(from_json(text))
+        return job(content), [job(each) for each in content.get("made", ())]
     except ValueError as error:  # InputError is one
         raise InputError(f"{file}: {error}") from error
 
 
-def _job(job: Mapping[str, Any]) -> TrainingJob:
-    """Return what a file says of something that was made. Raises InputError: options that there are not."""
-    wanted, told = replace(job["wanted"], name=plain_name(job["wanted"].name)), job["told"]
-    VoiceOptions.stored(wanted.options)
-    state = INTERRUPTED if told["state"] == WORKING else told["state"]
-    return TrainingJob(wanted, {**_nothing_told(), **told, "state": state})
-
-
 _TEXT, _ANY = text(1 << 20), any_members(lambda value: value)
-_WANTED = {"kind": one_of(KINDS), "name": _TEXT, "lines": as_tuple(items(whole(0, 1 << 31))), "options": _ANY}
-_TOLD = {
+_REQUEST = {"kind": one_of(KINDS), "name": _TEXT, "lines": as_tuple(items(whole(0, 1 << 31))), "options": _ANY}
+_STATUS = {
     **{"state": one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)), "stage": _TEXT, "share": number(0, 1)},
     **{"warnings": items(_TEXT), "skipped": items(_ANY), "error": _TEXT, "report": optional(_ANY)},
 }
-_JOB = {"wanted": value_of(Wanted, _WANTED, _WANTED), "told": members(_TOLD, ["state"])}
+_JOB = {"wanted": value_of(TrainingRequest, _REQUEST, _REQUEST), "told": members(_STATUS, ["state"])}
 _STATE = members(
     _JOB | {"format": one_of([FORMAT]), "version": one_of([VERSION]), "made": items(members(_JOB, _JOB))},
     ("format", "version", *_JOB),
 )
 
 
-def _numbered(name: str, number: int) -> str:
-    return name if number == 1 else f"{name}-{number}"
-
-
-def _wanted_document(wanted: Wanted) -> dict[str, Any]:
-    return {**asdict(wanted), "lines": list(wanted.lines), "file": wanted.file}
-
-
-def _nothing_told() -> dict[str, Any]:
+def _empty_status() -> dict[str, Any]:
     return {"stage": "", "share": 0.0, "warnings": [], "skipped": [], "error": "", "report": None}
 
 
-def _append(told: list[Any], new: Any) -> None:
-    if len(told) < MOST_TOLD and new not in told:
-        told.append(new)
+def _append(entries: list[Any], new: Any) -> None:
+    if len(entries) < MAX_WARNINGS and new not in entries:
+        entries.append(new)

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.registry import DEFAULT
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.extensions import provided
-from lipmotion.formats.label_files import label_files_beside
+from lipmotion.formats.label_files import find_label_files
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.model import Model, load_model, save_model
@@ -38,7 +37,7 @@ CORPUS, GATHERED = "corpus", "recordings"
 """Folders for the work: recordings that were prepared, which later voices use again; and those that are used now."""
 PREPARED_SHARE, TRAINED_SHARE = 0.6, 0.95
 """Shares of the work that are done once recordings are prepared, and once a voice is trained."""
-Tell = Callable[[Mapping[str, Any]], None]
+Report = Callable[[Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True)
@@ -57,13 +56,13 @@ class VoiceOptions(Configuration):
 
 
 @dataclass(frozen=True)
-class LearnedLine:
-    """A line of the project that is learned from: its recording, its name, and its words; empty: those beside it.
+class TrainingRecording:
+    """A recording of the project that is learned from, and its words; empty: those beside it.
 
     sha256 : digest of the recording that the words are of; empty: not known
     """
 
-    recording: Path
+    path: Path
     name: str
     transcript: str
     sha256: str = ""
@@ -76,7 +75,7 @@ class TrainingOrder:
     kind    : ``voice`` or ``face``
     target  : the file that it becomes
     work    : folder for what is prepared, which another order goes on with
-    source  : a folder of recordings, or lines of the project
+    source  : a folder of recordings, or recordings of the project
     lexicon : pronunciations of the project; None: it has none
     workers : number of processes
     """
@@ -84,59 +83,61 @@ class TrainingOrder:
     kind: str
     target: Path
     work: Path
-    source: Path | tuple[LearnedLine, ...]
+    source: Path | tuple[TrainingRecording, ...]
     options: VoiceOptions
     lexicon: Path | None
     workers: int
 
 
-def carry_out(order: TrainingOrder, tell: Tell) -> None:
-    """Make what is ordered; tell of its progress, warnings, recordings that are not used, and of how it ended.
+def run_training(order: TrainingOrder, report: Report) -> None:
+    """Make what is ordered; report its progress, warnings, recordings that are not used, and how it ended.
 
-    What is told is one of ``stage`` with ``share`` (0 to 1), ``warning``, ``skipped`` with ``reason``, and at the end
-    ``report`` or ``error``.
+    A report is one of ``stage`` with ``share`` (0 to 1), ``warning``, ``skipped`` or ``noted`` with ``reason``, and at
+    the end ``report`` or ``error``.
     """
-    handler = _Teller(tell)
+
+    def monitor(event: Progress | Item) -> None:
+        if isinstance(event, Progress):
+            report({"stage": event.stage, "share": event.share})
+        elif event.reason:
+            report({"skipped" if event.outcome == "skipped" else "noted": event.name, "reason": event.reason})
+
+    handler = _WarningHandler(report)
     LOG.addHandler(handler)
     try:
         with confined(order.work.parent):  # the project, in this process
-            tell({"report": _made(order, partial(_report, tell))})
+            begun_s = time.monotonic()
+            with made_folders([order.target.parent, order.work]), gather_recordings(order) as recordings:
+                if order.kind == VOICE:
+                    facts = _train_voice(order, recordings, monitor)
+                else:
+                    name, workers = order.target.stem, order.workers
+                    face = build_face(recordings, name=name, workers=workers, monitor=monitor)
+                    save_face(face, order.target)
+                    facts = {"facts": face.summary}
+            report({"report": {"kind": order.kind, "seconds": round(time.monotonic() - begun_s), **facts}})
     except (LipMotionError, OSError) as error:
-        tell({"error": str(error)})
+        report({"error": str(error)})
     except Exception as error:  # a bug, of which the page is told
-        tell({"error": f"a bug: {type(error).__name__}: {error}"})
+        report({"error": f"a bug: {type(error).__name__}: {error}"})
     finally:
         LOG.removeHandler(handler)
 
 
-class _Teller(logging.Handler):
-    """Tells warnings."""
+class _WarningHandler(logging.Handler):
+    """Reports warnings."""
 
-    def __init__(self, tell: Tell) -> None:
+    def __init__(self, report: Report) -> None:
         super().__init__(logging.WARNING)
-        self._tell = tell
+        self._report = report
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._tell({"warning": record.getMessage()})
-
-
-def _report(tell: Tell, event: Progress | Item) -> None:
-    if isinstance(event, Progress):
-        tell({"stage": event.stage, "share": event.share})
-    elif event.reason:
-        tell({"skipped" if event.outcome == "skipped" else "noted": event.name, "reason": event.reason})
-
-
-def _made(order: TrainingOrder, monitor: Monitor) -> dict[str, Any]:
-    begun_s = time.monotonic()
-    with made_folders([order.target.parent, order.work]), _gathered(order) as recordings:
-        made = _voice(order, recordings, monitor) if order.kind == VOICE else _face(order, recordings, monitor)
-    return {"kind": order.kind, "seconds": round(time.monotonic() - begun_s), **made}
+        self._report({"warning": record.getMessage()})
 
 
 @contextmanager
-def _gathered(order: TrainingOrder) -> Iterator[Path]:
-    """Give a folder of the recordings: that of the order, or one that holds its lines, with their words."""
+def gather_recordings(order: TrainingOrder) -> Iterator[Path]:
+    """Give a folder of the recordings: that of the order, or one that holds those of the project, with their words."""
     if isinstance(order.source, Path):
         yield order.source
         return
@@ -145,20 +146,20 @@ def _gathered(order: TrainingOrder) -> Iterator[Path]:
     with made_folders([place]):
         try:
             taken: set[str] = set()
-            for line in order.source:
-                stem = line.name.replace("/", "-")
+            for recording in order.source:
+                stem = recording.name.replace("/", "-")
                 while stem.casefold() in taken:
                     stem += "-2"
                 taken.add(stem.casefold())
-                if line.sha256:
-                    check_sound(line.recording, line.sha256)
-                _put(line.recording, place / f"{stem}{line.recording.suffix}")
-                if line.transcript:
+                if recording.sha256:
+                    check_sound(recording.path, recording.sha256)
+                _put(recording.path, place / f"{stem}{recording.path.suffix}")
+                if recording.transcript:
                     with whole_file(place / f"{stem}.txt") as text:
-                        text.write_text(line.transcript, encoding="utf-8")
+                        text.write_text(recording.transcript, encoding="utf-8")
                     continue
-                for labels in label_files_beside(line.recording):
-                    _put(labels, place / f"{stem}{labels.name[len(line.recording.stem) :]}")
+                for labels in find_label_files(recording.path):
+                    _put(labels, place / f"{stem}{labels.name[len(recording.path.stem) :]}")
             yield place
         finally:
             remove(place.parent)
@@ -173,13 +174,12 @@ def _put(file: Path, place: Path) -> None:
             shutil.copyfile(file, copy)
 
 
-def _voice(order: TrainingOrder, recordings: Path, monitor: Monitor) -> dict[str, Any]:
-    """Train a voice, and write it last of all, once it has been measured."""
-    engine = engine_named(order.options.engine)
-    begun = sub_monitor(monitor, 0, PREPARED_SHARE)
-    done = prepare(recordings, order.work / CORPUS, workers=order.workers, crops=False, monitor=begun)
+def _train_voice(order: TrainingOrder, recordings: Path, monitor: Monitor) -> dict[str, Any]:
+    """Train a voice, and write it last of all, once it has been measured; return its figures."""
+    engine, preparing = engine_named(order.options.engine), sub_monitor(monitor, 0, PREPARED_SHARE)
+    done = prepare(recordings, order.work / CORPUS, workers=order.workers, crops=False, monitor=preparing)
     corpus = Corpus.open(done.corpus)
-    learned, kept_back = divided_names(corpus, (*done.prepared, *done.kept), held_out=order.options.held_out)
+    learned, held_out = split_names(corpus, (*done.prepared, *done.kept), held_out=order.options.held_out)
     with unfinished_work(order.target) as work:
         model, result = train(
             corpus,
@@ -189,15 +189,15 @@ def _voice(order: TrainingOrder, recordings: Path, monitor: Monitor) -> dict[str
             prior=load_model() if order.options.prior and engine.inputs().prior else None,
             run=Run(sub_monitor(monitor, PREPARED_SHARE, TRAINED_SHARE), work, order.workers),
         )
-        measured = _measured(model, corpus, kept_back, sub_monitor(monitor, TRAINED_SHARE, 1, "measuring: "))
+        measures = _measure(model, corpus, held_out, sub_monitor(monitor, TRAINED_SHARE, 1, "measuring: "))
         save_model(model, order.target)
     for name, reason in result.skipped.items():
         monitor(Item(name, "skipped", reason))
-    counts = {"learned": len(result.used), "minutes": model.about["minutes"], "kept_back": len(kept_back)}
-    return {**counts, "skipped": len(done.failed) + len(result.skipped), **measured}
+    counts = {"learned": len(result.used), "minutes": model.about["minutes"], "kept_back": len(held_out)}
+    return {**counts, "skipped": len(done.failed) + len(result.skipped), **measures}
 
 
-def divided_names(corpus: Corpus, names: Sequence[str], *, held_out: bool) -> tuple[list[str], list[str]]:
+def split_names(corpus: Corpus, names: Sequence[str], *, held_out: bool) -> tuple[list[str], list[str]]:
     """Return which of some utterances are learned from, and which show how good the voice is.
 
     held_out : as of ``VoiceOptions``
@@ -212,8 +212,8 @@ def divided_names(corpus: Corpus, names: Sequence[str], *, held_out: bool) -> tu
     return names[: len(names) - count], names[len(names) - count :]
 
 
-def _measured(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monitor) -> dict[str, Any]:
-    """Return the figures of recordings that were not learned from; empty: there are none, or they say why."""
+def _measure(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monitor) -> dict[str, Any]:
+    """Return the figures of recordings that were not learned from; empty: there are none, or a warning says why."""
     if not names:
         return {}
     try:
@@ -222,20 +222,14 @@ def _measured(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monit
         LOG.warning("the voice could not be measured: %s", error)
         return {}
     rows = [
-        {"condition": name, "acc": found["acc"], "opening": found["channels"].get("opening", {}).get("acc")}
-        for name, found in figures["conditions"].items()
+        {"condition": name, "acc": row["acc"], "opening": row["channels"].get("opening", {}).get("acc")}
+        for name, row in figures["conditions"].items()
     ]
     return {"figures": rows, "table": figures_table(figures)}
 
 
-def _face(order: TrainingOrder, recordings: Path, monitor: Monitor) -> dict[str, Any]:
-    face = build_face(recordings, name=order.target.stem, workers=order.workers, monitor=monitor)
-    save_face(face, order.target)
-    return {"facts": face.summary}
-
-
-def check_options(given: Mapping[str, Any]) -> VoiceOptions:
+def check_options(values: Mapping[str, Any]) -> VoiceOptions:
     """Return the options that a request gives. Raises InputError: unknown, or a value that is not allowed."""
-    if not isinstance(given, Mapping):
+    if not isinstance(values, Mapping):
         raise InputError("options is no object of names and values")
-    return VoiceOptions.parsed(given)
+    return VoiceOptions.parsed(values)

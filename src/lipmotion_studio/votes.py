@@ -1,4 +1,4 @@
-"""Votes of blind comparisons: which of two motions of a line somebody found better, without knowing which was which."""
+"""Votes of blind comparisons: which of two motions of a recording somebody found better."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DIGEST = re.compile(r"[0-9a-f]{64}|")
 
 @dataclass(frozen=True)
 class Side:
-    """One of two motions of a line.
+    """One of two motions of a recording.
 
     name  : of the model that made it; of votes from before digests were kept, what the page called it
     model : digest of the model's file (SHA-256); empty: it was not kept
@@ -36,7 +36,7 @@ class Side:
 
     @property
     def motion(self) -> tuple[str, str]:
-        """What tells it from other motions of the line: the model, by its name where nothing else is known; edits."""
+        """What tells it from other motions: the model, by its name where nothing else is known; the edits."""
         return self.model or self.name, self.edits
 
 
@@ -44,7 +44,7 @@ class Side:
 class Vote:
     """One answer of a blind comparison.
 
-    line   : name of the line
+    line   : name of the recording
     shown  : the two motions, in the order in which they were shown
     better : place of the one that was found better, 0 or 1; None: neither
     Raises InputError: these are not two, or the better one is neither.
@@ -62,7 +62,7 @@ class Vote:
 
     @property
     def compared(self) -> tuple[tuple[str, str], ...]:
-        """What the two are, whatever the line: edits that both have are those of the line, and do not count."""
+        """What the two are, whatever the recording: edits that both have are those of it, and do not count."""
         first, second = (side.motion for side in self.shown)
         return ((first[0], ""), (second[0], "")) if first[1] == second[1] else (first, second)
 
@@ -96,18 +96,22 @@ def read_votes(path: Path) -> tuple[Vote, ...]:
         raise InputError(f"{path}: {error}; put it right, or take it away") from error
 
 
-def _named_vote(row: Any) -> Vote:
-    """Return a vote from before digests were kept: of two names, with the digest of the line's edits."""
-    known = _NAMED(row)
-    names, better = known["shown"], known["better"]
-    sides = tuple(Side(name, "", known["edits"]) for name in names)
-    return Vote(known["line"], sides, names.index(better) if better else None)
-
-
 _TEXT = text(4096)
 _NAMES = {"line": _TEXT, "shown": items(_TEXT, 2, 2), "better": optional(_TEXT), "edits": text(64)}
 _NAMED = members(_NAMES, _NAMES)
 _SIDE = {"name": _TEXT, "model": text(64), "edits": text(64)}
 _VOTE = {"line": _TEXT, "shown": as_tuple(items(value_of(Side, _SIDE, _SIDE), 2, 2)), "better": optional(whole(0, 1))}
 _NEW_VOTE = value_of(Vote, _VOTE, _VOTE)
-_VOTES = items(lambda row: _named_vote(row) if isinstance(row, dict) and "edits" in row else _NEW_VOTE(row))
+
+
+def _vote(row: Any) -> Vote:
+    """Return a vote; one from before digests were kept is of two names, with the digest of the edits."""
+    if not isinstance(row, dict) or "edits" not in row:
+        return _NEW_VOTE(row)
+    known = _NAMED(row)
+    names, better = known["shown"], known["better"]
+    sides = tuple(Side(name, "", known["edits"]) for name in names)
+    return Vote(known["line"], sides, names.index(better) if better else None)
+
+
+_VOTES = items(_vote)

@@ -9,7 +9,7 @@ from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion_faces.appearance.candidates import (
     MIXTURE_SHARE,
     choose_candidates,
-    drawn_to_recorded,
+    draw_to_recorded,
     make_candidates,
     recorded_details,
     squared_distances,
@@ -124,23 +124,23 @@ def test_details_are_what_the_eigenlips_leave_out(space: Eigenlips) -> None:
 
 def test_recorded_mouths_stay_where_they_are() -> None:
     values = mouths()[::5]
-    assert drawn_to_recorded(values, values) == pytest.approx(values, abs=0.2)  # they are up to 147 from 0
+    assert draw_to_recorded(values, values) == pytest.approx(values, abs=0.2)  # they are up to 147 from 0
 
 
 def test_a_mouth_between_recorded_ones_stays_and_one_far_away_comes_nearer() -> None:
     grid = np.stack(np.meshgrid(np.arange(8.0), np.arange(8.0)), axis=-1).reshape(-1, 2).astype(np.float32)
     wanted = np.array([[3.4, 2.7], [3.5, 20.0]], np.float32)
-    drawn = drawn_to_recorded(wanted, grid)
+    drawn = draw_to_recorded(wanted, grid)
     assert drawn[0] == pytest.approx(wanted[0], abs=0.1)
     assert drawn[1] == pytest.approx(
         [3.5, (1 - MIXTURE_SHARE) * 20 + MIXTURE_SHARE * 7], abs=0.5
     )  # 7 is the end of what was recorded
     one = grid[:1]
-    assert drawn_to_recorded(one + 4, one) == pytest.approx(one + 4 * (1 - MIXTURE_SHARE), abs=1e-3)
+    assert draw_to_recorded(one + 4, one) == pytest.approx(one + 4 * (1 - MIXTURE_SHARE), abs=1e-3)
 
 
 def test_mouths_are_drawn_smoothly_over_time() -> None:
     recorded = mouths(1)[::3]
     path = np.linspace(recorded[0], recorded[50], 400)
-    steps = np.linalg.norm(np.diff(drawn_to_recorded(path.astype(np.float32), recorded), axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(draw_to_recorded(path.astype(np.float32), recorded), axis=0), axis=1)
     assert steps.max() < 0.02 * np.linalg.norm(path[-1] - path[0])  # where the nearest ones change

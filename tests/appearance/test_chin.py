@@ -5,16 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion_faces.appearance.chin import (
+from lipmotion_faces.appearance.lower_face import (
+    CORNER,
+    HEIGHT,
     LARGEST_PX,
     LEAST_PX,
     NECK_PX,
     SIDE_PX,
     STILL_PX,
+    WIDTH,
+    FaceShape,
+    move_chin,
     moved_part,
-    with_chin_moved,
+    replaced_part,
 )
-from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceShape, replaced_part
 
 CHIN_PX = 118.0
 
@@ -40,7 +44,7 @@ def test_the_tip_moves_as_far_as_it_should() -> None:
     drops = np.array([-9.0, -0.4, 0.0, 0.3, 6.7, 12.0])
     for scale in (1, 2):
         pictures = with_line(scale=scale, count=len(drops))
-        moved = with_chin_moved(pictures, np.full(len(drops), CHIN_PX), drops)
+        moved = move_chin(pictures, np.full(len(drops), CHIN_PX), drops)
         assert moved.dtype == np.uint8
         assert [line_px(picture) - line_px(pictures[0]) for picture in moved] == pytest.approx(drops, abs=0.15)
 
@@ -48,22 +52,22 @@ def test_the_tip_moves_as_far_as_it_should() -> None:
 def test_the_chin_may_be_elsewhere_in_every_frame() -> None:
     chins = np.array([112.0, 125.0])
     pictures = np.concatenate([with_line(chin) for chin in chins])
-    moved = with_chin_moved(pictures, chins, np.full(2, 5.0))
+    moved = move_chin(pictures, chins, np.full(2, 5.0))
     assert [line_px(picture) for picture in moved] == pytest.approx(chins + 5, abs=0.3)
 
 
 def test_it_does_not_move_further_than_a_neck_allows() -> None:
     for wanted, done in ((40.0, LARGEST_PX), (-40.0, -LARGEST_PX)):
-        moved, limit = (with_chin_moved(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done))
+        moved, limit = (move_chin(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done))
         assert np.array_equal(moved, limit)
 
 
 def test_what_does_not_move_stays_to_the_bit() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (2, HEIGHT, WIDTH, 3), np.uint8)
     before = noise.copy()
-    still = with_chin_moved(noise, np.full(2, CHIN_PX), np.array([0.0, 0.9 * LEAST_PX]))
+    still = move_chin(noise, np.full(2, CHIN_PX), np.array([0.0, 0.9 * LEAST_PX]))
     assert np.array_equal(still, before)
-    moved = with_chin_moved(noise, np.full(2, CHIN_PX), np.array([8.0, -8.0]))
+    moved = move_chin(noise, np.full(2, CHIN_PX), np.array([8.0, -8.0]))
     assert np.array_equal(noise, before)  # the given pictures are not changed
     y = np.arange(HEIGHT) + 0.5 + CORNER[1]
     x = np.abs(np.arange(WIDTH) + 0.5 + CORNER[0])
@@ -74,7 +78,7 @@ def test_what_does_not_move_stays_to_the_bit() -> None:
 
 def test_the_jaw_moves_less_towards_its_joints() -> None:
     picture = with_line()
-    moved = with_chin_moved(picture, np.array([CHIN_PX]), np.array([10.0]))
+    moved = move_chin(picture, np.array([CHIN_PX]), np.array([10.0]))
     steps = [line_px(moved[0], x) - line_px(picture[0], x) for x in (0.5, 20.5, 40.5, 50.5)]
     assert steps[0] > steps[1] + 0.3 > steps[2] + 1 > steps[3]
     mirrored = [line_px(moved[0], -x) - line_px(picture[0], -x) for x in (0.5, 20.5, 40.5, 50.5)]
@@ -96,7 +100,7 @@ def test_no_chin_folds_or_tears() -> None:
     chins = np.repeat([60.0, 80.0, 86.0, 92.0, 99.0, CHIN_PX], 2)
     drops = np.tile([-LARGEST_PX, LARGEST_PX], 6)
     above = round(STILL_PX - CORNER[1])
-    for moved in with_chin_moved(np.repeat(ramp[None], 12, axis=0), chins, drops).astype(int):
+    for moved in move_chin(np.repeat(ramp[None], 12, axis=0), chins, drops).astype(int):
         assert np.array_equal(moved[:above], ramp[:above])
         steps = np.diff(moved[:, WIDTH // 2, 0])
         assert steps.min() >= 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion_faces.appearance.frame_descriptors import describe_frames, row_distances
+from lipmotion_faces.appearance.looping import describe_frames, row_distances
 
 MAP = np.array([[0.7, 0, 80.0], [0, 0.7, 60.0]])
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion_faces.appearance.identity import SAME_PERSON_LIKENESS, face_signature, likeness
+from lipmotion_faces.appearance.lower_face import SAME_PERSON_LIKENESS, face_signature, likeness
 
 
 def face(seed: int) -> np.ndarray:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion_faces.appearance.frame_descriptors import FrameDescriptors
-from lipmotion_faces.appearance.looping import BUSY_S, JUMP_LIMIT, LoopOrder, fade_frames, loop_order
+from lipmotion_faces.appearance.looping import BUSY_S, JUMP_LIMIT, FrameDescriptors, LoopOrder, fade_frames, loop_order
 
 RATE_HZ = 25.0
 FADE_FRAMES = fade_frames(RATE_HZ)

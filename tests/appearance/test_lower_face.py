@@ -25,7 +25,7 @@ from lipmotion_faces.appearance.lower_face import (
     mouth_ellipse,
     mouth_part,
     region_map,
-    relit,
+    relight,
     replaced_part,
 )
 from lipmotion_faces.appearance.placing import cut
@@ -131,7 +131,7 @@ def test_light_of_other_pictures() -> None:
 def test_relit_pictures_are_lighter_by_their_gains() -> None:
     pictures = np.random.default_rng(1).integers(0, 256, (3, 20, 10, 3), np.uint8)
     gains = np.array([[1, 1, 1], [1.3, 0.5, 0], [2, 1, 1.1]])
-    made = relit(pictures, gains)
+    made = relight(pictures, gains)
     assert made.dtype == np.uint8
     assert np.array_equal(made, np.clip(np.rint(pictures * gains[:, None, None]), 0, 255))
     assert np.array_equal(made[0], pictures[0])
@@ -142,8 +142,8 @@ def test_normalised_light_is_the_same_in_all_pictures() -> None:
     draw = np.random.default_rng(2)
     mouth = draw.integers(90, 140, (1, 56, 72, 3)).astype(np.uint8)
     lamps = np.array([[1, 1, 1], [0.7, 0.7, 0.7], [1.2, 0.9, 0.8]])
-    seen = relit(np.repeat(mouth, 3, axis=0), lamps)
+    seen = relight(np.repeat(mouth, 3, axis=0), lamps)
     light = cheek_light(seen)
-    level = relit(seen, light[0] / light)
+    level = relight(seen, light[0] / light)
     assert cheek_light(level) == pytest.approx(np.tile(light[0], (3, 1)), abs=0.3)
     assert np.abs(level.astype(int) - mouth).max() <= 1

@@ -13,14 +13,8 @@ from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
 from lipmotion_faces.appearance import person
 from lipmotion_faces.appearance.candidates import CANDIDATES
-from lipmotion_faces.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relit, replaced_part
-from lipmotion_faces.appearance.person import (
-    EDGE_PX,
-    JAW_CANDIDATES,
-    Appearance,
-    FootagePictures,
-    learn_appearance,
-)
+from lipmotion_faces.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relight, replaced_part
+from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
 from lipmotion_faces.appearance.refinement import STEADY
 from lipmotion_faces.filmed.face import FilmedFace
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
@@ -116,7 +110,7 @@ def test_a_closure_shows_a_recorded_mouth_that_is_closed(
 
 def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Motion) -> None:
     drawn = toy_lower_faces(unseen, noise=0)[MOUTH]
-    dim = relit(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))
+    dim = relight(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))
     bright, dark = appearance.of_mouths(drawn), appearance.of_mouths(dim)
     assert bright.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.0)
     assert dark.chin_px == pytest.approx(bright.chin_px, abs=0.3)
@@ -166,7 +160,7 @@ def test_candidates_are_restored_as_recorded(appearance: Appearance) -> None:
 def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
     """A clip under another lamp is learned as if it had been the same."""
     lamp = np.tile([0.7, 0.8, 0.9], (len(footage.clips[1]), 1))
-    dimmed = replace(footage, clips=(footage.clips[0], relit(footage.clips[1], lamp), *footage.clips[2:]))
+    dimmed = replace(footage, clips=(footage.clips[0], relight(footage.clips[1], lamp), *footage.clips[2:]))
     found, wanted = learn_appearance(dimmed), learn_appearance(footage)
     assert found.light == pytest.approx(wanted.light, abs=0.5)
     assert cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.stats.pca import fit_pca
 from lipmotion_faces.appearance.candidates import choose_candidates, make_candidates
-from lipmotion_faces.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, sharpened
+from lipmotion_faces.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, sharpen
 
 TRAINING, HELD_OUT = np.split(pictures(count=160), [120])
 
@@ -162,12 +162,12 @@ def test_what_cannot_be_refined(refiner: Refiner) -> None:
 def test_edges_become_steeper_in_lightness_alone() -> None:
     edge = np.zeros((2, 20, 20, 3), np.uint8)
     edge[:, :, :10], edge[:, :, 10:] = (60, 80, 100), (110, 130, 150)
-    sharp = sharpened(edge, 0.5, 1).astype(int)
+    sharp = sharpen(edge, 0.5, 1).astype(int)
     assert (sharp[:, :, 10] - sharp[:, :, 9] > 55).all()  # 50 before
     assert (np.ptp(sharp - edge, axis=3) <= 1).all()  # no colour gets more than another
     assert np.abs(sharp - edge)[:, :, [0, -1]].max() == 0
-    assert np.abs(sharpened(edge, 0.5, 2).astype(int) - edge)[:, :, 6].max() > np.abs(sharp - edge)[:, :, 6].max()
-    assert sharpened(edge, 0, 1) is edge
+    assert np.abs(sharpen(edge, 0.5, 2).astype(int) - edge)[:, :, 6].max() > np.abs(sharp - edge)[:, :, 6].max()
+    assert sharpen(edge, 0, 1) is edge
     lips = np.repeat(np.repeat(edge[:, :1], 56, axis=1), 3, axis=2)
-    gained = np.abs(sharpened(lips, 0.5, 1).astype(int) - lips).max(axis=(0, 2, 3))
+    gained = np.abs(sharpen(lips, 0.5, 1).astype(int) - lips).max(axis=(0, 2, 3))
     assert gained[28] > 1.2 * gained[0]  # the lips are in the middle

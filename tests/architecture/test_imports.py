@@ -24,7 +24,7 @@ NUMBA = "Only kernels may import numba"
 FORBIDDEN = [
     # the contract, a module, and an import that the contract forbids there
     (CORE, "lipmotion/motion/space.py", "def late():\n    from lipmotion_faces import base"),
-    (CORE, "lipmotion_studio/desk.py", "from lipmotion_lab import stamp"),
+    (CORE, "lipmotion_studio/workspace.py", "from lipmotion_lab import stamp"),
     (DOWN, "lipmotion/errors.py", "import lipmotion.types"),
     (DOWN, "lipmotion/units/phones.py", "from lipmotion.speech.sound import audio_files"),
     (DOWN, "lipmotion/types/audio.py", "import lipmotion.storage.files"),
@@ -48,7 +48,7 @@ FORBIDDEN = [
     (
         "Tracking knows trackers by their interface alone",
         "lipmotion_faces/tracking/track.py",
-        "from lipmotion_faces.tracking import face_mesh",
+        "from lipmotion_faces.tracking import mediapipe",
     ),
     (TRACKING, "lipmotion/pipeline/training/train.py", "import cv2"),
     (NUMBA, "lipmotion/stats/mixture.py", "def late():\n    import numba"),

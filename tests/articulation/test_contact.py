@@ -13,13 +13,13 @@ from lipmotion.articulation.contact import (
     LARGEST_GAP,
     LEAST_GAP,
     TRACKER_DEFICIT,
-    closed_lips,
-    closures,
-    gap_in,
-    gap_of,
-    in_pictures,
-    opening_of,
-    shown_contact,
+    close_lips,
+    find_closures,
+    gap_to_opening,
+    opening_to_gap,
+    read_gap,
+    sample_pictures,
+    show_contact,
 )
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
@@ -40,24 +40,24 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def test_the_gap_is_0_where_trackers_see_closed_lips_and_grows_with_the_opening():
-    assert not gap_of(np.array([-0.01, 0, 0.005, CLOSED_OPENING])).any()
-    gap = gap_of(np.linspace(0, 1, 1001))
+    assert not opening_to_gap(np.array([-0.01, 0, 0.005, CLOSED_OPENING])).any()
+    gap = opening_to_gap(np.linspace(0, 1, 1001))
     assert (np.diff(gap) >= 0).all()
     assert np.diff(gap).max() < 0.004
     assert gap[-1] <= LARGEST_GAP
     people = np.array([0.05, 0.1, 0.25])
-    assert gap_of(people) == pytest.approx(people + TRACKER_DEFICIT, abs=1e-3)
+    assert opening_to_gap(people) == pytest.approx(people + TRACKER_DEFICIT, abs=1e-3)
 
 
 def test_an_opening_has_the_gap_that_it_was_made_of():
     gap = np.array([0.0, LEAST_GAP, 0.02, 0.1, 0.25, 0.4])
-    assert gap_of(opening_of(gap)) == pytest.approx(gap, abs=1e-3)
-    assert gap_of(opening_of(np.zeros(1)))[0] == 0
+    assert opening_to_gap(gap_to_opening(gap)) == pytest.approx(gap, abs=1e-3)
+    assert opening_to_gap(gap_to_opening(np.zeros(1)))[0] == 0
 
 
 def test_motion_with_a_gap_of_its_own_has_that_gap():
     both = Motion(np.array([[0.3, 0.1], [0.3, -0.1]]), 100.0, (Channel("opening"), Channel(GAP)))
-    assert gap_in(both) == pytest.approx([0.1, 0.0])
+    assert read_gap(both) == pytest.approx([0.1, 0.0])
 
 
 def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture():
@@ -66,43 +66,43 @@ def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture():
             for length_s in (0.02, 0.08, 0.15):
                 dip = 0.1 - 0.06 * np.exp(-(((np.arange(101) / 100 - start_s - length_s / 2) / 0.04) ** 2))
                 units = said((0, start_s, "aa"), (start_s, start_s + length_s, phone), (start_s + length_s, 1, "aa"))
-                gap = closed_lips(gap_of(dip), motion(dip), units)
+                gap = close_lips(opening_to_gap(dip), motion(dip), units)
                 [(first, stop)] = runs(gap == 0)
                 assert CONTACT_S[0] - 0.011 <= (stop - first) / 100 <= CONTACT_S[1] + 0.021
                 assert start_s - 0.04 < (first + stop - 1) / 200 < start_s + length_s + 0.04
                 assert gap[gap > 0].min() >= LEAST_GAP
                 assert np.abs(np.diff(gap)).max() < 0.04
                 for fps in RATES:
-                    assert shown_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).any()
+                    assert show_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).any()
 
 
 def test_a_contact_that_the_motion_has_is_neither_longer_nor_shorter():
     opening = np.full(101, 0.1)
     opening[40:55] = 0.005
-    assert runs(closed_lips(gap_of(opening), motion(opening), said((0.35, 0.6, "m"))) == 0) == [(40, 55)]
+    assert runs(close_lips(opening_to_gap(opening), motion(opening), said((0.35, 0.6, "m"))) == 0) == [(40, 55)]
 
 
 def test_lips_that_are_wide_open_in_all_of_a_p_are_meant_so():
     opening = np.full(101, EDITED_GAP + 0.05)
-    assert not (closed_lips(gap_of(opening), motion(opening), said((0.3, 0.5, "p"))) == 0).any()
+    assert not (close_lips(opening_to_gap(opening), motion(opening), said((0.3, 0.5, "p"))) == 0).any()
 
 
 def test_closing_twice_changes_nothing():
     dip = np.full(101, 0.08)
     units = said((0.3, 0.4, "b"), (0.7, 0.75, "m"))
     for rate_hz in (25.0, 100.0):
-        once = closed_lips(gap_of(dip), motion(dip, rate_hz), units)
-        again = Motion(np.stack([opening_of(once), once], axis=1), rate_hz, (Channel("opening"), Channel(GAP)))
-        assert closed_lips(gap_in(again), again, units) == pytest.approx(once, abs=1e-12)
+        once = close_lips(opening_to_gap(dip), motion(dip, rate_hz), units)
+        again = Motion(np.stack([gap_to_opening(once), once], axis=1), rate_hz, (Channel("opening"), Channel(GAP)))
+        assert close_lips(read_gap(again), again, units) == pytest.approx(once, abs=1e-12)
 
 
 def test_closures_are_the_least_open_frames():
     opening = np.full(101, 0.1)
     opening[33], opening[52:57] = 0.02, 0.0
     units = said((0.3, 0.4, "p"), (0.5, 0.6, "m"), (0.6, 0.7, "f"))
-    assert [each.frame for each in closures(motion(opening), units)] == [33, 54]
-    assert closures(motion(opening, name="width"), units) == []
-    assert [each.frame for each in closures(motion(opening[::4], 25.0), said((0.405, 0.41, "p")))] == [10]
+    assert [each.frame for each in find_closures(motion(opening), units)] == [33, 54]
+    assert find_closures(motion(opening, name="width"), units) == []
+    assert [each.frame for each in find_closures(motion(opening[::4], 25.0), said((0.405, 0.41, "p")))] == [10]
 
 
 def test_pictures_show_every_contact_and_no_other():
@@ -112,16 +112,16 @@ def test_pictures_show_every_contact_and_no_other():
         gap[50:53] = 0.1, 0.0, 0.1  # a contact of one frame
         for fps in RATES:
             time_s = np.arange(int(1.19 * fps) + 1) / fps
-            shown, values = shown_contact(gap == 0, 100.0, time_s), in_pictures(gap, gap == 0, 100.0, time_s)
+            shown, values = show_contact(gap == 0, 100.0, time_s), sample_pictures(gap, gap == 0, 100.0, time_s)
             assert np.array_equal(values == 0, shown)
             assert values[values > 0].min() >= LEAST_GAP
             for first, stop in runs(gap == 0):
                 near = (time_s > (first - 1) / 100 - 0.5 / fps) & (time_s < stop / 100 + 0.5 / fps)
                 assert shown[near].any()
-    assert in_pictures(gap, gap == 0, 100.0, np.arange(120) / 100) == pytest.approx(gap)
+    assert sample_pictures(gap, gap == 0, 100.0, np.arange(120) / 100) == pytest.approx(gap)
 
 
 def test_pictures_of_no_contact_and_of_nothing_but_contact():
     rows = np.arange(10.0)
     for contact in (np.zeros(10, bool), np.ones(10, bool)):
-        assert in_pictures(rows, contact, 100.0, np.array([0.0, 0.04, 0.08])) == pytest.approx([0, 4, 8])
+        assert sample_pictures(rows, contact, 100.0, np.array([0.0, 0.04, 0.08])) == pytest.approx([0, 4, 8])

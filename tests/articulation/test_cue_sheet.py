@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from lipmotion.articulation.cue_sheets import cue_frame_count, cue_sheet, start_s
+from lipmotion.articulation.cue_sheets import cue_frame_count, lay_out_cues, start_s
 
 RATES = [1, 10, 12, 15, 23.976, 24, 25, 29.97, 30, 48, 50, 59.94, 60]
 
@@ -23,7 +23,7 @@ def test_the_last_frame_begins_before_the_end() -> None:
     for fps in RATES:
         for duration_s in [0.0, 0.004, 0.01, 0.04, 0.0417, 0.05, 0.5, 1.0, 2.975, 3.0, 10.009, 60.0]:
             frames = cue_frame_count(duration_s, fps)
-            sheet = cue_sheet([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
+            sheet = lay_out_cues([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
             assert duration_s - 0.01 < sheet.duration_s <= duration_s
             assert frames == pytest.approx(duration_s * fps, abs=1.7)
             assert all(cue.start_s < cue.end_s for cue in sheet.cues) or duration_s < 0.01
@@ -31,7 +31,7 @@ def test_the_last_frame_begins_before_the_end() -> None:
 
 def test_no_segments_are_rest() -> None:
     for drawn, rest in (("ABCDEFX", "X"), ("ABCDEF", "A")):
-        (cue,) = cue_sheet([], 0.0, 24, drawn).cues
+        (cue,) = lay_out_cues([], 0.0, 24, drawn).cues
         assert (cue.start_s, cue.end_s, cue.label) == (0.0, 0.0, rest)
 
 

@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from lipmotion import Delivery
-from lipmotion.articulation.contact import closures
-from lipmotion.articulation.delivery import closed_on_grid, closed_times, held, intensified, moved_in_time, sound_units
+from lipmotion.articulation.contact import find_closures
+from lipmotion.articulation.delivery import (
+    close_on_frame_grid,
+    delay_units,
+    find_closed_times,
+    hold_poses,
+    intensify,
+    shift_in_time,
+)
 from lipmotion.errors import InputError
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from meshes.speech import motion, units
@@ -35,7 +42,7 @@ def test_values_out_of_their_ranges() -> None:
 
 
 def test_the_mouth_moves_earlier_and_the_phones_with_it(said: Generation) -> None:
-    early = moved_in_time(said, Delivery(anticipation_ms=40))
+    early = shift_in_time(said, Delivery(anticipation_ms=40))
     assert early.motion["opening"][:-4] == pytest.approx(said.motion["opening"][4:])
     assert len(early.motion.values) == len(said.motion.values)
     assert early.units[1].start_s == pytest.approx(said.units[1].start_s - 0.04)
@@ -44,12 +51,12 @@ def test_the_mouth_moves_earlier_and_the_phones_with_it(said: Generation) -> Non
 
 
 def test_everything_comes_later(said: Generation) -> None:
-    late = moved_in_time(said, Delivery(offset_ms=500))
+    late = shift_in_time(said, Delivery(offset_ms=500))
     assert len(late.motion.values) == len(said.motion.values) + 50
     assert late.motion["opening"][50:] == pytest.approx(said.motion["opening"])
     assert late.motion["opening"][:50] == pytest.approx(said.motion["opening"][0])
     assert (late.units[0].start_s, late.units[1].start_s) == (0, 1.0)
-    assert sound_units(said.units, Delivery(offset_ms=500, anticipation_ms=80), 2.0) == late.units
+    assert delay_units(said.units, Delivery(offset_ms=500, anticipation_ms=80), 2.0) == late.units
 
 
 @pytest.mark.parametrize("offset_ms", [1000.0, -250.0])
@@ -58,16 +65,16 @@ def test_phones_that_end_after_the_last_frame_are_not_cut(said: Generation, offs
     spans = [*list(said.units)[:-1], replace(said.units[last], end_s=2.005)]
     longer = replace(said, units=Timeline(tuple(spans)))
     delivery, end_s = Delivery(offset_ms=offset_ms), pytest.approx(2.005 + offset_ms / 1000)
-    assert moved_in_time(longer, delivery).units[last].end_s == end_s
-    assert sound_units(longer.units, delivery, 2.0)[last].end_s == end_s
+    assert shift_in_time(longer, delivery).units[last].end_s == end_s
+    assert delay_units(longer.units, delivery, 2.0)[last].end_s == end_s
 
 
 def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:
-    cut = moved_in_time(said, Delivery(offset_ms=-550))
+    cut = shift_in_time(said, Delivery(offset_ms=-550))
     assert cut.motion["opening"] == pytest.approx(said.motion["opening"][55:])
     assert (cut.units[0].label.phone, cut.units[0].start_s) == ("m", 0)
     with pytest.raises(InputError, match=r"the offset is -3000 ms, and the motion lasts 2\.00 s: nothing is left"):
-        moved_in_time(said, Delivery(offset_ms=-3000))
+        shift_in_time(said, Delivery(offset_ms=-3000))
 
 
 def test_closures_survive_a_shift_between_two_frames(said: Generation) -> None:
@@ -75,17 +82,17 @@ def test_closures_survive_a_shift_between_two_frames(said: Generation) -> None:
     (column,) = [said.motion.column("opening")]
     spiky[90:101, column] = 0.1
     spiky[95, column] = 0.0
-    early = moved_in_time(replace(said, motion=replace(said.motion, values=spiky)), Delivery(anticipation_ms=33))
+    early = shift_in_time(replace(said, motion=replace(said.motion, values=spiky)), Delivery(anticipation_ms=33))
     assert early.motion["opening"][86:100].min() == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("intensity", [0.5, 1.5, 2.0, 3.0])
 def test_movements_grow_and_closures_stay(said: Generation, intensity: float) -> None:
-    larger = intensified(said, intensity)
+    larger = intensify(said, intensity)
     before, after = said.motion["opening"], larger.motion["opening"]
     assert after.max() > before.max() if intensity > 1 else after.max() < before.max()
     assert after.max() <= 2 * before.max()
-    closed = [each.frame for each in closures(said.motion, said.units)]
+    closed = [each.frame for each in find_closures(said.motion, said.units)]
     assert after[closed] == pytest.approx(before[closed])
     silent = said.motion.time_s < 0.45
     assert larger.motion.values[silent] == pytest.approx(said.motion.values[silent])
@@ -98,7 +105,7 @@ def test_weights_stay_between_0_and_1(said: Generation) -> None:
     time_s = said.motion.time_s
     ramp = np.interp(time_s, [0.5, 0.9, 1.3], [0, 0.8, 0])[:, None]
     weights = Motion(np.hstack([ramp, ramp]), 100.0, (Channel("jawOpen", WEIGHT), Channel("protrusion", WEIGHT)))
-    larger = intensified(replace(said, motion=weights, spread=np.zeros((len(ramp), 2))), 3.0).motion
+    larger = intensify(replace(said, motion=weights, spread=np.zeros((len(ramp), 2))), 3.0).motion
     assert larger.values.min() >= 0
     assert larger.values.max() <= 1
     assert larger["jawOpen"][70] > weights["jawOpen"][70] > 0
@@ -106,9 +113,9 @@ def test_weights_stay_between_0_and_1(said: Generation) -> None:
 
 @pytest.mark.parametrize(("rate_hz", "frames"), [(24.0, 2), (25.0, 3), (100.0, 12)])
 def test_held_poses_last_long_enough_and_close(said: Generation, rate_hz: float, frames: int) -> None:
-    closed_s = closed_times(said)
+    closed_s = find_closed_times(said)
     assert len(closed_s) == 2
-    steps = held(closed_on_grid(said, rate_hz).resampled(rate_hz), frames, closed_s)
+    steps = hold_poses(close_on_frame_grid(said, rate_hz).resampled(rate_hz), frames, closed_s)
     changes = np.flatnonzero(np.abs(np.diff(steps.motion.values, axis=0)).max(axis=1) > 1e-12) + 1
     assert np.diff([0, *changes, len(steps.motion.values)]).min() >= frames
     for time_s in closed_s:

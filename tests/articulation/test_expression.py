@@ -10,10 +10,10 @@ from lipmotion.articulation.expression import (
     is_mood,
     mood_rows,
     mood_table,
-    moods_shown,
+    read_moods,
     with_moods,
 )
-from lipmotion.articulation.liveliness import liveliness
+from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
 from lipmotion.types import Channel, Motion, Prosody
 from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, parse_moods
@@ -59,7 +59,7 @@ def test_from_the_start_a_mood_is_there_at_once_and_others_replace_it():
     assert (moved["mood_angry"] == 1).all()
     again = with_moods(moved, parse_moods("tired:0.5"))
     assert [name for name in again.names if is_mood(name)] == ["mood_tired"]
-    assert {name: curve[0] for name, curve in moods_shown(again).items()} == {"tired": 0.5}
+    assert {name: curve[0] for name, curve in read_moods(again).items()} == {"tired": 0.5}
 
 
 def test_neutral_adds_nothing():
@@ -69,7 +69,7 @@ def test_neutral_adds_nothing():
     assert not action_units(moved)
     mouth = spoken_mouth(moved, units())
     assert not any(getattr(mouth, name).any() for name in EXPRESSED)
-    assert not liveliness(moved.time_s, moved, units(), None).units
+    assert not compute_liveliness(moved.time_s, moved, units(), None).units
 
 
 @pytest.mark.parametrize("mood", MOODS)
@@ -98,7 +98,8 @@ def test_the_head_sinks_in_sadness_unless_it_is_still():
     time_s = np.arange(51) / 25
     sad = with_moods(motion(), parse_moods("sad"))
     plain, moved, still = (
-        liveliness(time_s, of, units(), None, head=head) for of, head in ((motion(), True), (sad, True), (sad, False))
+        compute_liveliness(time_s, of, units(), None, head=head)
+        for of, head in ((motion(), True), (sad, True), (sad, False))
     )
     assert (moved.turn[:, 1] < plain.turn[:, 1] - 0.05).all()
     assert not still.turn.any()
@@ -110,7 +111,7 @@ def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
     sad = with_moods(Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),)), parse_moods("sad"))
     accent = np.arange(6001) % 300 > 200
     voice = Prosody(-40 + 25.0 * accent, 5.0 + 0.3 * accent)
-    still, lively = (liveliness(time_s, sad, units(), voice, brows=brows).unit(1) for brows in (False, True))
+    still, lively = (compute_liveliness(time_s, sad, units(), voice, brows=brows).unit(1) for brows in (False, True))
     usual = mood_table()["sad"][1]
     assert still == pytest.approx(np.full(len(time_s), usual))
     assert 0.03 < lively.std() < 0.2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.articulation.contact import gap_of
+from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.articulation.mouth import (
     LIP_SPEED,
     PURSED_GAP,
@@ -44,7 +44,7 @@ def test_there_is_a_frame_for_every_picture_to_the_end_of_the_motion(fps):
     assert mouth.rate_hz == fps
     assert len(mouth.gap) == len(mouth.teeth) == int(2.0 * fps + 1e-6) + 1
     middle = round(fps)
-    assert mouth.gap[middle] == pytest.approx(float(gap_of(np.array(0.1 * middle / fps))), abs=1e-3)
+    assert mouth.gap[middle] == pytest.approx(float(opening_to_gap(np.array(0.1 * middle / fps))), abs=1e-3)
 
 
 def test_speakers_with_different_rest_poses_move_alike():
@@ -86,7 +86,7 @@ def test_the_tracked_chin_moves_the_jaw_within_reason():
     opening = np.r_[np.zeros(20), np.full(60, 0.1)]
     chin = np.r_[np.full(20, -1.4), np.full(20, -1.475), np.full(20, -1.4), np.full(20, -2.0)]
     jaw = spoken_mouth(motion(opening=opening, y_152=chin), NOTHING_SAID).jaw
-    usual = float(jaw_drop(gap_of(np.array(0.1))))
+    usual = float(jaw_drop(opening_to_gap(np.array(0.1))))
     assert 0.75 * usual < jaw[30] < 1.15 * usual + 0.01
     assert jaw[50] == pytest.approx(0.75 * usual)
     assert jaw[70] == pytest.approx(1.15 * usual + 0.01)

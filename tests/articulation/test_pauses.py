@@ -16,8 +16,8 @@ from lipmotion.articulation.pauses import (
     OPENING_S,
     REST,
     pause_weight,
-    with_pauses,
-    without_short_pauses,
+    rest_in_pauses,
+    share_short_pauses,
 )
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit, VoiceEvent
 from lipmotion.types.voice_event import BREATH, LAUGHTER
@@ -50,7 +50,7 @@ def test_the_mouth_rests_in_pauses_and_at_both_ends_and_goes_on_in_short_ones():
 
 
 def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
-    moved = with_pauses(generation(LINE), REST)
+    moved = rest_in_pauses(generation(LINE), REST)
     opening = moved.motion["opening"]
     for start_s in (0.4, 1.5):
         before = opening[round((start_s - 0.2) * 100) : round((start_s - OPENING_S) * 100)]
@@ -65,30 +65,30 @@ def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
 
 def test_a_phrase_that_begins_with_closed_lips_takes_no_breath():
     units = said((0, 1, "sil"), (1, 1.2, "m"), (1.2, 2.5, "aa"), (2.5, 3.0, "sil"))
-    moved = with_pauses(generation(units, 0.01), REST)
+    moved = rest_in_pauses(generation(units, 0.01), REST)
     assert moved.motion["opening"][80:110].max() <= 0.0101
 
 
 def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
-    assert with_pauses(generation(LINE), NATURAL).motion is not None
+    assert rest_in_pauses(generation(LINE), NATURAL).motion is not None
     for units, style in ((LINE, NATURAL), (said((0, 3, "aa")), REST), (Timeline(()), REST)):
         given = generation(units)
-        assert with_pauses(given, style) is given
+        assert rest_in_pauses(given, style) is given
 
 
 def test_a_pin_in_a_pause_holds():
-    moved = with_pauses(generation(LINE), REST, [1.25])
+    moved = rest_in_pauses(generation(LINE), REST, [1.25])
     assert moved.motion["opening"][125] == pytest.approx(0.1)
     assert moved.motion["opening"][20] <= CLOSED_OPENING
 
 
 def test_all_silence_is_rest():
-    moved = with_pauses(generation(said((0, 3, "sil"))), REST)
+    moved = rest_in_pauses(generation(said((0, 3, "sil"))), REST)
     assert moved.motion["opening"].max() <= CLOSED_OPENING
 
 
 def test_short_pauses_are_shared_by_the_phones_beside_them():
-    shared = without_short_pauses(LINE)
+    shared = share_short_pauses(LINE)
     assert [span.label.phone for span in shared] == ["sil", "aa", "sp", "aa", "eh", "sil"]
     assert shared[3].end_s == pytest.approx(2.075)
     assert shared[4].start_s == pytest.approx(2.075)
@@ -100,21 +100,21 @@ QUIET = said((0, 2.0, "sil"), (2.0, 2.6, "aa"), (2.6, 3.0, "sil"))
 
 
 def test_a_breath_that_is_detected_parts_the_lips_and_they_close_after_it():
-    opening = with_pauses(generation(QUIET), REST, events=[VoiceEvent(0.8, 1.2, BREATH, 1.0)]).motion["opening"]
+    opening = rest_in_pauses(generation(QUIET), REST, events=[VoiceEvent(0.8, 1.2, BREATH, 1.0)]).motion["opening"]
     assert opening[90:111] == pytest.approx(INHALING_GAP)
     assert opening[[60, 140]].max() <= CLOSED_OPENING
     assert np.abs(np.diff(opening[60:140])).max() < 0.01
 
 
 def test_laughter_opens_the_mouth_with_its_calls_and_leaves_speech_alone():
-    moved = with_pauses(generation(QUIET), REST, events=[LAUGH]).motion
+    moved = rest_in_pauses(generation(QUIET), REST, events=[LAUGH]).motion
     opening = moved["opening"]
     assert opening[50] == pytest.approx(LAUGH_GAP, rel=0.02)
     assert opening[100] == pytest.approx(LAUGH_SHARE * LAUGH_GAP, rel=0.02)
     assert opening[100] < opening[70] < opening[50]
     assert opening[160] <= CLOSED_OPENING
     assert opening[210:250] == pytest.approx(0.1)
-    speaking = with_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"]
+    speaking = rest_in_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"]
     assert speaking[45:95] == pytest.approx(0.1)
 
 
@@ -124,7 +124,7 @@ def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
     values[:, 0] = np.where((TIME_S > 2.1) & (TIME_S < 2.5), 0.2, 0.0)
     values[:, 1] = 0.6 - 0.5 * values[:, 0]
     moving = Generation(Motion(values, 100.0, plain.motion.channels), plain.spread, QUIET, plain.trace)
-    moved = with_pauses(moving, REST, events=[LAUGH]).motion
+    moved = rest_in_pauses(moving, REST, events=[LAUGH]).motion
     assert moved["width"][50] == pytest.approx(0.6 - 0.5 * moved["opening"][50], abs=1e-6)
-    natural = with_pauses(moving, NATURAL, events=[LAUGH])
+    natural = rest_in_pauses(moving, NATURAL, events=[LAUGH])
     assert natural is moving

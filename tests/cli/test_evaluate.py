@@ -11,7 +11,7 @@ from lipmotion import Corpus, evaluate, load_model
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.model import VERSION
-from lipmotion_lab.evaluation import figures as evaluation_figures
+from lipmotion_lab.evaluation import evaluate as evaluation_figures
 
 
 @pytest.fixture(autouse=True)

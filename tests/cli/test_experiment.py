@@ -13,13 +13,12 @@ from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion_lab import comparison, folds, learning_curve, runner
-from lipmotion_lab.engines import engine_comparison as text
-from lipmotion_lab.evaluation import figures as evaluation_figures
-from lipmotion_lab.hofer2008 import table1
-from lipmotion_lab.minnis_breen2000 import minnis2000 as minnis_2000
-from lipmotion_lab.report.parts import PARTS
+from lipmotion_lab import engine_comparison as text
+from lipmotion_lab import hofer2008 as table1
+from lipmotion_lab import minnis2000 as minnis_2000
+from lipmotion_lab.evaluation import evaluate as evaluation_figures
+from lipmotion_lab.report.report import PARTS
 from lipmotion_lab.xie_liu2007 import six_systems
-from lipmotion_lab.xie_liu2007 import text as xieliu2007_text
 
 
 @pytest.fixture(autouse=True)
@@ -56,7 +55,7 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(
     monkeypatch.setattr(runner, "QUICK_CLIPS", {"train": 3, "val": 1, "test": 1})
     for module, name in ((table1, "hofer2008"), (six_systems, "xieliu2007"), (minnis_2000, "minnis2000")):
         monkeypatch.setattr(module, name, taking)
-    for module in (table1, xieliu2007_text, minnis_2000):
+    for module in (table1, six_systems, minnis_2000):
         monkeypatch.setattr(module, "table", lambda figures: figures["stamp"]["command"])
     monkeypatch.setitem(PARTS, "folds", replace(PARTS["folds"], run=lambda given: taking(given.corpus)))
     for name in ("hofer2008", "xieliu2007", "minnis2000"):
@@ -109,7 +108,7 @@ def test_xieliu2007_of_some_systems(run: RunCommand, toy_corpus: Corpus, here: P
     done = run("experiment", "xieliu2007", toy_corpus.path, *chosen, "-o", "a.json")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == xieliu2007_text.table(figures)
+    assert "\n".join(done.out) == six_systems.table(figures)
     assert [row["names"] for row in figures["rows"]] == [3]
     assert (figures["order"], figures["tuning"]["tried"]) == ("given", {})
     assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 5)]

@@ -16,7 +16,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion import read_motion
 from lipmotion.cli.main import main
-from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
+from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
 from lipmotion.testing.toy import ToySentence
 from meshes.heads import head, write_glb
 
@@ -100,9 +100,9 @@ def test_a_character_is_opened_once(
 
     def counted(path: Path, **how: object) -> DrivenCharacter:
         opened.append(path)
-        return driven_character(path, **how)  # type: ignore[arg-type]
+        return load_character(path, **how)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("lipmotion.meshes.fitting.driven.driven_character", counted)
+    monkeypatch.setattr("lipmotion.meshes.fitting.driven.load_character", counted)
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
     assert done == (0, ["out/a.json", "out/b.json"], [])
     assert opened == [Path("head.glb")]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.layouts import read_aligned_words, read_grid, words_of_name
+from lipmotion.corpora.layouts import read_aligned_words, read_grid, spell_name
 from lipmotion.errors import InputError
 
 
@@ -20,15 +20,15 @@ def grid(tmp_path: Path) -> Path:
 
 
 def test_file_names_spell_sentences():
-    assert words_of_name("brwa3s") == ("bin", "red", "with", "a", "three", "soon")
-    assert words_of_name("swiz9n") == ("set", "white", "in", "z", "nine", "now")
-    assert words_of_name("lgazzp") == ("lay", "green", "at", "z", "zero", "please")
-    assert words_of_name("pbbc1a") == ("place", "blue", "by", "c", "one", "again")
+    assert spell_name("brwa3s") == ("bin", "red", "with", "a", "three", "soon")
+    assert spell_name("swiz9n") == ("set", "white", "in", "z", "nine", "now")
+    assert spell_name("lgazzp") == ("lay", "green", "at", "z", "zero", "please")
+    assert spell_name("pbbc1a") == ("place", "blue", "by", "c", "one", "again")
 
 
 def test_other_names_do_not():
     for name in ("brwa3", "brww3s", "brwa0s", "xrwa3s", "brwa3s2", "BRWA3S", ""):
-        assert words_of_name(name) is None
+        assert spell_name(name) is None
 
 
 def test_reads_the_layout(grid):
@@ -77,7 +77,7 @@ def test_the_real_thing():
     assert found.problems == {}
     splits = [item.split for item in found.recordings]
     assert {split: splits.count(split) for split in splits} == {"train": 452, "val": 22, "test": 50}
-    assert sum(item.words == words_of_name(item.name) for item in found.recordings) >= 520
+    assert sum(item.words == spell_name(item.name) for item in found.recordings) >= 520
     assert all(item.words is not None and len(item.words) == 6 for item in found.recordings)
 
 

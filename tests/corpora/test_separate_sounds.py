@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.separate_sounds import read_offsets, with_separate_sounds
+from lipmotion.corpora.separate_sounds import add_separate_sounds, read_offsets
 from lipmotion.errors import CorpusError, InputError
 
 
@@ -21,7 +21,7 @@ def studio(tmp_path: Path) -> Path:
 
 def test_a_recorder_belongs_to_its_recording(studio):
     (studio / "offsets.csv").write_text("name,offset_ms\nanna/c, -12.5\n\ngone,3\n")
-    found = with_separate_sounds(discover(studio), studio, 0.1)
+    found = add_separate_sounds(discover(studio), studio, 0.1)
     assert [(item.name, item.recorder, item.offset_s) for item in found.recordings] == [
         ("a", studio / "a.recorder.flac", 0.1),
         ("anna-c", None, -0.0125),
@@ -32,14 +32,14 @@ def test_a_recorder_belongs_to_its_recording(studio):
 
 def test_one_video_of_many_has_its_own_row(studio):
     (studio / "offsets.csv").write_text("name,offset_ms\na,7\nothers,3\n")
-    found = with_separate_sounds(discover(studio), studio, is_whole=False)
+    found = add_separate_sounds(discover(studio), studio, is_whole=False)
     assert found.recordings[0].offset_s == pytest.approx(0.007)
     assert "others" not in found.problems
 
 
 def test_without_them_nothing_changes(studio):
     (studio / "a.recorder.flac").unlink()
-    found = with_separate_sounds(discover(studio), studio)
+    found = add_separate_sounds(discover(studio), studio)
     assert {(item.recorder, item.offset_s) for item in found.recordings} == {(None, None)}
 
 
@@ -64,4 +64,4 @@ def test_what_is_wrong_with_a_table_is_said(tmp_path):
 
 def test_an_offset_of_a_day_is_refused(studio):
     with pytest.raises(InputError, match="required within"):
-        with_separate_sounds(discover(studio), studio, 86_400.0)
+        add_separate_sounds(discover(studio), studio, 86_400.0)

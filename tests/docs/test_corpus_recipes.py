@@ -24,7 +24,7 @@ from lipmotion.pipeline.training import train as train_module
 from lipmotion.testing import toy_utterances
 from lipmotion.types import Track, Utterance
 from lipmotion_faces.corpus import prepare as prepare_module
-from lipmotion_lab.evaluation import figures as evaluation_figures
+from lipmotion_lab.evaluation import evaluate as evaluation_figures
 
 FOLDER = Path(__file__).parents[2] / "recipes"
 INDEX = FOLDER / "README.md"

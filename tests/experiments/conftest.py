@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion_lab import comparison
-from lipmotion_lab.evaluation import figures as evaluation_figures
+from lipmotion_lab.evaluation import evaluate as evaluation_figures
 
 
 @pytest.fixture(scope="package", autouse=True)

@@ -16,8 +16,7 @@ from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.testing.examples import speech, timeline
 from lipmotion.types import Progress
-from lipmotion_lab.engines.engine_comparison import engines, table
-from lipmotion_lab.engines.models import ENGINES_COMPARED
+from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines, table
 from lipmotion_lab.runner import ExperimentSettings
 
 LONG = pytest.mark.long

@@ -14,11 +14,11 @@ from experiments.copies import copied, renamed
 from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.closures import closings
+from lipmotion.measures.closures import find_closings
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
-from lipmotion_lab.evaluation.figures import BILABIAL
-from lipmotion_lab.evaluation.held_out import ComparedClip, compared_clips, held_out_recordings
+from lipmotion_lab.evaluation.evaluate import BILABIAL
+from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
 from lipmotion_lab.folds import folds, table
 from lipmotion_lab.runner import ExperimentSettings
 
@@ -30,7 +30,6 @@ OPENING_ROW = (
     *("score", "precision", "timing_ms", "closings", "generated_closings", "recall_p_b_m", "p_b_m"),
     *("acc", "nrmse", "global_variance"),
 )
-LIPS = {"false_per_minute": 1.0, "original_per_minute": 2.0}
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +47,8 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
         model = train(
             toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=PHONE_MODELS
         )[0]
-        found = held_out_recordings(
-            toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out))
-        )
-        made += compared_clips(found, "with transcript", model.engine, model.learned)
+        found = load_held_out(toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out)))
+        made += generate_clips(found, "with transcript", model.engine, model.learned)
     return made
 
 
@@ -79,7 +76,7 @@ def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand:
 @pytest.mark.long
 def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
-    pairs = [(closings(c.generated[:, 0], under), closings(c.original[:, 0], under)) for c in by_hand]
+    pairs = [(find_closings(c.generated[:, 0], under), find_closings(c.original[:, 0], under)) for c in by_hand]
     hits = [any(abs(int(g) - int(o)) <= 2 for g in made) for made, recorded_ones in pairs for o in recorded_ones]
     good = [any(abs(int(g) - int(o)) <= 2 for o in recorded_ones) for made, recorded_ones in pairs for g in made]
     assert (row["closings"], row["generated_closings"]) == (len(hits), len(good))
@@ -102,7 +99,7 @@ def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[Comp
             wanted += bool((clip.original[near, 0] < under).any())
             hit += bool((clip.original[near, 0] < under).any() and (clip.generated[near, 0] < under).any())
         for side, curve in enumerate((clip.generated[:, 0], clip.original[:, 0])):
-            elsewhere[side] += int((~inside[closings(curve, under)]).sum())
+            elsewhere[side] += int((~inside[find_closings(curve, under)]).sum())
     assert wanted > 10
     assert (row["p_b_m"], row["recall_p_b_m"]) == (wanted, pytest.approx(100 * hit / wanted))
     assert row["false_per_minute"] == pytest.approx(elsewhere[0] / speech_s * 60)
@@ -141,14 +138,14 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
         return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1, utterances=[]))
 
     monkeypatch.setattr(module, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", lambda clips, *_: {"clips": clips, "closures_p_b_m": LIPS})
-    monkeypatch.setattr(module, "opening_row", lambda figures: {"clips": sorted(figures["clips"])})
+    monkeypatch.setattr(module, "figures_of", lambda clips, *_: sorted(clips))
+    monkeypatch.setattr(module, "opening_row_with_rates", lambda figures: {"clips": figures})
     figures = folds(toy_corpus, count=3)
     assert sorted(name for held_out in cut for name in held_out) == sorted(toy_corpus.names("train"))
     assert [len(held_out) for held_out in cut] == [3, 3, 2]
     assert (figures["trained_on"], figures["closed_under"]) == ([5, 5, 6], 0.1)
     wanted = [f"{name} audio only" for name in sorted(toy_corpus.names("train"))]
-    assert figures["conditions"] == {"audio only": {"clips": wanted} | LIPS}
+    assert figures["conditions"] == {"audio only": {"clips": wanted}}
     first = cut[:]
     cut.clear()
     folds(toy_corpus, count=3, settings=ExperimentSettings(seed=1))
@@ -172,13 +169,12 @@ def test_finished_parts_are_not_generated_again(
     def run(work: Path | None) -> dict[str, Any]:
         return folds(toy_corpus, count=2, by_speaker=False, work=work)
 
-    def told(clips: Sequence[ComparedClip], *_: object) -> dict[str, Any]:
-        parts = [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
-        return {"clips": parts, "closures_p_b_m": LIPS}
+    def as_lists(clips: Sequence[ComparedClip], *_: object) -> list[Any]:
+        return [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
 
     monkeypatch.setattr(module, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", told)
-    monkeypatch.setattr(module, "opening_row", lambda figures: {"clips": figures["clips"]})
+    monkeypatch.setattr(module, "figures_of", as_lists)
+    monkeypatch.setattr(module, "opening_row_with_rates", lambda figures: {"clips": figures})
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path)
     again = run(tmp_path)
@@ -208,8 +204,9 @@ def test_by_speaker_everybody_is_a_stranger_once(
         return SimpleNamespace(used=names, clips={CONDITIONS[0]: clips}, recordings=recordings)
 
     monkeypatch.setattr(module, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", lambda *_: {"closures_p_b_m": LIPS})
-    monkeypatch.setattr(module, "opening_row", lambda _: dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6]})
+    row = dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6], "false_per_minute": 1.0, "original_per_minute": 2.0}
+    monkeypatch.setattr(module, "figures_of", lambda *_: {})
+    monkeypatch.setattr(module, "opening_row_with_rates", lambda _: row)
     figures = folds(corpus, by_speaker=True)
     assert sorted(map(sorted, left_out)) == [[""], ["anna"], ["ben"], ["eve"]]
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(

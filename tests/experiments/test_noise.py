@@ -10,17 +10,17 @@ from lipmotion.errors import InputError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.noise import noisy_audio
-from lipmotion_lab.evaluation.held_out import HeldOutRecordings, held_out_recordings
-from lipmotion_lab.noise import LONGEST_S, read_talkers, recordings_in_noise
+from lipmotion_lab.evaluation.held_out import HeldOutRecordings, load_held_out
+from lipmotion_lab.noise import LONGEST_S, add_noise, read_talkers
 
 
 @pytest.fixture(scope="module")
 def clean(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
-    return held_out_recordings(toy_corpus, Recogniser(toy_model.phones, "own"), selection=Selection("test"))
+    return load_held_out(toy_corpus, Recogniser(toy_model.phones, "own"), selection=Selection("test"))
 
 
 def test_faces_stay_and_the_sound_is_noisy(clean: HeldOutRecordings) -> None:
-    noisy_recordings = recordings_in_noise(clean, "white", 10, seed=4)
+    noisy_recordings = add_noise(clean, "white", 10, seed=4)
     assert list(noisy_recordings.conditions) == ["audio only"]
     assert noisy_recordings.reference is clean.reference
     for number, (one, before) in enumerate(zip(noisy_recordings.utterances, clean.utterances, strict=True)):
@@ -32,7 +32,7 @@ def test_faces_stay_and_the_sound_is_noisy(clean: HeldOutRecordings) -> None:
 
 
 def test_every_clip_has_noise_of_its_own(clean: HeldOutRecordings) -> None:
-    noisy_utterances = recordings_in_noise(clean, "white", 0).utterances
+    noisy_utterances = add_noise(clean, "white", 0).utterances
     one, other = (
         noisy.audio.samples - before.audio.samples
         for noisy, before in zip(noisy_utterances, clean.utterances, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, inset_box, with_inset
+from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, add_inset, inset_box
 from lipmotion_faces.video.synthetic_mark import mark_frames
 
 
@@ -23,7 +23,7 @@ def drawn(frame: np.ndarray, made: np.ndarray) -> tuple[slice, slice]:
 @pytest.mark.parametrize("frame_size", [(120, 160), (480, 270)])
 def test_it_lies_in_the_lower_right_corner(size: tuple[int, int], frame_size: tuple[int, int]) -> None:
     (frame,), picture = frames(1, *frame_size), np.full((*size, 3), 130, np.uint8)
-    (made,) = with_inset([frame], [picture])
+    (made,) = add_inset([frame], [picture])
     assert (made.shape, made.dtype) == (frame.shape, np.uint8)
     rows, columns = drawn(frame, made)
     assert inset_box(frame_size, size) == (columns.start, rows.start, columns.stop, rows.stop)
@@ -43,7 +43,7 @@ def test_the_picture_keeps_its_form_and_its_place() -> None:
     picture[:, 36:, 1] = 200
     picture[:28, :, 0] = 200
     (frame,) = frames(1, 288, 360)
-    (made,) = with_inset([frame], [picture])
+    (made,) = add_inset([frame], [picture])
     rows, columns = drawn(frame, made)
     inner = made[rows, columns][2:-2, 2:-2].astype(int)
     height, width = inner.shape[:2]
@@ -54,23 +54,23 @@ def test_the_picture_keeps_its_form_and_its_place() -> None:
     assert inner[-4, -4].tolist() == [0, 200, 0]
     middle = np.abs(np.diff(inner[-4, :, 1])).argmax()
     assert middle == pytest.approx(width / 2, abs=1.5)
-    (turned,) = with_inset([frame], [picture[::-1, ::-1]])
+    (turned,) = add_inset([frame], [picture[::-1, ::-1]])
     assert np.abs(turned[rows, columns].astype(int) - made[rows, columns][::-1, ::-1]).max() <= 1
 
 
 def test_every_frame_has_its_own_picture_and_is_not_changed() -> None:
     films, pictures = frames(5), [np.full((56, 72, 3), 100 + n, np.uint8) for n in range(4)]
     before = [frame.copy() for frame in films]
-    made = list(with_inset(films, pictures))
+    made = list(add_inset(films, pictures))
     assert len(made) == 4  # as many as there are of both
     assert [frame[-15, -15, 0] for frame in made] == [100, 101, 102, 103]
     assert all(np.array_equal(frame, old) for frame, old in zip(films, before, strict=True))
     assert [frame[0, 0, 0] for frame in made] == [0, 10, 20, 30]
-    assert list(with_inset([], pictures)) == []
+    assert list(add_inset([], pictures)) == []
 
 
 def test_a_label_leaves_the_inset_free() -> None:
-    (made,) = with_inset(frames(1, 288, 360), [np.full((56, 72, 3), 130, np.uint8)])
+    (made,) = add_inset(frames(1, 288, 360), [np.full((56, 72, 3), 130, np.uint8)])
     left, top, right, bottom = inset_box((288, 360), (56, 72))
     (marked,) = mark_frames([made], (left, top, right, bottom))
     assert np.array_equal(marked[top:bottom, left:right], made[top:bottom, left:right])

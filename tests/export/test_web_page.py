@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from lipmotion.formats.web_page import SHARED_COLOURS, Html, coloured, element, joined, whole_page
+from lipmotion.formats.web_page import SHARED_COLOURS, Html, colour_code, element, joined, whole_page
 
 
 def test_every_text_is_escaped_and_html_is_not() -> None:
@@ -40,5 +40,5 @@ def test_a_page_loads_nothing_from_elsewhere() -> None:
 
 
 def test_all_pages_have_the_same_colours() -> None:
-    light, dark = coloured(SHARED_COLOURS).split("prefers-color-scheme: dark")
+    light, dark = colour_code(SHARED_COLOURS).split("prefers-color-scheme: dark")
     assert set(re.findall(r"--[\w-]+(?=:)", light)) == set(re.findall(r"--[\w-]+(?=:)", dark))

@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from lipmotion.articulation.contact import LARGEST_GAP
 from lipmotion.articulation.mouth import TUCKED_GAP, jaw_drop
 from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
-from lipmotion_faces.portrait.geometry import TEETH_EDGE, lip_outlines, mouth_interior
-from lipmotion_faces.portrait.pose import MouthPose
+from lipmotion_faces.portrait.geometry import TEETH_EDGE, MouthPose, lip_outlines, mouth_interior
 
 X = np.linspace(-0.5, 0.5, 1001)
 MIDDLE = 500

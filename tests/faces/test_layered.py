@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion_faces import Staging, face_named, staged_face
-from lipmotion_faces.portrait.layered import MOUTHS, chosen_mouths, painted
-from lipmotion_faces.portrait.pose import MouthPose
-from lipmotion_faces.portrait.svg_document import drawing_of
+from lipmotion_faces.portrait.geometry import MouthPose
+from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths, paint_shapes
+from lipmotion_faces.portrait.svg_document import parse_drawing
 from lipmotion_faces.testing import check_face
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robot.svg"
@@ -26,8 +26,8 @@ def svg(inside: str, box: str = "0 0 40 40") -> bytes:
 
 def picture(inside: str, size: int = 40) -> np.ndarray:
     """Return the cover of shapes [shape=(size, size)]."""
-    shapes = [(shape, (0.0, 0.0)) for _, shape in drawing_of(svg(inside)).shapes]
-    return painted(shapes, WHOLE, size, size)[..., 3]
+    shapes = [(shape, (0.0, 0.0)) for _, shape in parse_drawing(svg(inside)).shapes]
+    return paint_shapes(shapes, WHOLE, size, size)[..., 3]
 
 
 @pytest.mark.long
@@ -63,8 +63,8 @@ def test_shapes_cover_what_they_should(shape, area):
 
 
 def test_colours_and_order():
-    drawing = drawing_of(svg('<rect width="40" height="40" fill="#f00"/><rect width="20" height="40" fill="blue"/>'))
-    layer = painted([(shape, (0.0, 0.0)) for _, shape in drawing.shapes], WHOLE, 40, 40)
+    drawing = parse_drawing(svg('<rect width="40" height="40" fill="#f00"/><rect width="20" height="40" fill="blue"/>'))
+    layer = paint_shapes([(shape, (0.0, 0.0)) for _, shape in drawing.shapes], WHOLE, 40, 40)
     assert layer[20, 10].tolist() == [0, 0, 255, 1]
     assert layer[20, 30].tolist() == [255, 0, 0, 1]
 
@@ -103,7 +103,7 @@ def test_colours_and_order():
 )
 def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
     with pytest.raises(InputError, match=words):
-        drawing_of(svg(inside))
+        parse_drawing(svg(inside))
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
 )  # fmt: skip
 def test_what_is_no_drawing_is_refused(data):
     with pytest.raises(InputError):
-        drawing_of(data)
+        parse_drawing(data)
 
 
 def test_a_drawing_is_utf_8_whatever_it_declares():
@@ -125,14 +125,14 @@ def test_a_drawing_is_utf_8_whatever_it_declares():
     plain = svg(f'<g id="é">{MOUTH_ONLY}</g>')
     doctype = b'<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">'
     for before in (b"", b"\xef\xbb\xbf", b'<?xml version="1.0" encoding="iso-8859-1"?>', doctype):
-        assert drawing_of(before + plain).shapes[0][0] == ("", "é", "mouth-rest")
+        assert parse_drawing(before + plain).shapes[0][0] == ("", "é", "mouth-rest")
     for coding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp037"):
         for text in (entities, plain.decode()):
             declared = f'<?xml version="1.0" encoding="{coding}"?>{text}'
             with pytest.raises(InputError, match=r"not text in UTF-8|not an SVG|entities"):
-                drawing_of(declared.encode(coding))
+                parse_drawing(declared.encode(coding))
     with pytest.raises(InputError, match="compressed"):
-        drawing_of(gzip.compress(plain))
+        parse_drawing(gzip.compress(plain))
 
 
 def test_a_drawing_has_limits_as_a_whole(monkeypatch):
@@ -148,22 +148,22 @@ def test_a_drawing_has_limits_as_a_whole(monkeypatch):
         f'<path d="{"M" * 2_000_000}"/>': "ends within",
     }.items():
         with pytest.raises(InputError, match=words):
-            drawing_of(svg(inside))
+            parse_drawing(svg(inside))
     with pytest.raises(InputError, match="not an SVG"):
-        drawing_of(b"<!DOCTYPE svg " * 300_000)
+        parse_drawing(b"<!DOCTYPE svg " * 300_000)
     monkeypatch.setattr("lipmotion_faces.portrait.svg_document.MOST_POINTS", 120)
     arcs = '<path d="M0 0a1 1 0 011 1"/>'
-    assert len(drawing_of(svg(arcs * 2)).shapes) == 2
+    assert len(parse_drawing(svg(arcs * 2)).shapes) == 2
     for inside in (arcs * 3, arcs + '<path d="M0 0' + "z" * 80 + '"/>', arcs * 2 + '<circle r="1"/>'):
         with pytest.raises(InputError, match="points in all its lines"):
-            drawing_of(svg(inside))
+            parse_drawing(svg(inside))
 
 
 @settings(max_examples=150)
 @given(st.text(alphabet="MmLlHhVvCcSsQqTtAaZz0123456789.,- e", max_size=40))
 def test_any_path_is_read_or_refused(path):
     try:
-        drawing = drawing_of(svg(f'<path d="{path}"/>'))
+        drawing = parse_drawing(svg(f'<path d="{path}"/>'))
     except InputError:
         return
     for _, shape in drawing.shapes:
@@ -192,20 +192,20 @@ def test_sounds_choose_their_mouths():
     for name in ("fv", "aa", "oo", "th", "ee", "mbp"):
         k = MOUTHS[name]
         poses += [MouthPose(k.gap, k.width, tongue=k.tongue, tuck=k.tuck, protrusion=k.protrusion, teeth=k.teeth)] * 5
-    shown = chosen_mouths(poses, list(MOUTHS), 25.0)
+    shown = choose_mouths(poses, list(MOUTHS), 25.0)
     assert shown[2::5] == ["rest", "fv", "aa", "oo", "th", "ee", "mbp"]
 
 
 def test_a_mouth_that_is_missing_is_replaced_and_closures_are_never_skipped():
     poses = [MouthPose(0.2)] * 10 + [MouthPose(0.0, press=1.0)] + [MouthPose(0.2)] * 10
-    assert chosen_mouths(poses, ["rest", "eh"], 60.0) == ["eh"] * 10 + ["rest"] + ["eh"] * 10
+    assert choose_mouths(poses, ["rest", "eh"], 60.0) == ["eh"] * 10 + ["rest"] + ["eh"] * 10
 
 
 def test_mouths_do_not_flicker():
     rng = np.random.default_rng(0)
     poses = [MouthPose(float(gap)) for gap in 0.16 + 0.02 * rng.standard_normal(100)]
-    shown = chosen_mouths(poses, list(MOUTHS), 25.0)
-    alone = [chosen_mouths([pose], list(MOUTHS), 25.0)[0] for pose in poses]
+    shown = choose_mouths(poses, list(MOUTHS), 25.0)
+    alone = [choose_mouths([pose], list(MOUTHS), 25.0)[0] for pose in poses]
 
     def changes(names):
         return sum(one != other for one, other in pairwise(names))

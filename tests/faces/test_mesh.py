@@ -9,7 +9,7 @@ import pytest
 
 from lipmotion import Staging
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
+from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
 from lipmotion.meshes.model.bones import HEAD, NECK, Bone
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
 from lipmotion_faces.mesh import MeshFace, MeshStage
@@ -26,7 +26,7 @@ def character(tmp_path_factory) -> DrivenCharacter:
     red = Material("lips", (0.8, 0.2, 0.2))
     parts = (MeshPart("face", 0, mesh.parts[0].stop, red), *mesh.parts[1:])
     write_glb(path, Mesh(mesh.vertices, mesh.triangles, parts, mesh.shapes))
-    return driven_character(path)
+    return load_character(path)
 
 
 def drawn(character, staging: Staging) -> list[np.ndarray]:

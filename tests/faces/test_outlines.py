@@ -1,14 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion_faces.portrait.outlines import (
-    STEPS,
-    closed_curve,
-    open_curve,
-    path_points,
-    stroke,
-    symmetric,
-)
+from lipmotion_faces.portrait.design import STEPS, closed_curve, mirror_curve, open_curve, path_points, stroke
 
 PATH = "0 0, 1 0.5, 2 -0.5, 3 0"
 
@@ -30,7 +23,7 @@ def test_a_straight_path_stays_straight():
 
 
 def test_symmetric_outlines_mirror_themselves():
-    outline = symmetric("0 -1, 1 0, 0.5 0.5, 0 1")
+    outline = mirror_curve("0 -1, 1 0, 0.5 0.5, 0 1")
     mirrored = outline * (-1, 1)
     away = np.abs(outline[:, None] - mirrored[None]).sum(axis=2).min(axis=1)
     assert away.max() < 1e-9

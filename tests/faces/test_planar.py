@@ -9,10 +9,10 @@ from lipmotion.types import Channel, Motion, Timeline
 from lipmotion_faces import base
 from lipmotion_faces.base import DrawsPlanes, Face
 from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
+from lipmotion_faces.portrait.geometry import MouthPose
 from lipmotion_faces.portrait.movement import HeadPlacement
 from lipmotion_faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
-from lipmotion_faces.portrait.pose import MouthPose
 from lipmotion_faces.registry import staged_face
 
 MOTION = Motion(np.linspace(0, 0.2, 30)[:, None], 25.0, (Channel("opening"),))

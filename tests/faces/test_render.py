@@ -7,10 +7,10 @@ from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion_faces import FACES, Staging, staged_face
 from lipmotion_faces.portrait.characters import WOMAN
+from lipmotion_faces.portrait.geometry import MouthPose
+from lipmotion_faces.portrait.layer import View
 from lipmotion_faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, grid
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
-from lipmotion_faces.portrait.pose import MouthPose
-from lipmotion_faces.portrait.view import View
 from lipmotion_faces.testing import check_face
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())
@@ -133,10 +133,7 @@ def test_a_transparent_background_shows_through_around_the_figure_only(face):
 
 
 def test_unusable_settings_are_refused():
-    unusable: dict[str, tuple[Any, ...]] = {
-        "size": (62, 129, 5000),
-        "background": ("blue", "#12345"),
-    }
+    unusable: dict[str, tuple[Any, ...]] = {"size": (62, 129, 5000), "background": ("blue", "#12345")}
     for name, values in unusable.items():
         for value in values:
             with pytest.raises(InputError, match="required"):

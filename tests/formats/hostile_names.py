@@ -23,7 +23,7 @@ from lipmotion.formats.base import write_motion
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.formats.label_files import write_labels
 from lipmotion.formats.textgrid import parse_interval_tiers
-from lipmotion.meshes.files.gltf_container import read_gltf_document
+from lipmotion.meshes.files.gltf_document import read_gltf_document
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart

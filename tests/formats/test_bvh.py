@@ -14,7 +14,7 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.formats import write_motion
 from lipmotion.formats.bvh import CENTIMETRES
-from lipmotion.meshes.fitting.point_motion import point_motion
+from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 FRAMES = 60
@@ -53,7 +53,7 @@ def written(talking: Generation, tmp_path: Path) -> Path:
 
 def expected(talking: Generation) -> np.ndarray:
     """Return the places of the points in centimetres [shape=(T, 52, 3)]."""
-    moved = point_motion(talking.motion, talking.units).displacements
+    moved = move_points(talking.motion, talking.units).displacements
     return (mouth_template().places + moved) * CENTIMETRES
 
 

@@ -15,7 +15,7 @@ import pytest
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion, write_motion
 from lipmotion.formats.c3d import BLOCK, C3dFile, read_c3d, write_c3d
-from lipmotion.formats.markers import MILLIMETRES, in_head_frame
+from lipmotion.formats.markers import MILLIMETRES, to_head_frame
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
 RNG = np.random.default_rng(11)
@@ -145,7 +145,7 @@ def test_axes_with_z_up_are_turned(tmp_path):
 
 def test_a_face_that_looks_the_other_way_is_turned():
     still = {name.split(":")[-1]: place for name, place in face().items()}
-    found = in_head_frame({name: place * [-90.0, 90, -90] for name, place in still.items()}, "mm")
+    found = to_head_frame({name: place * [-90.0, 90, -90] for name, place in still.items()}, "mm")
     np.testing.assert_allclose(found["LIP_13"], still["LIP_13"], atol=1e-9)
 
 

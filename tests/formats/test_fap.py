@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion, write_motion
-from lipmotion.meshes.fitting.facial_animation import FAP, PARAMETERS
+from lipmotion.formats.fap import FAP, PARAMETERS
 from lipmotion.types import Channel, Generation, Motion, StateTrace, Timeline
 
 NONE = ["0"] * 68

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import LARGEST_LABELS, labels_beside, read_labels
+from lipmotion.formats.label_files import LARGEST_LABELS, find_labels, read_labels
 from lipmotion.formats.label_tiers import MOST_LABELS
 from lipmotion.units import PHONES, find_phone
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
@@ -164,21 +164,21 @@ def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):
     (tmp_path / "a.lab").touch()
     monkeypatch.setattr(Path, "read_bytes", refused)
     with pytest.raises(InputError, match=r"a\.lab: not a readable label \(Permission denied"):
-        labels_beside(tmp_path / "a.mp4")
+        find_labels(tmp_path / "a.mp4")
 
 
 def test_files_beside_a_recording(tmp_path):
     recording = tmp_path / "a.mp4"
-    assert labels_beside(recording).words is None
+    assert find_labels(recording).words is None
     (tmp_path / "a.lab").write_text("0 1000000 t\n1000000 2000000 uw\n")
-    assert labels_beside(recording).words is None
+    assert find_labels(recording).words is None
     (tmp_path / "a.txt").write_text("Two.")
-    found = labels_beside(recording)
+    found = find_labels(recording)
     assert found.words == ("two",)
     assert [phone for *_, phone in rows(found)] == ["t", "uw"]
     (tmp_path / "a.TextGrid").write_text('"ooTextFile" "TextGrid" 0 1 <exists> 1 "IntervalTier" "w" 0 1 1 0 1 "too"')
-    assert labels_beside(recording).words == ("two",)  # plain text before labels
-    assert labels_beside(recording, ignored=frozenset({tmp_path / "a.txt"})).words == ("too",)
+    assert find_labels(recording).words == ("two",)  # plain text before labels
+    assert find_labels(recording, ignored=frozenset({tmp_path / "a.txt"})).words == ("too",)
 
 
 @pytest.mark.recordings
@@ -189,7 +189,7 @@ def test_real_ones(recordings: Path):
     assert len(phones) == 40
     assert [phone for *_, phone in phones][:8] == ["sil", "hh", "iy", "t", "er", "n", "d", "sh"]
     assert phones[0][:2] == (0, 0.13)
-    found = labels_beside(folder / "sense_and_sensibility_01_austen_64kb-0880.wav")
+    found = find_labels(folder / "sense_and_sensibility_01_austen_64kb-0880.wav")
     assert found.words == ("he", "was", "not", "an", "ill", "disposed", "young", "man")
 
 

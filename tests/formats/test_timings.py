@@ -24,7 +24,7 @@ from formats.timing_samples import (
     lines,
 )
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import holds_timings, labels_beside, read_labels, read_phones, read_transcript
+from lipmotion.formats.label_files import find_labels, holds_timings, read_labels, read_phones, read_transcript
 from lipmotion.pipeline.understand.read_request import read_units
 from lipmotion.types import TimedTranscript
 
@@ -120,7 +120,7 @@ def test_a_textgrid_in_ipa(file: Any) -> None:
 
 def test_beside_a_recording_and_other_suffixes(file: Any, tmp_path: Path) -> None:
     file(POLLY, "take.json")
-    assert labels_beside(tmp_path / "take.wav").words == ("mama", "bites")
+    assert find_labels(tmp_path / "take.wav").words == ("mama", "bites")
     assert phones(file(POLLY, "take.marks")) == phones(file(POLLY, "take.jsonl")) == phones(tmp_path / "take.json")
     assert phones(file(MFA_CSV, "take.csv")) == phones(file(MFA_CSV, "b.txt"))
     assert read_labels(file(CARTESIA)).phones is not None

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import labels_beside, read_transcript
+from lipmotion.formats.label_files import find_labels, read_transcript
 from lipmotion.types import TimedTranscript
 
 Lines = list[tuple[float | None, float | None, str]]
@@ -353,21 +353,21 @@ def test_plain_text_stays_as_it_is(tmp_path: Path) -> None:
 def test_they_are_found_beside_recordings(tmp_path: Path, name: str) -> None:
     other = {"ctm": OF_WORDS["CTM"], "json": OF_LINES["Whisper"], "ass": ASS}
     (tmp_path / name).write_text(other.get(name.rpartition(".")[2], SRT))
-    found = labels_beside(tmp_path / "take.mp4")
+    found = find_labels(tmp_path / "take.mp4")
     assert found.words == ("hello", "there", "how", "are", "you")
     assert found.transcript is not None
     assert found.transcript.lines[0].start_s == pytest.approx(1.0)
     (tmp_path / "take.txt").write_text("By hand")
-    assert labels_beside(tmp_path / "take.mp4").words == ("by", "hand")
+    assert find_labels(tmp_path / "take.mp4").words == ("by", "hand")
 
 
 def test_json_of_another_kind_beside_a_recording_is_passed_over(tmp_path: Path) -> None:
     for content in ('{"format": "lipmotion-motion", "channels": [], "words": []}', '{"name": "take"}', "7"):
         (tmp_path / "take.json").write_text(content)
-        assert labels_beside(tmp_path / "take.mp4").words is None
+        assert find_labels(tmp_path / "take.mp4").words is None
     (tmp_path / "take.json").write_text('{"segments": [')
     with pytest.raises(InputError, match=r"take\.json: line 1: damaged JSON"):
-        labels_beside(tmp_path / "take.mp4")
+        find_labels(tmp_path / "take.mp4")
 
 
 times = st.integers(0, 3_600_000).map(lambda ms: ms / 1000)
@@ -428,6 +428,6 @@ def test_texts_with_times_of_day_or_arrows_are_texts(tmp_path: Path) -> None:
 
 def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "take1.txt").write_text(" \n")
-    assert labels_beside(tmp_path / "take1.mp4").words is None
+    assert find_labels(tmp_path / "take1.mp4").words is None
     (text,) = caplog.messages
     assert "take1.txt: is empty: it counts as no transcript" in text

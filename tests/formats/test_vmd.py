@@ -15,7 +15,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.base import write_motion
 from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
-from lipmotion.meshes.fitting.eyes_and_brows import gaze_weights, given_gaze
+from lipmotion.meshes.fitting.eyes_and_brows import gaze_to_weights, weights_to_gaze
 from lipmotion.pipeline.outputs.motion_files import check_rate
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
@@ -73,7 +73,7 @@ def test_what_is_written_is_read(path: Path, generation: Generation) -> None:
 
 def test_eyes_turn_in_one_bone(tmp_path: Path, generation: Generation) -> None:
     gaze = np.stack([0.3 * np.sin(np.arange(FRAMES)), 0.1 * np.cos(np.arange(FRAMES))], axis=1)
-    looks = gaze_weights(gaze)
+    looks = gaze_to_weights(gaze)
     values = np.concatenate([generation.motion.values, np.stack(list(looks.values()), axis=1)], axis=1)
     channels = (*generation.motion.channels, *(Channel(name, WEIGHT) for name in looks))
     write_motion(
@@ -83,7 +83,7 @@ def test_eyes_turn_in_one_bone(tmp_path: Path, generation: Generation) -> None:
         model={},
     )
     motion, _ = read_motion(tmp_path / "a.vmd")
-    assert given_gaze({name: motion[name].astype(np.float64) for name in looks}) == pytest.approx(gaze, abs=1e-6)
+    assert weights_to_gaze({name: motion[name].astype(np.float64) for name in looks}) == pytest.approx(gaze, abs=1e-6)
     assert motion["headYaw"] == pytest.approx(generation.motion["headYaw"], abs=1e-6)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.articulation.delivery import best_holds
+from lipmotion.articulation.delivery import choose_holds
 
 
 def error(rows: NDArray[np.float64], borders: list[int], fixed: list[int]) -> float:
@@ -39,7 +39,7 @@ def test_no_division_is_nearer() -> None:
         hold = int(rng.integers(1, 6))
         rows = rng.normal(size=(int(rng.integers(2 * hold, 30)), 2)).cumsum(axis=0)
         fixed = sorted(rng.choice(len(rows), int(rng.integers(0, 3)), replace=False).tolist())
-        borders = best_holds(rows, hold, fixed)
+        borders = choose_holds(rows, hold, fixed)
         assert borders[0] == 0
         assert borders[-1] == len(rows)
         assert np.diff(borders).min() >= hold
@@ -48,11 +48,11 @@ def test_no_division_is_nearer() -> None:
 
 def test_a_curve_of_steps_is_found_again() -> None:
     rows = np.repeat([0.0, 3.0, 1.0, 2.0], [5, 4, 6, 7])[:, None]
-    borders = best_holds(rows, 4)
+    borders = choose_holds(rows, 4)
     assert {5, 9, 15} <= set(borders)
     assert error(rows, borders, []) == pytest.approx(0, abs=1e-12)
 
 
 def test_few_frames_are_one_pose() -> None:
     for frames, borders in ((0, [0]), (1, [0, 1]), (7, [0, 7])):
-        assert best_holds(np.arange(frames, dtype=float)[:, None], 4) == borders
+        assert choose_holds(np.arange(frames, dtype=float)[:, None], 4) == borders

@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 from lipmotion.measures.closures import (
     clip_closure_counts,
     closed_threshold,
-    closings,
     closure_figures,
+    count_matches,
+    find_closings,
     match_closings,
-    matched_count,
     phone_closures,
 )
 from oracles import matching
@@ -32,9 +32,9 @@ def test_threshold_is_a_tenth_of_the_95th_percentile_of_all_frames():
 
 def test_a_closing_is_the_first_closed_frame_after_an_open_one():
     curve = np.array([0.0, 0.0, 1.0, 0.05, 0.0, 1.0, 1.0, 0.0])
-    assert closings(curve, 0.1).tolist() == [3, 7]  # closed from the start is no closing
-    assert closings(curve, 0.05).tolist() == [4, 7]  # the threshold itself is open
-    assert closings(curve[:1], 0.1).tolist() == []
+    assert find_closings(curve, 0.1).tolist() == [3, 7]  # closed from the start is no closing
+    assert find_closings(curve, 0.05).tolist() == [4, 7]  # the threshold itself is open
+    assert find_closings(curve[:1], 0.1).tolist() == []
 
 
 @given(generated=FRAMES, original=FRAMES)
@@ -57,7 +57,7 @@ def test_matching_by_hand():
 
 @given(some=FRAMES, others=FRAMES)
 def test_near_counts_whichever_is_near(some, others):
-    assert matched_count(some, others) == sum(any(abs(a - b) <= 2 for b in others) for a in some)
+    assert count_matches(some, others) == sum(any(abs(a - b) <= 2 for b in others) for a in some)
 
 
 def test_figures_by_hand():
@@ -127,7 +127,7 @@ def test_closings_found_clip_by_clip_add_up_to_the_score(clips):
     generated, original = ([opening(list(clip[side]))[:, None] for clip in clips] for side in (0, 1))
     hits, count = clip_closure_counts(generated, original, 0.5)
     for (g, o), hit, wanted in zip(zip(generated, original, strict=True), hits, count, strict=True):
-        times = [closings(side[:, 0], 0.5).tolist() for side in (g, o)]
+        times = [find_closings(side[:, 0], 0.5).tolist() for side in (g, o)]
         assert wanted.tolist() == [len(times[1])]
         assert hit.tolist() == [sum(any(abs(a - b) <= 2 for a in times[0]) for b in times[1])]
     whole = closure_figures([g[:, 0] for g in generated], [o[:, 0] for o in original], 0.5, 25)

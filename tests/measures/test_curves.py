@@ -9,11 +9,11 @@ from lipmotion.measures.curves import (
     jerk_ratio,
     lag_ms,
     mean_distance,
-    moving,
     normalised_rmse,
     per_clip_correlation,
     pooled_correlation,
     rmse,
+    select_moving,
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -138,10 +138,10 @@ def test_channels_that_move():
     """They are compared with channels of the same unit, over all clips together."""
     wave = np.sin(np.arange(50) / 5)[:, None]
     clips = [wave * (1, 0.5, 0.009, 0, 90) + (0, 0, 0, 7, 0), np.tile([0, 0, 0, 7, 0.0], (9, 1))]
-    assert moving(clips, ["m", "m", "m", "m", "degrees"]).tolist() == [True, True, False, False, True]
-    assert moving([wave * (1e-9, 0)], ["m", "degrees"]).tolist() == [True, False]
+    assert select_moving(clips, ["m", "m", "m", "m", "degrees"]).tolist() == [True, True, False, False, True]
+    assert select_moving([wave * (1e-9, 0)], ["m", "degrees"]).tolist() == [True, False]
     steps = [np.full((5, 1), 1.0), np.full((5, 1), 2.0)]
-    assert moving(steps, ["m"]).tolist() == [True]
+    assert select_moving(steps, ["m"]).tolist() == [True]
 
 
 def test_a_constant_with_rounding_is_a_constant():
@@ -151,7 +151,7 @@ def test_a_constant_with_rounding_is_a_constant():
         still = value * (1 + 1e-8 * wave)
         assert correlation(still, wave) == 0
         assert correlation(wave, still) == 0
-        assert not moving([still], ["a"]).any()
+        assert not select_moving([still], ["a"]).any()
         for measure in (normalised_rmse, global_variance_ratio, jerk_ratio):
             assert np.isnan(measure([wave], [still])).all()
             assert np.isfinite(measure([still], [wave])).all()

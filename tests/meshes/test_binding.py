@@ -17,8 +17,8 @@ from lipmotion.meshes.files.binding_files import (
     write_points,
     write_weights,
 )
-from lipmotion.meshes.fitting.lip_placement import placed_by_points, surface_of_named
-from lipmotion.meshes.model.binding import MOST_WEIGHTS, bind, painted, skinned
+from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points
+from lipmotion.meshes.model.binding import MAX_WEIGHTS, bind, paint_weights, skin_vertices
 from meshes.heads import SEAM, SIZE, head, lip_points
 from oracles.skinning import skinned_vertex_by_vertex
 
@@ -31,8 +31,8 @@ def mesh():
 @pytest.fixture(scope="module")
 def binding(mesh):
     named = lip_points(mesh)
-    surface = surface_of_named(mesh, named)
-    return bind(mesh, surface, placed_by_points(mesh, surface, named))
+    surface = part_named_lips(mesh, named)
+    return bind(mesh, surface, place_lips_by_points(mesh, surface, named))
 
 
 def _moved(binding, mesh, chosen, way):
@@ -44,7 +44,7 @@ def _moved(binding, mesh, chosen, way):
 def test_weights_are_a_share_of_1(binding):
     assert binding.weights.min() >= 0
     assert binding.weights.sum(axis=1).max() <= 1 + 1e-9
-    assert binding.controls.shape[1] <= MOST_WEIGHTS
+    assert binding.controls.shape[1] <= MAX_WEIGHTS
 
 
 def test_the_lower_lip_does_not_drag_the_upper(binding, mesh):
@@ -80,7 +80,7 @@ def test_skinning_is_the_weighted_sum_of_the_transformed_vertices(binding, mesh)
     rng = np.random.default_rng(3)
     matrices = np.tile(np.eye(3, 4), (len(binding.placement.points), 1, 1)) + 0.1 * rng.normal(size=(52, 3, 4))
     rows = binding.rows[:40]
-    fast = skinned(binding.matrix[:40], matrices, mesh.vertices[rows])
+    fast = skin_vertices(binding.matrix[:40], matrices, mesh.vertices[rows])
     slow = skinned_vertex_by_vertex(binding.matrix[:40].toarray(), matrices, mesh.vertices[rows])
     np.testing.assert_allclose(fast, slow, atol=1e-9)
     np.testing.assert_allclose(binding.transformed(mesh, matrices)[rows], slow, atol=1e-9)
@@ -120,7 +120,7 @@ def test_painted_weights_replace_those_of_a_vertex(binding, mesh, tmp_path):
     (tmp_path / "paint.csv").write_text(
         f"vertex,point,weight\n{vertex},152,0.25\n{vertex},17,0.5\n\n# more\n0,17,2e-1\n"
     )
-    after = painted(binding, mesh, read_weights(tmp_path / "paint.csv"))
+    after = paint_weights(binding, mesh, read_weights(tmp_path / "paint.csv"))
     template = mouth_template()
     moved = _moved(after, mesh, [template.row(17)], [0, 1, 0])
     assert moved[vertex, 1] == pytest.approx(0.5)
@@ -132,7 +132,7 @@ def test_painted_weights_replace_those_of_a_vertex(binding, mesh, tmp_path):
 
 def test_written_weights_paint_the_same_binding(binding, mesh, tmp_path):
     write_weights(tmp_path / "weights.csv", binding)
-    again = painted(binding, mesh, read_weights(tmp_path / "weights.csv"))
+    again = paint_weights(binding, mesh, read_weights(tmp_path / "weights.csv"))
     np.testing.assert_allclose(again.matrix.toarray(), binding.matrix.toarray(), atol=1e-5)
 
 
@@ -158,4 +158,4 @@ def test_paint_is_checked(binding, mesh, tmp_path):
     for text, message in WRONG:
         (tmp_path / "paint.csv").write_text(text)
         with pytest.raises(InputError, match=message):
-            painted(binding, mesh, read_weights(tmp_path / "paint.csv"))
+            paint_weights(binding, mesh, read_weights(tmp_path / "paint.csv"))

@@ -5,14 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.articulation.contact import CLOSED_OPENING, gap_of
-from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, given_weights, is_of_blendshapes, with_mouth
+from lipmotion.articulation.contact import CLOSED_OPENING, opening_to_gap
+from lipmotion.meshes.fitting.blendshape_motion import (
+    arkit_mouth,
+    arkit_weights,
+    find_own_weights,
+    is_of_blendshapes,
+    with_mouth,
+)
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.lip_placement import placed_by_shape
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
-from lipmotion.meshes.fitting.shape_weights import shape_weights
-from lipmotion.meshes.model.face_shapes import face_shapes
-from lipmotion.meshes.model.surface import mesh_surface
+from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
+from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
+from lipmotion.meshes.model.face_shapes import find_face_shapes
+from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline
 from meshes.heads import head
 from meshes.speech import motion, units
@@ -34,7 +39,7 @@ def test_the_jaw_opens_and_mouth_close_closes() -> None:
     moved = with_mouth(weights(jawOpen=[0.0, 0.5, 1.0, 0.5], mouthClose=[0.0, 0.0, 0.0, 0.5]))
     opening = moved["opening"]
     assert opening[[0, 3]].max() < CLOSED_OPENING
-    assert moved["lip_gap"] == pytest.approx(gap_of(opening), abs=1e-3)
+    assert moved["lip_gap"] == pytest.approx(opening_to_gap(opening), abs=1e-3)
     assert np.diff(opening[:3]).min() > 0.1
     assert moved["y_152"][1] < moved["y_152"][0]
     beyond = with_mouth(weights(jawOpen=[0.0, 0.0, 0.3], mouthClose=[0.0, 1.0, 0.9]))  # no further than the jaw is open
@@ -52,7 +57,7 @@ def test_lips_narrow_and_spread() -> None:
 
 def test_motion_that_became_weights_comes_back() -> None:
     said = motion()
-    back = with_mouth(shape_weights(said, units(), arkit_mouth()))
+    back = with_mouth(solve_shape_weights(said, units(), arkit_mouth()))
     assert np.corrcoef(back["opening"], said["opening"])[0, 1] > 0.99
     assert np.corrcoef(back["width"], said["width"])[0, 1] > 0.9
 
@@ -65,19 +70,19 @@ def test_the_blendshapes_of_facegood_are_converted() -> None:
 
 
 def test_weights_that_are_given_are_taken() -> None:
-    given = given_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
+    given = find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
     assert given is not None
     assert given.names == arkit_mouth().names
     assert given["jawOpen"].tolist() == [0.2, 1.0]
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]
-    assert given_weights(motion(), arkit_mouth()) is None
-    assert given_weights(weights(mouthPucker=[0.1, 0.2]), arkit_mouth()) is None
+    assert find_own_weights(motion(), arkit_mouth()) is None
+    assert find_own_weights(weights(mouthPucker=[0.1, 0.2]), arkit_mouth()) is None
 
 
 def test_a_mesh_shows_the_weights_that_are_given() -> None:
     mesh = head()
-    placement = placed_by_shape(mesh, mesh_surface(mesh))
-    character = DrivenCharacter(mesh, placement, face_shapes(mesh, placement), None)
+    placement = place_lips_by_shape(mesh, build_surface(mesh))
+    character = DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None)
     assert character.shapes is not None
     moved = with_mouth(weights(jawOpen=[0.0, 0.25, 0.5], mouthClose=[0.0] * 3))
     rest, half, whole = character.vertices(moved, Timeline(()), np.arange(3) / 100)

@@ -7,13 +7,13 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves
 
 
 def test_each_frame_is_the_bounded_least_squares_solution():
     rng = np.random.default_rng(0)
     matrix, targets = rng.normal(size=(6, 20)), 2 * rng.normal(size=(5, 20))
-    found = bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.0))
+    found = fit_bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.0))
     rows = np.concatenate([matrix.T, np.sqrt(1e-2) * np.eye(6)])
     for frame, target in zip(found, targets, strict=True):
         exact = lsq_linear(rows, np.concatenate([target, np.zeros(6)]), (0, 1), tol=1e-12).x
@@ -24,7 +24,7 @@ def test_all_frames_together_are_the_exact_solution():
     rng = np.random.default_rng(9)
     frames, matrix = 7, rng.normal(size=(3, 8))
     targets = rng.normal(size=(frames, 8))
-    found = bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.7), np.array([[0.3, -0.3, 0.0]]))
+    found = fit_bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.7), np.array([[0.3, -0.3, 0.0]]))
     second = np.zeros((frames - 2, frames))
     for row in range(frames - 2):
         second[row, row : row + 3] = 1, -2, 1
@@ -44,7 +44,7 @@ def test_all_frames_together_are_the_exact_solution():
 def test_more_cost_is_smoother():
     targets = np.random.default_rng(2).random((50, 4))
     rough, smooth = (
-        np.abs(np.diff(bounded_curves(np.eye(4), targets, CurveCosts(smooth=cost)), axis=0)).sum()
+        np.abs(np.diff(fit_bounded_curves(np.eye(4), targets, CurveCosts(smooth=cost)), axis=0)).sum()
         for cost in (0.0, 5.0)
     )
     assert smooth < rough / 2
@@ -52,6 +52,6 @@ def test_more_cost_is_smoother():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(InputError, match="do not fit"):
-        bounded_curves(np.zeros((2, 3)), np.zeros((5, 4)))
+        fit_bounded_curves(np.zeros((2, 3)), np.zeros((5, 4)))
     with pytest.raises(InputError, match="not finite"):
-        bounded_curves(np.full((2, 3), np.nan), np.zeros((5, 3)))
+        fit_bounded_curves(np.full((2, 3), np.nan), np.zeros((5, 3)))

@@ -14,7 +14,7 @@ from fuzz.character_floods import CHARACTER_FLOODS
 from fuzz.inputs import lay_out
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.gltf_animator import write_animated_gltf
+from lipmotion.meshes.files.gltf_writer import write_animated_gltf
 from lipmotion.meshes.model.file_limits import ALLOWANCE, Budget
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes.gltf import document, glb

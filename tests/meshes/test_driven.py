@@ -9,7 +9,7 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.types.moods import parse_moods
 from meshes.heads import head, lip_points, write_glb
@@ -40,9 +40,9 @@ def _gap(character, vertices):
 @pytest.mark.parametrize("by", ["blendshapes", "control points", "named points"])
 def test_the_lips_follow_the_motion(files, by):
     if by == "named points":
-        character = driven_character(files / "head.obj", points=files / "points.csv")
+        character = load_character(files / "head.obj", points=files / "points.csv")
     else:
-        character = driven_character(files / "head.glb", by_points=by == "control points")
+        character = load_character(files / "head.glb", by_points=by == "control points")
     assert (character.shapes is None) == (by != "blendshapes")
     gaps = [_gap(character, vertices) for vertices in character.vertices(motion(), units(), TIME_S)]
     opening = motion().at(TIME_S)[:, 0]
@@ -52,7 +52,7 @@ def test_the_lips_follow_the_motion(files, by):
 
 
 def test_only_the_moving_vertices_move(files):
-    character = driven_character(files / "head.glb")
+    character = load_character(files / "head.glb")
     still = np.setdiff1d(np.arange(len(character.mesh.vertices)), character.moving)
     others = {"eyeBlinkLeft": np.linspace(0, 1, len(TIME_S))}
     for vertices in character.vertices(motion(), units(), TIME_S, others):
@@ -62,11 +62,11 @@ def test_only_the_moving_vertices_move(files):
 
 
 def test_bindings_are_stored_and_painted(files):
-    computed = driven_character(files / "head.obj", points=files / "points.csv")
+    computed = load_character(files / "head.obj", points=files / "points.csv")
     save_binding(files / "head.binding", computed.binding, computed.mesh)
     write_weights(files / "weights.csv", computed.binding)
-    stored = driven_character(files / "head.obj", binding=files / "head.binding")
-    painted = driven_character(files / "head.obj", points=files / "points.csv", binding=files / "weights.csv")
+    stored = load_character(files / "head.obj", binding=files / "head.binding")
+    painted = load_character(files / "head.obj", points=files / "points.csv", binding=files / "weights.csv")
     for other in (stored, painted):
         pairs = zip(
             other.vertices(motion(), units(), TIME_S), computed.vertices(motion(), units(), TIME_S), strict=True
@@ -76,11 +76,11 @@ def test_bindings_are_stored_and_painted(files):
 
 def test_a_mesh_without_blendshapes_needs_points(files):
     with pytest.raises(InputError, match=r"head\.obj: no blendshape opens the mouth.*name the lip points"):
-        driven_character(files / "head.obj")
+        load_character(files / "head.obj")
 
 
 def test_control_points_have_no_weights(files):
-    character = driven_character(files / "head.glb", by_points=True)
+    character = load_character(files / "head.glb", by_points=True)
     with pytest.raises(InputError, match="moved by control points"):
         character.weights(motion(), units())
 
@@ -106,7 +106,7 @@ def _expressive(*names):
 
 def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_path):
     write_glb(tmp_path / "head.glb", _expressive("Happy", "surprised"))
-    character = driven_character(tmp_path / "head.glb")
+    character = load_character(tmp_path / "head.glb")
     moved = with_moods(motion(), parse_moods("happy:0.5, afraid at 1.5"))
     mouth = spoken_mouth(moved, units())
     weights = character.expressions(moved, mouth)
@@ -122,7 +122,7 @@ def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_p
 
 
 def test_characters_with_finer_shapes_do_not_show_whole_expressions(files):
-    character = driven_character(files / "head.glb")
+    character = load_character(files / "head.glb")
     moved = with_moods(motion(), parse_moods("happy"))
     assert not character.expressions(moved, spoken_mouth(moved, units()))
     weights, plain = (character.weights(of, units()) for of in (moved, motion()))
@@ -130,7 +130,7 @@ def test_characters_with_finer_shapes_do_not_show_whole_expressions(files):
 
 
 def test_control_points_raise_the_corners_in_a_smile(files):
-    character = driven_character(files / "head.obj", points=files / "points.csv")
+    character = load_character(files / "head.obj", points=files / "points.csv")
     placement = character.placement
     corner = placement.vertices[placement.row(61)]
     plain, happy = (

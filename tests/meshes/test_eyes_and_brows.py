@@ -10,19 +10,19 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights
-from lipmotion.meshes.model.head_angles import ANGLES
+from lipmotion.meshes.model.bones import ANGLES
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline
 from lipmotion.types.moods import parse_moods
 from lipmotion.types.motion import RADIAN
-from lipmotion_faces.base import alive
-from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.base import stage_liveliness
+from lipmotion_faces.head.pose import head_poses
 
 TIME_S = np.arange(60) / 30
 TALK = Motion(0.1 * np.sin(9 * TIME_S)[:, None] ** 2, 30.0, (Channel("opening"),))
 
 
 def moved(motion: Motion, seed: int = 0) -> Liveliness:
-    return alive(TIME_S, with_mouth(motion), Timeline(()), Staging(seed=seed))
+    return stage_liveliness(TIME_S, with_mouth(motion), Timeline(()), Staging(seed=seed))
 
 
 def captured(curves: dict[str, object]) -> Motion:

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_animator import write_animated_gltf
-from lipmotion.meshes.files.gltf_container import read_gltf_document
+from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
+from lipmotion.meshes.files.gltf_writer import write_animated_gltf
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes import gltf
 from meshes.heads import head, write_glb

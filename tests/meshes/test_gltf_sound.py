@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from lipmotion.meshes.files.gltf_writer import named_sound, sound_extras
+from lipmotion.meshes.files.gltf_writer import find_named_sound, sound_extras
 
 
 @pytest.mark.parametrize(
@@ -25,5 +25,5 @@ from lipmotion.meshes.files.gltf_writer import named_sound, sound_extras
 def test_paths_from_the_folder_of_the_file_count(tmp_path, extras, found):
     text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"extras": extras}]})
     (tmp_path / "a.gltf").write_text(text, encoding="utf-8")
-    named = named_sound(tmp_path / "a.gltf")
+    named = find_named_sound(tmp_path / "a.gltf")
     assert (named and named[0]) == (found and tmp_path / found)

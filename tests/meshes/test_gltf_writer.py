@@ -7,8 +7,7 @@ import pytest
 
 from lipmotion.errors import ExportError
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_container import read_gltf_document
+from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes.heads import head, shaped, write_glb
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.fitting.driven import JAW_OPEN, driven_character, with_jaw
-from lipmotion.meshes.model.bones import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merged_bones
+from lipmotion.meshes.fitting.driven import JAW_OPEN, load_character, with_jaw
+from lipmotion.meshes.model.bones import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merge_bones
 from meshes.gltf import POSITIONS, document, glb
 from meshes.heads import SEAM, head, shaped, write_glb
 from meshes.speech import motion, units
@@ -48,7 +48,7 @@ def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
     write_glb(path, head(shapes=False))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(driven, "read_character", lambda _: with_bone(head(shapes=False)))
-        character = driven_character(path)
+        character = load_character(path)
     weights = character.weights(motion(), units())
     assert weights.names == (JAW_OPEN,)
     assert np.corrcoef(weights.values[:, 0], motion()["opening"])[0, 1] > 0.95
@@ -57,7 +57,7 @@ def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
 def test_bones_of_one_kind_become_one():
     one = Bone(HEAD, np.zeros(3), np.array([1, 2]), np.array([0.5, 1.0]))
     two = Bone(HEAD, np.ones(3), np.array([2, 4]), np.array([0.25, 1.0]))
-    (merged,) = merged_bones([one, two, Bone(JAW, np.zeros(3), np.zeros(0, int), np.zeros(0))])
+    (merged,) = merge_bones([one, two, Bone(JAW, np.zeros(3), np.zeros(0, int), np.zeros(0))])
     assert merged.rows.tolist() == [1, 2, 4]
     assert merged.shares.tolist() == [0.5, 1.0, 1.0]
     np.testing.assert_array_equal(merged.place, np.zeros(3))

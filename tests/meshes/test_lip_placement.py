@@ -8,9 +8,9 @@ import pytest
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting import lip_placement
-from lipmotion.meshes.fitting.lip_placement import placed_by_points, placed_by_shape, surface_of_named
+from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points, place_lips_by_shape
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.meshes.model.surface import mesh_surface
+from lipmotion.meshes.model.surface import build_surface
 from meshes.heads import COLUMNS, HALF, SEAM, SIZE, head, lip_points, shaped
 
 GRID = 0.05 * SIZE
@@ -19,7 +19,7 @@ GRID = 0.05 * SIZE
 
 def _named(mesh):
     named = lip_points(mesh)
-    return placed_by_points(mesh, surface_of_named(mesh, named), named)
+    return place_lips_by_points(mesh, part_named_lips(mesh, named), named)
 
 
 def _offsets(mesh, placement):
@@ -34,8 +34,8 @@ def _offsets(mesh, placement):
 @pytest.mark.parametrize("named", [False, True])
 def test_points_are_where_the_mouth_is(named):
     mesh = head(shapes=not named)
-    surface = mesh_surface(mesh)
-    placement = _named(mesh) if named else placed_by_shape(mesh, surface)
+    surface = build_surface(mesh)
+    placement = _named(mesh) if named else place_lips_by_shape(mesh, surface)
     assert _offsets(mesh, placement) < 1.5 * GRID
     assert placement.scale == pytest.approx(SIZE * 2 * HALF / mouth_template().width, rel=0.25)
 
@@ -43,8 +43,8 @@ def test_points_are_where_the_mouth_is(named):
 @pytest.mark.parametrize("named", [False, True])
 def test_upper_points_are_on_the_upper_lip(named):
     mesh = head()
-    surface = mesh_surface(mesh)
-    placement = _named(mesh) if named else placed_by_shape(mesh, surface)
+    surface = build_surface(mesh)
+    placement = _named(mesh) if named else place_lips_by_shape(mesh, surface)
     drop = (shaped(mesh, {"jawOpen": 1.0}) - mesh.vertices)[placement.vertices, 1]
     template = mouth_template()
     middle = np.abs(template.places[:, 0]) < 0.2
@@ -59,8 +59,8 @@ def test_a_turned_head_is_found_by_its_eye_corners():
     for point, x in ((33, -0.5), (263, 0.5)):
         named[point] = int(np.abs(mesh.vertices[:, :2] / SIZE - [x, 0.0]).sum(axis=1).argmin())
     turned = Mesh(mesh.vertices @ turn.T, mesh.triangles)
-    placement = placed_by_points(turned, surface_of_named(turned, named), named)
-    upright = placed_by_points(mesh, surface_of_named(mesh, named), named)
+    placement = place_lips_by_points(turned, part_named_lips(turned, named), named)
+    upright = place_lips_by_points(mesh, part_named_lips(mesh, named), named)
     assert placement.vertices.tolist() == upright.vertices.tolist()
     np.testing.assert_allclose(placement.axes, turn @ upright.axes, atol=1e-9)
     moved = placement.to_mesh(np.array([[0.0, -1, 0]]))
@@ -72,7 +72,7 @@ def test_a_mouth_that_is_not_cut_open_is_refused():
     named = lip_points(head(shapes=False))
     named[14] = named[13] + len(COLUMNS)
     with pytest.raises(InputError, match="hang together"):
-        placed_by_points(mesh, mesh_surface(mesh), named)
+        place_lips_by_points(mesh, build_surface(mesh), named)
 
 
 def test_named_points_are_checked():
@@ -84,29 +84,29 @@ def test_named_points_are_checked():
         ({61: 0, 291: 1, 13: 2, 14: 3, 5: 4}, "5 is no lip or jaw point"),
     ):
         with pytest.raises(InputError, match=message):
-            placed_by_points(mesh, mesh_surface(mesh), named)
+            place_lips_by_points(mesh, build_surface(mesh), named)
 
 
 def test_a_mesh_without_a_shape_that_opens_says_what_it_has():
     mesh = head()
     closed = Mesh(mesh.vertices, mesh.triangles, shapes=tuple(s for s in mesh.shapes if s.name == "mouthPucker"))
     with pytest.raises(InputError, match="the mesh has: mouthPucker"):
-        placed_by_shape(closed, mesh_surface(closed))
+        place_lips_by_shape(closed, build_surface(closed))
 
 
 def test_a_shape_that_parts_no_lips_is_refused():
     mesh = head(shapes=False, slit=False)
     whole = Blendshape.between("jawOpen", mesh.vertices, mesh.vertices - [0, SIZE, 0])
     with pytest.raises(InputError, match="parts no lips"):
-        placed_by_shape(Mesh(mesh.vertices, mesh.triangles, shapes=(whole,)), mesh_surface(mesh))
+        place_lips_by_shape(Mesh(mesh.vertices, mesh.triangles, shapes=(whole,)), build_surface(mesh))
 
 
 def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
     mesh = head()
-    surface = mesh_surface(mesh)
-    whole = placed_by_shape(mesh, surface)
-    monkeypatch.setattr(lip_placement, "MOST_PAIRS", 1500)
-    thinned = placed_by_shape(mesh, surface)
+    surface = build_surface(mesh)
+    whole = place_lips_by_shape(mesh, surface)
+    monkeypatch.setattr(lip_placement, "MAX_PAIRS", 1500)
+    thinned = place_lips_by_shape(mesh, surface)
     assert (thinned.vertices != whole.vertices).any()
     assert _offsets(mesh, thinned) < 2 * GRID
     assert thinned.scale == pytest.approx(whole.scale, rel=0.2)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
-from lipmotion.meshes.fitting.point_motion import point_motion
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
-from lipmotion.meshes.fitting.shape_weights import rounded_weights, shape_weights
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.shape_weights import round_lips, solve_shape_weights
 from meshes.speech import motion, units
 
 TIME_S = np.arange(201) / 100
@@ -13,7 +13,7 @@ TIME_S = np.arange(201) / 100
 def test_the_weights_are_never_less_round_than_before():
     shapes = arkit_mouth()
     weights = np.full((3, len(shapes.names)), 0.3)
-    result = rounded_weights(weights, shapes, np.array([0.0, 0.5, 1.0]))
+    result = round_lips(weights, shapes, np.array([0.0, 0.5, 1.0]))
     pucker, smile = shapes.row("mouthPucker"), shapes.row("mouthSmileLeft")
     assert result[:2, pucker] == pytest.approx([0.3, 0.3])
     assert 0.3 <= result[2, pucker] <= 0.5
@@ -21,14 +21,14 @@ def test_the_weights_are_never_less_round_than_before():
 
 
 def test_the_solved_weights_pucker_in_oo():
-    weights = shape_weights(motion(), units(), arkit_mouth())
+    weights = solve_shape_weights(motion(), units(), arkit_mouth())
     assert weights["mouthPucker"][115] > 0.38
     assert weights["mouthPucker"][75] < 0.3
 
 
 def test_points_of_round_lips_come_together_and_forward():
     template = mouth_template()
-    moved = point_motion(motion(points=False), units()).displacements
+    moved = move_points(motion(points=False), units()).displacements
     right, left = moved[115, template.row(RIGHT_CORNER)], moved[115, template.row(LEFT_CORNER)]  # uw
     assert right[0] > 0.03
     assert left[0] < -0.03

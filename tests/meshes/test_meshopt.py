@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.meshopt import decoded_attributes, decoded_exponents, decoded_indices, decoded_triangles
+from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
 from meshes.gltf import packed_attributes
 
 
@@ -16,7 +16,7 @@ def test_attributes_come_back():
         smooth = np.cumsum(rng.integers(-2, 3, (count, stride)), axis=0)
         smooth[:, ::3] = rng.integers(0, 256, (count, len(range(0, stride, 3))))
         elements = (smooth & 255).astype(np.uint8)
-        np.testing.assert_array_equal(decoded_attributes(packed_attributes(elements), count, stride), elements)
+        np.testing.assert_array_equal(decode_attributes(packed_attributes(elements), count, stride), elements)
 
 
 TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")
@@ -33,23 +33,23 @@ TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")
 def test_triangles_of_both_versions(start, triangles):
     """Streams of the reference implementation (meshoptimizer): fresh, shared, repeated and arbitrary vertices."""
     stream = bytes.fromhex(start) + TAIL
-    assert decoded_triangles(stream, 3 * len(triangles)).reshape(-1, 3).tolist() == triangles
+    assert decode_triangles(stream, 3 * len(triangles)).reshape(-1, 3).tolist() == triangles
 
 
 def test_indices_without_triangles():
     stream = bytes.fromhex("d1 00 04 cd 01 04 07 98 1f 00 00 00 00")
-    assert decoded_indices(stream, 6).tolist() == [0, 1, 51, 2, 49, 1000]
+    assert decode_indices(stream, 6).tolist() == [0, 1, 51, 2, 49, 1000]
 
 
 def test_exponents():
     stored = np.array([[3 | (-1 & 0xFF) << 24, (-5 & 0xFFFFFF) | 2 << 24]], np.uint32).view(np.uint8)
-    np.testing.assert_allclose(decoded_exponents(stored), [[1.5, -20.0]])
+    np.testing.assert_allclose(decode_exponents(stored), [[1.5, -20.0]])
 
 
 def test_damaged_streams_are_refused():
     for stream in (b"", b"\xa0", b"\xb0" + b"\0" * 60, b"\xa1" + b"\0" * 60, b"\xa0" + b"\xff" * 40):
         with pytest.raises(InputError, match=r"export it (again|without)"):
-            decoded_attributes(stream, 100, 8)
-    for decode in (decoded_triangles, decoded_indices):
+            decode_attributes(stream, 100, 8)
+    for decode in (decode_triangles, decode_indices):
         with pytest.raises(InputError):
             decode(b"\xe1\xff\xff" + b"\x80" * 20, 300)

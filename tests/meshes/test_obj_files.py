@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.obj_files import read_obj
+from lipmotion.meshes.files.character_files import read_character, read_obj
 from meshes.heads import head, shaped
 from meshes.obj_writing import write_obj
 

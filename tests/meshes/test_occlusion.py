@@ -1,6 +1,6 @@
 import numpy as np
 
-from lipmotion_faces.rendering.occlusion import reaches
+from lipmotion_faces.rendering.lighting import reaches
 
 
 def test_a_floor_under_a_roof_gets_less_light_than_the_floor_beside_it():

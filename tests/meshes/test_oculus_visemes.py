@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.articulation.crossfade import FADE_S, phone_weights
+from lipmotion.articulation.crossfade import FADE_S, crossfade_phones
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.articulation.pauses import with_pauses
-from lipmotion.meshes.fitting.oculus_visemes import MOST_CLOSED_WEIGHT, VISEME_OF_PHONE, viseme_motion
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
-from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.articulation.pauses import rest_in_pauses
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.meshes.fitting.oculus_visemes import MAX_CLOSED_WEIGHT, VISEME_OF_PHONE, weigh_visemes
+from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import PHONES
@@ -25,7 +25,7 @@ def test_every_phone_has_a_viseme():
 
 
 def test_silence_and_closures():
-    found = viseme_motion(units(), spoken_mouth(motion(), units()))
+    found = weigh_visemes(units(), spoken_mouth(motion(), units()))
     assert found["viseme_sil"][[0, 20, 160, 200]] == pytest.approx([1, 1, 1, 1])
     assert found["viseme_PP"][[55, 95]] == pytest.approx([1, 1])
     assert found["viseme_aa"][75] == pytest.approx(1)
@@ -46,18 +46,18 @@ def test_weights_add_up_to_1_and_are_never_negative(phones, rate_hz, opening):
     frames = int(rate_hz * (end + 0.5)) + 1
     still = Motion(np.full((frames, 1), opening), rate_hz, (Channel("opening"),))
     said = Timeline(tuple(spans))
-    motion = viseme_motion(said, spoken_mouth(still, said))
+    motion = weigh_visemes(said, spoken_mouth(still, said))
     np.testing.assert_allclose(motion.values.sum(axis=1), 1, atol=1e-9)
     assert motion.values.min() >= 0
     closed = motion["viseme_sil"] + motion["viseme_PP"]
     contact = spoken_mouth(still, said).contact
     assert closed[contact] == pytest.approx(1)
-    assert closed[~contact].max(initial=0) <= MOST_CLOSED_WEIGHT + 1e-9
+    assert closed[~contact].max(initial=0) <= MAX_CLOSED_WEIGHT + 1e-9
 
 
 def test_phones_fade_around_their_border():
     time_s = np.array([0.9 - FADE_S, 0.9 - 0.02, 0.9, 0.9 + 0.02, 0.9 + FADE_S])
-    weights = phone_weights(units(), time_s, lambda phone: phone)
+    weights = crossfade_phones(units(), time_s, lambda phone: phone)
     assert weights["p"][2] == pytest.approx(0.5)
     assert weights["aa"][2] == pytest.approx(0.5)
     assert weights["aa"][0] == pytest.approx(1)
@@ -66,7 +66,7 @@ def test_phones_fade_around_their_border():
 
 def test_without_units_there_is_silence():
     closed = Motion(np.zeros((5, 1)), 25.0, (Channel("opening"),))
-    assert viseme_motion(Timeline(()), spoken_mouth(closed, Timeline(())))["viseme_sil"] == pytest.approx(np.ones(5))
+    assert weigh_visemes(Timeline(()), spoken_mouth(closed, Timeline(())))["viseme_sil"] == pytest.approx(np.ones(5))
 
 
 def test_visemes_rest_where_the_curves_do():
@@ -74,7 +74,7 @@ def test_visemes_rest_where_the_curves_do():
     held = Motion(np.full((161, 1), 0.1), 100.0, (Channel("opening"),))
     generation = Generation(held, np.zeros((161, 1)), said, StateTrace(("",), np.zeros(161, np.intp)))
     for style, rests in (("rest", True), ("natural", False)):
-        moved = with_pauses(generation, style).motion
-        found, arkit = viseme_motion(said, spoken_mouth(moved, said)), shape_weights(moved, said, arkit_mouth())
+        moved = rest_in_pauses(generation, style).motion
+        found, arkit = weigh_visemes(said, spoken_mouth(moved, said)), solve_shape_weights(moved, said, arkit_mouth())
         assert (found["viseme_sil"][80] > 0.99) == rests
         assert (arkit["jawOpen"][80] < 0.01) == rests

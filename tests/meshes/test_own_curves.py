@@ -9,7 +9,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.face_shapes import life_scale
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
@@ -33,7 +33,7 @@ def _parted(character, weights):
 
 
 def test_any_names_are_understood_by_their_rows(file):
-    plain = driven_character(file).weights(motion(), units())
+    plain = load_character(file).weights(motion(), units())
     shapes = {shape.name: f"あ {number}" for number, shape in enumerate(head().shapes)}
     halves = [
         replace(shape, name=shapes[shape.name], displacements=shape.displacements / (1 + (shape.name == "mouthFunnel")))
@@ -43,28 +43,28 @@ def test_any_names_are_understood_by_their_rows(file):
     write_glb(file, replace(head(), shapes=tuple(halves)))
     rows = "".join(f"{own},{known},,\n" for known, own in shapes.items())
     table_path(file).write_text(f"{COLUMNS}{rows}other half,mouthFunnel,,\n", encoding="utf-8")
-    character = driven_character(file)
+    character = load_character(file)
     weights = character.weights(motion(), units())
     for name in plain.names:
         np.testing.assert_allclose(weights[shapes[name]], plain[name], atol=1e-4)
     np.testing.assert_array_equal(weights["other half"], weights[shapes["mouthFunnel"]])
     assert character.has_shape("eyeBlinkLeft")
-    assert [*character.beside({"eyeBlinkLeft": np.ones(2)}, 2)] == [shapes["eyeBlinkLeft"]]
+    assert [*character.weigh_others({"eyeBlinkLeft": np.ones(2)}, 2)] == [shapes["eyeBlinkLeft"]]
 
 
 def test_the_table_of_what_was_found_changes_nothing(file):
-    before = driven_character(file)
+    before = load_character(file)
     write_rig_table(before.table_file, before.table_rows())
-    after = driven_character(file)
+    after = load_character(file)
     assert after.table_rows() == before.table_rows()
     np.testing.assert_array_equal(after.weights(motion(), units()).values, before.weights(motion(), units()).values)
 
 
 def test_gains_weaken_the_mouth_and_lips_still_touch(file):
     table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,\nmouthPressLeft,mouthPressLeft,1,0.2\n")
-    character = driven_character(file)
+    character = load_character(file)
     weights = character.weights(motion(), units())
-    whole = driven_character(file.rename(file.with_name("other.glb"))).weights(motion(), units())
+    whole = load_character(file.rename(file.with_name("other.glb"))).weights(motion(), units())
     assert weights["jawOpen"][75] == pytest.approx(0.5 * whole["jawOpen"][75], abs=0.02)  # aa
     assert _parted(character, weights)[75] < 0.7 * _parted(character, whole)[75]
     assert _parted(character, weights)[CLOSED].max() < 0.004
@@ -74,7 +74,7 @@ def test_gains_weaken_the_mouth_and_lips_still_touch(file):
 
 def test_weights_that_are_given_back_stay(file):
     table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,0.03\nmouthPucker,mouthPucker,1.2,\n")
-    character = driven_character(file)
+    character = load_character(file)
     weights = character.weights(motion(), units())
     np.testing.assert_allclose(character.weights(weights, units()).values, weights.values, atol=0.03)
 
@@ -89,7 +89,7 @@ def test_weights_that_are_given_back_stay(file):
 def test_damaged_tables_are_refused(file, rows, message):
     table_path(file).write_text(COLUMNS + rows)
     with pytest.raises(InputError, match=message):
-        driven_character(file)
+        load_character(file)
 
 
 def test_a_head_in_metres_parts_its_lips_as_far_as_in_centimetres(file):
@@ -97,7 +97,7 @@ def test_a_head_in_metres_parts_its_lips_as_far_as_in_centimetres(file):
     for unit in (1.3, 0.013):  # 22 cm
         shapes = tuple(replace(each, displacements=unit * each.displacements) for each in mesh.shapes)
         write_glb(file, replace(mesh, vertices=unit * mesh.vertices, shapes=shapes))
-        found.append(driven_character(file))
+        found.append(load_character(file))
     centimetres, metres = found
     assert life_scale(centimetres.mesh, centimetres.placement) == pytest.approx(9.0)
     np.testing.assert_allclose(metres.shapes.gap, centimetres.shapes.gap, rtol=1e-3, atol=1e-6)

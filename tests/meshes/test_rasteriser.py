@@ -3,8 +3,8 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
-from lipmotion.meshes.model.surface import normals_of
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.surface import compute_normals
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.rendering.lighting import Finish, Lighting
 from lipmotion_faces.rendering.rasteriser import Camera, Canvas, flat, gradient
 
@@ -27,10 +27,10 @@ def picture_of(mesh: Mesh, camera: Camera) -> np.ndarray:
     colours, kinds = np.zeros_like(vertices), np.zeros(len(vertices), np.intp)
     for number, part in enumerate(mesh.parts):
         rows = np.unique(mesh.triangles[part.first : part.stop])
-        colours[rows], kinds[rows] = linear(part.material.colour), number
+        colours[rows], kinds[rows] = decode_srgb(part.material.colour), number
     glosses = [part.material.gloss for part in mesh.parts]
     lighting = Lighting([Finish((0.3, 0.2, 0.15), gloss=0.5 * gloss, focus=4 + round(2 * gloss)) for gloss in glosses])
-    light = lighting.light(vertices, normals_of(vertices, mesh.triangles), colours, kinds, camera.place)
+    light = lighting.light(vertices, compute_normals(vertices, mesh.triangles), colours, kinds, camera.place)
     return Canvas(camera).picture(vertices, light, mesh.triangles)
 
 
@@ -58,7 +58,7 @@ def test_normals_of_a_ball_point_outwards():
     mesh = ball()
     inner = np.abs(mesh.vertices[:, 1]) < 0.45
     outward = mesh.vertices[inner] / np.linalg.norm(mesh.vertices[inner], axis=1, keepdims=True)
-    assert np.einsum("ij,ij->i", normals_of(mesh.vertices, mesh.triangles)[inner], outward).min() > 0.99
+    assert np.einsum("ij,ij->i", compute_normals(mesh.vertices, mesh.triangles)[inner], outward).min() > 0.99
 
 
 def test_a_mesh_is_seen_in_its_colour_at_its_place():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.rig_tables import read_rig_table, rig_motion
+from lipmotion.meshes.files.rig_tables import apply_rig, read_rig_table
 
 SOURCES = {"jawOpen": np.array([0.0, 0.5, 1.0]), "mouthPucker": np.array([0.0, 1.0, 0.0])}
 
@@ -20,20 +20,20 @@ def test_controls_follow_their_sources(tmp_path):
     text = (
         "control,source,gain,offset,low,high\nJaw.rz,jawOpen,-25,,-20,0\nLips,mouthPucker,0.5\nLips,jawOpen,-0.25,0.1\n"
     )
-    motion = rig_motion(_table(tmp_path, text), SOURCES, 25.0)
+    motion = apply_rig(_table(tmp_path, text), SOURCES, 25.0)
     assert motion.names == ("Jaw.rz", "Lips")
     np.testing.assert_allclose(motion["Jaw.rz"], [0, -12.5, -20])
     np.testing.assert_allclose(motion["Lips"], [0.1, 0.475, -0.15])
 
 
 def test_a_control_may_be_constant(tmp_path):
-    motion = rig_motion(_table(tmp_path, "control,source,offset\n# a comment\nBrow,,0.3\n\n"), SOURCES, 25.0)
+    motion = apply_rig(_table(tmp_path, "control,source,offset\n# a comment\nBrow,,0.3\n\n"), SOURCES, 25.0)
     np.testing.assert_allclose(motion["Brow"], 0.3)
 
 
 def test_an_unknown_source_is_named(tmp_path):
     with pytest.raises(InputError, match="'Jaw' follows 'jawopen', which is no curve; nearest: jawOpen"):
-        rig_motion(_table(tmp_path, "control,source\nJaw,jawopen\n"), SOURCES, 25.0)
+        apply_rig(_table(tmp_path, "control,source\nJaw,jawopen\n"), SOURCES, 25.0)
 
 
 WRONG = [

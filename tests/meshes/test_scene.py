@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.meshes.model.scene import HeadTurn, Scene, shading_normals
+from lipmotion.meshes.model.scene import HeadTurn, Scene, compute_shading_normals
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes.heads import head, shaped
 
@@ -37,12 +37,12 @@ def test_a_turn_that_does_not_fit_is_refused(vertices: int | None, frames: int) 
 
 def test_normals_are_of_length_one_and_turn_with_the_shape() -> None:
     mesh = head()
-    normals = shading_normals(mesh)
+    normals = compute_shading_normals(mesh)
     assert np.linalg.norm(normals.rest, axis=1) == pytest.approx(np.ones(len(mesh.vertices)))
     number = mesh.shape_names.index("jawOpen")
     rows, change = normals.turned[number]
     moved = type(mesh)(shaped(mesh, {"jawOpen": 1.0}), mesh.triangles, mesh.parts)
-    after = shading_normals(moved, split=False).rest
+    after = compute_shading_normals(moved, split=False).rest
     assert len(rows) > 10
     inner = np.isin(rows, mesh.shapes[number].rows)
     assert (normals.rest[rows] + change)[inner] == pytest.approx(after[rows][inner], abs=0.35)

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts
-from lipmotion.meshes.fitting.lip_placement import placed_by_shape
-from lipmotion.meshes.fitting.point_motion import point_motion
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
-from lipmotion.meshes.fitting.shape_weights import SolverOptions, shape_weights
-from lipmotion.meshes.model.face_shapes import face_shapes
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
+from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, SolverOptions, solve_shape_weights
+from lipmotion.meshes.model.face_shapes import find_face_shapes
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.surface import mesh_surface
+from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import Channel, Motion, Timeline
 from meshes.heads import head
 from meshes.speech import motion, units
@@ -21,7 +20,7 @@ from meshes.speech import motion, units
 
 def _head_shapes():
     mesh = head()
-    return face_shapes(mesh, placed_by_shape(mesh, mesh_surface(mesh)))
+    return find_face_shapes(mesh, place_lips_by_shape(mesh, build_surface(mesh)))
 
 
 @pytest.fixture(scope="module", params=["mesh", "reference"])
@@ -32,7 +31,7 @@ def shapes(request):
 @pytest.fixture(scope="module")
 def weights(shapes):
     """Of motion with points for the mesh, of distances alone for the reference."""
-    return shape_weights(motion(points=shapes is not arkit_mouth()), units(), shapes)
+    return solve_shape_weights(motion(points=shapes is not arkit_mouth()), units(), shapes)
 
 
 def test_weights_are_between_0_and_1_and_smooth(weights):
@@ -43,7 +42,7 @@ def test_weights_are_between_0_and_1_and_smooth(weights):
 
 def test_the_gap_is_that_of_the_motion(weights, shapes):
     gap = weights.values @ shapes.gap
-    wanted = point_motion(motion(), units()).mouth.gap
+    wanted = move_points(motion(), units()).mouth.gap
     phone = np.array([name for name, start, end in _phones() for _ in range(round(100 * (end - start)))] + ["sil"])
     free = ~np.isin(phone, ["p", "m"])
     assert np.abs(gap - wanted)[free].max() < 0.012
@@ -62,7 +61,7 @@ def test_the_jaw_is_never_less_open_than_the_lips_are_closed(weights):
 
 
 def test_the_jaw_stays_open_behind_closed_lips(shapes):
-    weights = shape_weights(motion(), units(), shapes)
+    weights = solve_shape_weights(motion(), units(), shapes)
     assert weights["jawOpen"][95] > 0.05
     assert weights["mouthClose"][95] > 0.05
 
@@ -72,8 +71,8 @@ def test_oo_is_puckered_and_aa_is_not(weights):
 
 
 def test_gestures_can_be_left_out(shapes):
-    plain = shape_weights(motion(), units(), shapes, SolverOptions(gestures=False))
-    pressed = shape_weights(motion(), units(), shapes)
+    plain = solve_shape_weights(motion(), units(), shapes, SolverOptions(gestures=False))
+    pressed = solve_shape_weights(motion(), units(), shapes)
     assert np.abs(plain["mouthPressLeft"]).max() < 1e-9
     assert pressed["mouthPressLeft"][95] > 0.15
 
@@ -85,7 +84,7 @@ def test_known_weights_come_back():
     known[:, shapes.row("jawOpen")] = 0.4 * wave
     known[:, shapes.row("mouthPucker")] = 0.5 * wave[::-1]
     placed = np.einsum("ts,spc->tpc", known, shapes.moved)
-    found = shape_weights(_of(placed, known @ shapes.gap), Timeline(()), shapes, _EXACT)
+    found = solve_shape_weights(_of(placed, known @ shapes.gap), Timeline(()), shapes, _EXACT)
     found = Motion(found.values[30:], 100.0, found.channels)  # before: the rest pose
     assert np.abs(found["jawOpen"] - known[:, shapes.row("jawOpen")]).max() < 0.08
     assert np.abs(found["mouthPucker"] - known[:, shapes.row("mouthPucker")]).max() < 0.08
@@ -98,9 +97,9 @@ def test_visemes_are_used_where_there_is_no_jaw_shape():
     names |= {"mouthLowerDownLeft": "viseme_DD", "mouthUpperUpLeft": "viseme_SS"}
     kept = tuple(type(s)(names[s.name], s.rows, s.displacements) for s in mesh.shapes if s.name in names)
     spoken = Mesh(mesh.vertices, mesh.triangles, mesh.parts, kept)
-    shapes = face_shapes(spoken, placed_by_shape(spoken, mesh_surface(spoken)))
+    shapes = find_face_shapes(spoken, place_lips_by_shape(spoken, build_surface(spoken)))
     assert shapes.style == "visemes"
-    found = shape_weights(motion(), units(), shapes)
+    found = solve_shape_weights(motion(), units(), shapes)
     assert found["viseme_aa"][75] > 0.2
     assert found["viseme_aa"][:40].max() < 0.02
     assert found["viseme_U"][115] > found["viseme_U"][75]

@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 from lipmotion.errors import InputError
+from lipmotion.meshes.files.character_files import read_obj
 from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.obj_files import read_obj
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart
 from lipmotion.meshes.model.textures import Texture, read_texture, texture_table
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
+from lipmotion.meshes.files.character_files import read_obj, read_obj_folder
 from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.obj_files import read_obj, read_obj_folder
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.head.stage import figure, head_mesh
 from meshes.gltf import document, glb, textured_document, with_colours
 from meshes.heads import write_glb
@@ -41,18 +41,18 @@ def test_colours_of_every_kind_are_read_as_light(tmp_path, kind, normalised, wid
     given = np.concatenate([LIGHT, np.ones((4, 1))], axis=1)[:, :width] * FULL[kind]
     stored = (given if kind == "<f4" else np.rint(given)).astype(kind)
     mesh = _coloured(tmp_path, stored, normalised=normalised)
-    np.testing.assert_allclose(linear(mesh.colours), LIGHT, atol=0.003)
+    np.testing.assert_allclose(decode_srgb(mesh.colours), LIGHT, atol=0.003)
 
 
 def test_colours_are_multiplied_by_that_of_the_material(tmp_path):
     factor = [0.5, 1.0, 0.25, 1.0]
     mesh = _coloured(tmp_path, LIGHT.astype("<f4"), {"pbrMetallicRoughness": {"baseColorFactor": factor}})
-    np.testing.assert_allclose(linear(mesh.colours), LIGHT * factor[:3], atol=1e-6)
+    np.testing.assert_allclose(decode_srgb(mesh.colours), LIGHT * factor[:3], atol=1e-6)
 
 
 def test_colours_beyond_white_are_white(tmp_path):
     mesh = _coloured(tmp_path, (LIGHT * 4).astype("<f4"))
-    np.testing.assert_allclose(linear(mesh.colours), np.minimum(LIGHT * 4, 1), atol=1e-6)
+    np.testing.assert_allclose(decode_srgb(mesh.colours), np.minimum(LIGHT * 4, 1), atol=1e-6)
 
 
 def test_a_texture_is_multiplied_by_colours(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, write_rig_table
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.calibration import POSES, calibrated, posed_sources
 from meshes.heads import head, write_glb
 
@@ -17,10 +17,10 @@ STATED = {"open": {"jawOpen": 0.6}, "closed": {"jawOpen": 0.05}, "rounded": {"mo
 
 def test_a_character_has_the_stated_weights(tmp_path: Path) -> None:
     write_glb(tmp_path / "head.glb", head())
-    before = driven_character(tmp_path / "head.glb")
+    before = load_character(tmp_path / "head.glb")
     rows = calibrated(before.table_rows(), posed_sources(before, before.table_rows()), STATED)
     write_rig_table(before.table_file, rows)
-    after = driven_character(tmp_path / "head.glb")
+    after = load_character(tmp_path / "head.glb")
     posed = {row.control: _values(after.table_rows(), posed_sources(after, rows), row.control) for row in rows}
     assert posed["jawOpen"][:2] == pytest.approx([0.6, 0.05], abs=1e-3)
     assert posed["mouthPucker"][2] == pytest.approx(0.9, abs=1e-3)

@@ -16,10 +16,9 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.formats.base import write_motion
-from lipmotion.meshes.fitting.blendshape_motion import with_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
-from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
+from lipmotion.formats.fap import FAP
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, curves_of
 from lipmotion.pipeline.outputs.delivered import delivered
@@ -27,11 +26,11 @@ from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.moods import MOODS
 from lipmotion.units import mark_closing_phones
-from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.shape_fit import lip_gap
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
-from lipmotion_faces.portrait.drawn_frames import face_poses
+from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
@@ -116,8 +115,8 @@ def characters(tmp_path_factory: pytest.TempPathFactory) -> dict[str, DrivenChar
     write_obj(folder / "points.obj", plain)
     rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
     (folder / "points.csv").write_text("point,vertex\n" + rows)
-    found = {name: driven_character(folder / f"{name}.glb") for name in ("arkit", "visemes", "vowels")}
-    found["points"] = driven_character(folder / "points.obj", points=folder / "points.csv")
+    found = {name: load_character(folder / f"{name}.glb") for name in ("arkit", "visemes", "vowels")}
+    found["points"] = load_character(folder / "points.obj", points=folder / "points.csv")
     return found
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import lipmotion
 from lipmotion import Model
-from lipmotion.articulation.cue_sheets import shown_shapes
+from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.pipeline.outputs.cues import cue_text
@@ -107,10 +107,10 @@ def test_each_line_of_a_stem_has_the_motion_and_the_cues_of_the_line_alone(toy_m
         stem[at : at + len(line)] = line
         lines.append((2 + 8 * number, line.astype(np.float32)))
     together = lipmotion.animate(Audio(stem, rate_hz), model=toy_model)
-    shown, opening, outside = shown_shapes(lipmotion.cues(together)), together.motion["opening"].copy(), 0.0
+    shown, opening, outside = list_frame_shapes(lipmotion.cues(together)), together.motion["opening"].copy(), 0.0
     for at_s, line in lines:
         alone = lipmotion.animate(Audio(line, rate_hz), model=toy_model)
-        values, cues = alone.motion.values, shown_shapes(lipmotion.cues(alone))[:-2]
+        values, cues = alone.motion.values, list_frame_shapes(lipmotion.cues(alone))[:-2]
         frames = slice(100 * at_s, 100 * at_s + len(values))
         assert together.motion.values[frames] == pytest.approx(values, abs=0.005)
         assert any(shape != "X" for shape in cues)

@@ -11,7 +11,7 @@ from PIL import Image
 
 import lipmotion
 from faces.test_cut_out import draw
-from lipmotion.articulation.cue_sheets import shown_shapes
+from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
 from lipmotion.types import Audio, Generation, StateTrace, Timeline
 from lipmotion_faces import Staging
@@ -31,7 +31,7 @@ def result() -> Generation:
 def test_every_picture_is_that_of_its_cue(result: Generation, tmp_path: Path) -> None:
     drawings = draw(tmp_path / "chart", LETTERS)
     lipmotion.write(result, tmp_path / "a%05d.png", speech=SOUND, face=drawings, fps=24)
-    shown = shown_shapes(lipmotion.cues(result, fps=24))
+    shown = list_frame_shapes(lipmotion.cues(result, fps=24))
     pictures = sorted(tmp_path.glob("a*.png"))
     greys = [int(np.asarray(Image.open(path).convert("RGB"))[-1, 0, 0]) for path in pictures]
     expected = [10 + 10 * LETTERS.split().index(shape) for shape in shown]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from lipmotion import Delivery, read_motion, write
-from lipmotion.articulation.contact import closures
+from lipmotion.articulation.contact import find_closures
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
@@ -54,7 +54,7 @@ def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
     generation: Generation, tmp_path: Path
 ) -> None:
     write_glb(tmp_path / "head.glb", head())
-    character = driven_character(tmp_path / "head.glb")
+    character = load_character(tmp_path / "head.glb")
     larger = Delivery(intensity=2)
     both = with_curves(generation, "arkit")[0]
     before, after = both.motion["jawOpen"], shown(both, larger, 25.0, character).motion["jawOpen"]
@@ -99,7 +99,7 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(
     narrow = generation.motion.values.copy()
     column, closed = (
         generation.motion.column("opening"),
-        [each.frame for each in closures(generation.motion, generation.units)],
+        [each.frame for each in find_closures(generation.motion, generation.units)],
     )
     narrow[50:100, column] = 0.1
     narrow[closed, column] = 0.0

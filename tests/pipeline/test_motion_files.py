@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from lipmotion import Delivery, write
-from lipmotion.articulation.delivery import closed_times
+from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
-from lipmotion.meshes.fitting.living_curves import living_curves
-from lipmotion.meshes.model.head_angles import ANGLES as HEAD
+from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_living_curves, eye_and_brow_weights
+from lipmotion.meshes.model.bones import ANGLES as HEAD
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of
@@ -86,8 +85,8 @@ def test_the_script_takes_controls_that_were_asked_for(generation: Generation) -
 
 def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> None:
     said = (generation.motion, generation.units)
-    still = living_curves(*said, Staging(blinks=False, gaze=False, brows=False, head=False))
-    moving = living_curves(*said)
+    still = compute_living_curves(*said, Staging(blinks=False, gaze=False, brows=False, head=False))
+    moving = compute_living_curves(*said)
     assert np.abs(still.values).max() < 1e-9
     assert all(np.abs(moving[name]).max() > 1e-3 for name in ("browInnerUp", *HEAD))
     assert 0 <= moving["eyeBlinkLeft"].min() <= moving["eyeBlinkLeft"].max() <= 1
@@ -98,7 +97,7 @@ def test_eyes_look_to_one_side_together(generation: Generation) -> None:
     to_its_left = eye_and_brow_weights(Liveliness(np.zeros(1), np.zeros(1), gaze, np.zeros((1, 3))))
     for name, weight in (("OutLeft", 0.5), ("InRight", 0.5), ("InLeft", 0), ("OutRight", 0), ("UpLeft", 0.25)):
         assert to_its_left[f"eyeLook{name}"] == pytest.approx(weight)
-    moving = living_curves(generation.motion, generation.units)
+    moving = compute_living_curves(generation.motion, generation.units)
     assert moving["eyeLookOutLeft"] == pytest.approx(moving["eyeLookInRight"])
     assert moving["eyeLookInLeft"] == pytest.approx(moving["eyeLookOutRight"])
     assert np.abs(moving["eyeLookOutLeft"] * moving["eyeLookInLeft"]).max() < 1e-12
@@ -170,7 +169,7 @@ def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(
     names = [line for line in fewer if "NodePath" in line]
     assert 5 < len(names) < sum("NodePath" in line for line in plain)
     held = in_format(Path("a.tres"), generation, generation, None)
-    thin = thinned(held, Thinning(0.03, tuple(closed_times(held)))).motion
+    thin = thinned(held, Thinning(0.03, tuple(find_closed_times(held)))).motion
     for name in thin.names:
         assert np.abs(thin[name] - held.motion[name]).max() < 0.0301
     assert all(held.motion[name].max() <= 0.03 for name in {*held.motion.names} - {*thin.names})

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from lipmotion import Delivery
-from lipmotion.articulation.delivery import closed_times
+from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_container import read_gltf_document
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
@@ -57,7 +56,7 @@ def own_head(generation: Generation) -> Scene:
 def character(generation: Generation, tmp_path_factory: pytest.TempPathFactory) -> Scene:
     path = tmp_path_factory.mktemp("character") / "head.glb"
     write_glb(path, head())
-    return character_scene(generation, driven_character(path))
+    return character_scene(generation, load_character(path))
 
 
 @pytest.fixture(scope="module", params=["own_head", "character"])
@@ -137,7 +136,7 @@ def test_some_frames_are_those_of_the_whole(generation: Generation, mood: str, o
     scene = head_scene
     if own:
         write_glb(tmp_path / "own.glb", head())
-        scene = partial(character_scene, character=driven_character(tmp_path / "own.glb"))
+        scene = partial(character_scene, character=load_character(tmp_path / "own.glb"))
     whole = scene(long)
     assert whole.weights is not None
     for frames in (slice(0, 30), slice(250, 310), slice(len(values) - 20, len(values))):
@@ -152,7 +151,7 @@ def test_some_frames_are_those_of_the_whole(generation: Generation, mood: str, o
 def test_closures_between_two_keys_are_kept(generation: Generation, character: Scene, tmp_path: Path) -> None:
     path = tmp_path / "head.glb"
     write_glb(path, head())
-    slow = character_scene(generation, driven_character(path), 12.0)
+    slow = character_scene(generation, load_character(path), 12.0)
     assert slow.weights is not None
     assert character.weights is not None
     parted = slow.weights["jawOpen"] - slow.weights["mouthClose"]
@@ -223,7 +222,7 @@ def test_keys_that_others_give_are_left_out(generation: Generation, tmp_path: Pa
     settings = OutputSettings(shown_face("head"), delivery=Delivery(key_tolerance=0.02))
     scene = delivered_scene(Performance(generation, settings))
     assert scene.weights is not None
-    assert scene.thinning == Thinning(0.02, tuple(closed_times(generation)))
+    assert scene.thinning == Thinning(0.02, tuple(find_closed_times(generation)))
     write_scene(tmp_path / "a.glb", scene)
     stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.table())
     weights, turned = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, animate, read_motion, write
-from lipmotion.articulation.delivery import closed_on_grid
+from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.outputs.motion_files import with_articulation
@@ -58,7 +58,7 @@ def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> N
     for name in ("a.json", "a.csv"):
         motion, _ = read_motion(tmp_path / name)
         assert motion.rate_hz == 30
-        assert motion.values == pytest.approx(closed_on_grid(result, 30).motion.resampled(30).values, abs=1e-5)
+        assert motion.values == pytest.approx(close_on_frame_grid(result, 30).motion.resampled(30).values, abs=1e-5)
 
 
 def test_a_video_with_its_sound(result: Generation, toy_speech: Path, tmp_path: Path) -> None:

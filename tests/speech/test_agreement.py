@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, load_model
-from lipmotion.corpora.layouts import words_of_name
+from lipmotion.corpora.layouts import spell_name
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import (
     DOUBTFUL_SCORE,
@@ -119,7 +119,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[::4]
     phones, whole, half = Recogniser(load_model().phones, "auto"), 0, 0
     for name in names:
-        audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), words_of_name(name)
+        audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), spell_name(name)
         assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
             units = phones.align(audio, analysed(audio).mfcc(), said, Lexicon())
@@ -139,7 +139,7 @@ def test_real_recordings(recordings: Path) -> None:
         audio = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv")
         features = analysed(audio).mfcc()
         for clip, found in ((name, right), (other, wrong)):
-            words = words_of_name(clip)
+            words = spell_name(clip)
             assert words is not None
             found.append(agreement_score(audio, phones.align(audio, features, words, Lexicon())))
     assert min(right) > DOUBTFUL_SCORE

@@ -31,10 +31,10 @@ from lipmotion.storage.files import (
 )
 from lipmotion.testing import toy_utterances
 from lipmotion_faces.corpus.sync import sync
-from lipmotion_studio.folder import opened_folder
+from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
 from lipmotion_studio.study.store import ANSWERS, StudyStore
-from lipmotion_studio.training import VOICE, LearnedLine, TrainingOrder, VoiceOptions, carry_out
+from lipmotion_studio.training import VOICE, TrainingOrder, TrainingRecording, VoiceOptions, run_training
 from lipmotion_studio.votes import Side, Vote
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
@@ -56,28 +56,28 @@ def content_of(folder: Path) -> dict[str, bytes | None]:
 
 
 def drop(folder: Path) -> None:
-    with opened_folder(None, folder) as project:
+    with open_folder(None, folder) as project:
         (folder / "came").write_bytes(b"sound")
         project.drop("line.wav", folder / "came", "")
 
 
 def vote(folder: Path) -> None:
-    with opened_folder(None, folder) as project:
+    with open_folder(None, folder) as project:
         project.add_vote(Vote("line", (Side("a", "0" * 64, "0" * 64), Side("b", "1" * 64, "0" * 64)), 0))
 
 
 def pronounce(folder: Path) -> None:
-    with opened_folder(None, folder) as project:
+    with open_folder(None, folder) as project:
         project.add_pronunciation("bob", ("b", "aa", "b"), project.word_revision("bob"))
 
 
 def train_voice(folder: Path) -> None:
-    with opened_folder(None, folder):
+    with open_folder(None, folder):
         (folder / "came.mp4").write_bytes(b"no video")
-        lines = (LearnedLine(folder / "came.mp4", "line", "words"),)
+        lines = (TrainingRecording(folder / "came.mp4", "line", "words"),)
         place = folder / "voices" / "new.lipmotion"
         order = TrainingOrder(VOICE, place, folder / "training", lines, VoiceOptions(), None, 1)
-    carry_out(order, lambda _: None)
+    run_training(order, lambda _: None)
 
 
 def add_to_corpus(folder: Path) -> None:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from random import Random
 
-from lipmotion_studio.access import TOKEN_HEADER
+from lipmotion_studio.requests import TOKEN_HEADER
 from study.hostile import Hostile
 
 FOREIGN = "nobody may read this"

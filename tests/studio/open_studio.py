@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lipmotion import Model
-from lipmotion_studio.access import TOKEN_HEADER, Access
 from lipmotion_studio.application import studio_application
-from lipmotion_studio.folder import ProjectFolder, opened_folder
-from lipmotion_studio.known_model import KnownModel
-from lipmotion_studio.studio import Studio
+from lipmotion_studio.folder import ProjectFolder, open_folder
+from lipmotion_studio.requests import TOKEN_HEADER, Access
+from lipmotion_studio.studio import KnownModel, Studio
 from study.asgi import Application, Reply, answered, ask
 
 TOY_DIGEST = "0" * 64
@@ -57,7 +56,7 @@ class OpenStudio(NamedTuple):
 
     def row(self, number: int = 1) -> dict[str, Any]:
         """Return what the list says of a line."""
-        return self.studio.row(self.folder.line(number))
+        return self.studio.row(self.folder.recording(number))
 
     def change(self, what: str, number: int = 1, **content: Any) -> Reply:
         """Return the reply to a change of a line by somebody who sees it as it is."""
@@ -82,5 +81,5 @@ def open_studio(speech: Path, transcript: str, model: Model, folder: Path) -> It
     if not sound.exists():
         shutil.copy(speech, sound)
         sound.with_suffix(".txt").write_text(transcript, encoding="utf-8")
-    with opened_folder(sound) as opened, closing(Studio(opened, toy(model))) as studio:
+    with open_folder(sound) as opened, closing(Studio(opened, toy(model))) as studio:
         yield OpenStudio(opened, studio, studio_application(studio, Access(TOKEN, frozenset({HOST}))))

@@ -28,13 +28,12 @@ from lipmotion_faces.video.mp4 import write_mp4
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.storage.files import LOCK
-from lipmotion_studio import line as line_module
-from lipmotion_studio.access import TOKEN_HEADER, Access
+from lipmotion_studio import recording as recording_module
 from lipmotion_studio.application import studio_application
-from lipmotion_studio.folder import ProjectFolder, opened_folder
-from lipmotion_studio.known_model import known_model
+from lipmotion_studio.folder import ProjectFolder, open_folder
 from lipmotion_studio.project import project_from
-from lipmotion_studio.studio import Studio
+from lipmotion_studio.requests import TOKEN_HEADER, Access
+from lipmotion_studio.studio import Studio, known_model
 from lipmotion_studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
 from study.asgi import Reply
@@ -67,11 +66,11 @@ def test_an_edit_is_made_stored_and_taken_back(studio: OpenStudio) -> None:
     state = reply.content
     assert (reply.status, state["undo"], state["phones"][2]["label"]) == (200, 2, "p")
     assert 0 < state["changed"]["start_s"] < before["phones"][2]["end_s"]
-    stored = read_edits(studio.folder.edits(studio.folder.line(1)))
+    stored = read_edits(studio.folder.edits(studio.folder.recording(1)))
     assert stored.edits.sentences == ("phone 3 is p", "pin opening 0.1 at 1.0")
     undone = studio.ask("/api/lines/1/undo", {"revision": state["revision"], "count": 2}).content
     assert (undone["phones"], undone["redo"]) == (before["phones"], 2)
-    assert list(map(str, read_edits(studio.folder.edits(studio.folder.line(1))).undone)) == state["steps"]
+    assert list(map(str, read_edits(studio.folder.edits(studio.folder.recording(1))).undone)) == state["steps"]
     redone = studio.ask("/api/lines/1/redo", {"revision": undone["revision"]}).content
     assert (redone["steps"], redone["redo"]) == (["phone 3 is p"], 1)
 
@@ -145,11 +144,11 @@ def test_numbers_are_those_of_the_motion(studio: OpenStudio) -> None:
     reply = studio.ask("/api/lines/1/motion?start_s=0.5&end_s=1.0")
     names = json.loads(reply.headers["x-lipmotion-names"])
     found = np.frombuffer(reply.body, "<f4").reshape(-1, len(names))
-    work = studio.studio.desk.work(1)
+    work = studio.studio.workspace.work(1)
     assert work is not None
-    assert work.line is not None
+    assert work.recording is not None
     assert names == [channel["name"] for channel in state["channels"]]
-    assert found == pytest.approx(work.line.generation.motion.values[50:101], abs=1e-6)
+    assert found == pytest.approx(work.recording.generation.motion.values[50:101], abs=1e-6)
     assert reply.headers["x-lipmotion-first"] == "50"
     sure = np.frombuffer(studio.ask("/api/lines/1/motion?of=confidence").body, "<f4")
     assert len(sure) == state["frames"]
@@ -162,16 +161,16 @@ def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(
     studio: OpenStudio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert studio.ready()["settled"]
-    monkeypatch.setattr(line_module, "LONG_S", 0.0)
+    monkeypatch.setattr(recording_module, "LONG_S", 0.0)
     state = studio.edit("phone 3 is p").content
     assert not state["settled"]
-    work = studio.studio.desk.work(1)
+    work = studio.studio.workspace.work(1)
     assert work is not None
-    assert work.line is not None
+    assert work.recording is not None
     assert studio.ask("/api/lines/1/settle", {"revision": state["revision"] + 1}).status == 409
     state = studio.ask("/api/lines/1/settle", {"revision": state["revision"]}).content
     assert state["settled"]
-    whole = work.line.session.generated(work.line.file.edits).motion.values
+    whole = work.recording.session.generated(work.recording.file.edits).motion.values
     found = np.frombuffer(studio.ask("/api/lines/1/motion").body, "<f4").reshape(whole.shape)
     assert found == pytest.approx(whole, abs=1e-6)
 
@@ -213,7 +212,7 @@ def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
     assert studio.row()["marked"] != studio.row()["edits_digest"] == studio.ready()["edits_digest"]
     done = studio.ask("/api/export", {"files": [".csv"], "only": "approved"}).content
     assert (done["exported"][0]["files"], done["failed"]) == (["exports/line.csv"], [])
-    record = studio.folder.line(1).exports[-1]
+    record = studio.folder.recording(1).exports[-1]
     assert read_edits(studio.folder.path / record.edits).edits.sentences == ("phone 3 is p",)
     assert studio.row()["exported"] == "yes"
     studio.edit("phone 3 is m")
@@ -342,8 +341,8 @@ def test_a_project_outlives_its_model(
         asked.append(path)
         return toy_model
 
-    monkeypatch.setattr("lipmotion_studio.known_model.load_model", loaded)
-    with opened_folder(None, tmp_path / "project") as folder:
+    monkeypatch.setattr("lipmotion_studio.studio.load_model", loaded)
+    with open_folder(None, tmp_path / "project") as folder:
         folder.change(lambda project: replace(project, model="../gone.lipmotion"))
         with closing(Studio(folder)):
             assert asked == [None]
@@ -359,22 +358,22 @@ def test_what_the_list_says_of_a_line_outlives_a_kill(
             (stored,) = ProjectFolder(studio.folder.path).project.lines.values()  # as where it is killed now
             assert stored.duration_s == pytest.approx(duration_s)
             assert stored.doubt is not None
-            studio.folder.change_line(1, lambda line: replace(line, duration_s=None, doubt=None))
+            studio.folder.change_recording(1, lambda line: replace(line, duration_s=None, doubt=None))
 
 
 @pytest.mark.long
 def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(
     studio: OpenStudio, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lipmotion_studio.desk.MOST_OPEN", 1)
+    monkeypatch.setattr("lipmotion_studio.workspace.MAX_OPEN", 1)
     edited = studio.edit("phone 3 is p").content
     reply = studio.ask("/api/lines?name=other.wav", toy_speech.read_bytes())
     other = reply.content["id"]
     assert studio.ready(other)["status"] == "ready"
-    assert studio.studio.desk.work(1) is None
+    assert studio.studio.workspace.work(1) is None
     again = studio.ready()
     assert (again["steps"], again["revision"]) == (["phone 3 is p"], edited["revision"])
-    assert studio.studio.desk.work(other) is None
+    assert studio.studio.workspace.work(other) is None
     assert studio.ask("/api/understand", {"lines": "all"}).content["waiting"] == 0
     assert studio.ask("/api/understand", {"lines": [99]}).status == 404
     said = studio.change("transcript", other, text="mama").content
@@ -416,7 +415,7 @@ def test_a_filmed_face_the_real_video_and_another_model(
     sound.with_suffix(".txt").write_text(" ".join(toy_sentence.words), encoding="utf-8")
     pictures = [np.full((32, 48, 3), 60 + 4 * number, np.uint8) for number in range(20)]
     write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
-    with opened_folder(sound) as opened:
+    with open_folder(sound) as opened:
         opened.change(lambda now: replace(now, characters={"toy": str(filmed_face_file)}))
         with closing(Studio(opened, toy(toy_model), replace(toy(coupled_model), digest=OTHER_DIGEST))) as running:
             studio = OpenStudio(opened, running, studio_application(running, Access(TOKEN, frozenset({HOST}))))

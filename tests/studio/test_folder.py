@@ -13,8 +13,8 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.sound import write_sound
 from lipmotion.storage.files import portable_name
 from lipmotion.testing.toy import ToySentence
-from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, folder_for, opened_folder
-from lipmotion_studio.project import ExportRecord, Project, ProjectLine, project_document, project_from
+from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, project_path
+from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, project_document, project_from
 
 LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}
 RECORD = ExportRecord("arkit", {"exports/a.livelink.csv": "1"}, "exports/a.edits.json", "2", "3", "0.1.0")
@@ -30,14 +30,14 @@ def lines(tmp_path: Path, toy_sentence: ToySentence) -> Path:
 
 
 def test_a_project_is_there_again(lines: Path) -> None:
-    with opened_folder(lines) as folder:
+    with open_folder(lines) as folder:
         assert [line.name for line in folder.project.lines.values()] == ["a", "b", "inner/a"]
         for content in ("sound", "other"):
             (folder.path / content).write_text(content, encoding="utf-8")
         number = folder.drop("C:\\over there\\..\\A.WAV", folder.path / "sound", "hello")
-        assert folder.line(number).name == "C__over there_.._A"
+        assert folder.recording(number).name == "C__over there_.._A"
         assert folder.drop("a.wav", folder.path / "other", "") == number + 1
-        folder.change_line(1, lambda line: replace(line, mark="approved", exports=(RECORD,)))
+        folder.change_recording(1, lambda line: replace(line, mark="approved", exports=(RECORD,)))
         seen = folder.word_revision("tear")
         folder.add_pronunciation("tear", ("t", "eh", "r"), seen)
         with pytest.raises(RevisionError):
@@ -45,37 +45,37 @@ def test_a_project_is_there_again(lines: Path) -> None:
         folder.add_pronunciation("tear", ("t", "ih", "r"), folder.word_revision("tear"))
         project = folder.project
     assert folder.path == lines.with_name("lines.studio")
-    with opened_folder(folder.path) as again:
+    with open_folder(folder.path) as again:
         assert again.project == project
         assert again.lexicon().user == {"tear": (("t", "ih", "r"), ("t", "eh", "r"))}
-        assert again.line(number + 1).sound == "sounds/a-2.wav"
-    with opened_folder(lines) as once_more:  # nothing is added twice
+        assert again.recording(number + 1).sound == "sounds/a-2.wav"
+    with open_folder(lines) as once_more:  # nothing is added twice
         assert once_more.project == project
     document = json.loads((folder.path / PROJECT).read_text(encoding="utf-8"))
     assert document["lines"][0]["sound"] == "../lines/a.wav"
 
 
 def test_a_second_one_is_told(lines: Path) -> None:
-    with opened_folder(lines), pytest.raises(ExportError, match="another lipmotion"), opened_folder(lines):
+    with open_folder(lines), pytest.raises(ExportError, match="another lipmotion"), open_folder(lines):
         pass
 
 
 def test_the_folder_of_a_project(tmp_path: Path, lines: Path) -> None:
-    assert folder_for(lines / "a.wav") == lines / "a.studio"
-    assert folder_for(lines, tmp_path / "x") == tmp_path / "x"
+    assert project_path(lines / "a.wav") == lines / "a.studio"
+    assert project_path(lines, tmp_path / "x") == tmp_path / "x"
     with pytest.raises(InputError, match="no such file"):
-        folder_for(tmp_path / "nothing")
+        project_path(tmp_path / "nothing")
 
 
 def test_a_project_that_is_not_there_is_an_empty_one(tmp_path: Path) -> None:
     for _ in range(2):
-        with opened_folder(tmp_path / "hero.studio") as folder:
+        with open_folder(tmp_path / "hero.studio") as folder:
             assert (folder.path, folder.project) == (tmp_path / "hero.studio", Project())
     assert (tmp_path / "hero.studio" / PROJECT).is_file()
 
 
 def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with opened_folder(lines) as folder:
+    with open_folder(lines) as folder:
         before = folder.project
 
         def refuse() -> None:
@@ -83,14 +83,14 @@ def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.Mon
 
         monkeypatch.setattr(folder, "save", refuse)
         with pytest.raises(ExportError):
-            folder.change_line(1, lambda line: replace(line, mark="redo"))
+            folder.change_recording(1, lambda line: replace(line, mark="redo"))
         assert folder.project == before
         monkeypatch.undo()
 
 
 def test_a_project_is_what_its_document_says() -> None:
     project = Project(
-        {1: ProjectLine(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
+        {1: ProjectRecording(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
     )
     assert project_from(json.loads(json.dumps(project_document(project)))) == replace(project, next_number=2)
 
@@ -124,11 +124,11 @@ def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -
 @pytest.mark.parametrize("name", ["CON.wav", "nul .wav", "Aux..wav", "com1.take.wav"])
 def test_what_is_called_as_a_device_gets_another_name(lines: Path, tmp_path: Path, name: str) -> None:
     sound = (lines / "a.wav").rename(tmp_path / name)
-    assert portable_name(folder_for(sound).name) == folder_for(sound).name
-    with opened_folder(sound, tmp_path / "own") as folder:
+    assert portable_name(project_path(sound).name) == project_path(sound).name
+    with open_folder(sound, tmp_path / "own") as folder:
         (folder.path / "came").write_text("sound", encoding="utf-8")
         for number in (1, folder.drop(name, folder.path / "came", "")):
-            line = folder.line(number)
+            line = folder.recording(number)
             assert portable_name(line.name) == line.name
             assert portable_name(folder.edits(line).name) == folder.edits(line).name
 
@@ -137,5 +137,5 @@ def test_what_is_called_as_a_device_gets_another_name(lines: Path, tmp_path: Pat
 def test_the_usual_folder_of_a_project_is_no_link(lines: Path, tmp_path: Path) -> None:
     (lines / "a.studio").symlink_to(tmp_path)
     with pytest.raises(InputError, match="is a link"):
-        folder_for(lines / "a.wav")
-    assert folder_for(lines / "a.wav", lines / "a.studio") == lines / "a.studio"
+        project_path(lines / "a.wav")
+    assert project_path(lines / "a.wav", lines / "a.studio") == lines / "a.studio"

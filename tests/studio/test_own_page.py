@@ -13,7 +13,7 @@ from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
-from lipmotion_studio.folder import opened_folder
+from lipmotion_studio.folder import open_folder
 from studio.test_page import LIMIT_S, SCREENS, WEBGL, WELCOME, Page, served
 from studio.toy_recordings import SENTENCES, write_recordings
 
@@ -27,7 +27,7 @@ def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:
     project = tmp_path / "project"
     recordings = os.path.relpath(write_recordings(tmp_path / "recordings"), project)
     (tmp_path / "home").mkdir()
-    with opened_folder(WELCOME, project) as folder:
+    with open_folder(WELCOME, project) as folder:
         folder.change(lambda now: replace(now, recordings=recordings))
     with served(project) as address, browser(tmp_path / "home", *WEBGL) as window:
         window.open(address)

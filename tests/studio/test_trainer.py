@@ -23,7 +23,7 @@ pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion_studio.folder import ProjectFolder
 from lipmotion_studio.trainer import TRAINING, Trainer
-from lipmotion_studio.training import TrainingOrder, VoiceOptions, carry_out, divided_names
+from lipmotion_studio.training import TrainingOrder, VoiceOptions, run_training, split_names
 from studio.open_studio import OpenStudio, open_studio
 from studio.toy_recordings import SENTENCES, write_recordings
 
@@ -117,7 +117,7 @@ def test_what_is_stopped_or_killed_goes_on(studio: OpenStudio) -> None:
     assert (document["state"], document["name"]) == ("interrupted", "me")
     kept = Corpus.open(studio.folder.path / TRAINING / "corpus").names()
     assert set(kept) == {f"toy{number:02d}" for number in range(SENTENCES)}
-    found.again()
+    found.retry()
     wait_until(lambda: not found.is_working and found._thread is None)
     document = found.document()
     assert document is not None
@@ -154,17 +154,17 @@ def test_what_cannot_be_made_is_refused(studio: OpenStudio) -> None:
 
 def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> None:
     """What the readers refuse is told as a sentence, and nothing is left of what was gathered."""
-    from lipmotion_studio.training import LearnedLine, _gathered
+    from lipmotion_studio.training import TrainingRecording, gather_recordings
 
     for name in ("take.mp4", "take.srt", "other.mp4"):
         (tmp_path / name).write_text(name, encoding="utf-8")
     lines = (
-        LearnedLine(tmp_path / "take.mp4", "a/take", ""),
-        LearnedLine(tmp_path / "take.mp4", "a-take", "so typed"),
-        LearnedLine(tmp_path / "other.mp4", "other", ""),
+        TrainingRecording(tmp_path / "take.mp4", "a/take", ""),
+        TrainingRecording(tmp_path / "take.mp4", "a-take", "so typed"),
+        TrainingRecording(tmp_path / "other.mp4", "other", ""),
     )
     order = TrainingOrder("voice", tmp_path / "me.lipmotion", tmp_path / "work", lines, VoiceOptions(), None, 1)
-    with _gathered(order) as place:
+    with gather_recordings(order) as place:
         found = {path.name: path.read_text(encoding="utf-8") for path in place.iterdir()}
     assert found == {
         "a-take.mp4": "take.mp4",
@@ -174,7 +174,7 @@ def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> 
         "other.mp4": "other.mp4",
     }
     told: list[Any] = []
-    carry_out(order, told.append)
+    run_training(order, told.append)
     assert list(told[-1]) == ["error"]
     assert not order.target.exists()
     assert not any(path.is_file() for path in order.work.glob("recordings/**/*"))
@@ -182,12 +182,12 @@ def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> 
 
 def test_some_recordings_are_kept_back(toy_corpus: Corpus) -> None:
     names = toy_corpus.names()
-    assert divided_names(toy_corpus, names, held_out=False) == (sorted(names), [])
-    learned, kept_back = divided_names(toy_corpus, names, held_out=True)
+    assert split_names(toy_corpus, names, held_out=False) == (sorted(names), [])
+    learned, kept_back = split_names(toy_corpus, names, held_out=True)
     assert (learned, kept_back) == (sorted(toy_corpus.names("train")), sorted(toy_corpus.names("test")))
     without_list = [name for name in names if name not in kept_back]
-    assert divided_names(toy_corpus, without_list, held_out=True) == (without_list[:-1], without_list[-1:])
-    assert divided_names(toy_corpus, without_list[:9], held_out=True) == (without_list[:9], [])
+    assert split_names(toy_corpus, without_list, held_out=True) == (without_list[:-1], without_list[-1:])
+    assert split_names(toy_corpus, without_list[:9], held_out=True) == (without_list[:9], [])
 
 
 def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -253,7 +253,7 @@ def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path: Path, damage: str
     file.write_text(damage, encoding="utf-8")
     trainer = Trainer(folder)
     assert (trainer.document(), str(file) in trainer.damage, trainer.is_restorable) == (None, True, True)
-    for act in (trainer.again, lambda: trainer.begin("voice", "a", [], VoiceOptions())):
+    for act in (trainer.retry, lambda: trainer.begin("voice", "a", [], VoiceOptions())):
         with pytest.raises(InputError, match="damaged"):
             act()
     assert file.read_text(encoding="utf-8") == damage

@@ -34,25 +34,25 @@ def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line
     first = studio.ask("/api/lines?name=take.wav", sound, x_lipmotion_transcript="mama").content
     studio.ready(first["id"])
     assert studio.change("edits", first["id"], steps=["phone 2 is p"]).status == 200
-    path = studio.folder.sound(studio.folder.line(first["id"]))
+    path = studio.folder.sound(studio.folder.recording(first["id"]))
     assert studio.change("remove", first["id"]).status == 200
     other = sound[:-2] + b"\0\1"
     second = studio.ask("/api/lines?name=take.wav", other, x_lipmotion_transcript="bob").content
     state = studio.ready(second["id"])
     assert (second["name"], state["transcript"], state["steps"]) == ("take-2", "bob", [])
     assert path.read_bytes() == sound
-    assert studio.folder.sound(studio.folder.line(second["id"])).read_bytes() == other
+    assert studio.folder.sound(studio.folder.recording(second["id"])).read_bytes() == other
 
 
 def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(studio: OpenStudio) -> None:
-    sound = studio.folder.sound(studio.folder.line(1))
+    sound = studio.folder.sound(studio.folder.recording(1))
     assert studio.edit("phone 3 is p").status == 200
     assert studio.change("remove").status == 200
     other = sound.with_name("inner") / "line.wav"
     other.parent.mkdir()
     other.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
-    assert [studio.folder.line(number).name for number in studio.folder.add(other)] == ["line-2"]
-    assert [studio.folder.line(number).name for number in studio.folder.add(sound)] == ["line"]
+    assert [studio.folder.recording(number).name for number in studio.folder.add(other)] == ["line-2"]
+    assert [studio.folder.recording(number).name for number in studio.folder.add(sound)] == ["line"]
     assert studio.ready(3)["steps"] == ["phone 3 is p"]
 
 
@@ -98,7 +98,7 @@ def test_two_windows_lose_nothing_of_what_was_acknowledged(studio: OpenStudio) -
 
 def test_damaged_edits_are_an_error_with_a_way_back(studio: OpenStudio) -> None:
     assert studio.edit("phone 3 is p").status == 200
-    seen, file = studio.row(), studio.folder.edits(studio.folder.line(1))
+    seen, file = studio.row(), studio.folder.edits(studio.folder.recording(1))
     damage = file.read_bytes()[:-40]
     file.write_bytes(damage)
     row = studio.row()
@@ -119,7 +119,7 @@ def test_damaged_edits_are_an_error_with_a_way_back(studio: OpenStudio) -> None:
 
 
 def test_edits_that_others_make_of_an_open_line_are_seen(studio: OpenStudio) -> None:
-    state, line = studio.ready(), studio.folder.line(1)
+    state, line = studio.ready(), studio.folder.recording(1)
     file = read_edits(studio.folder.edits(line))
     write_edits(file.then("phone 3 is p"), studio.folder.edits(line))
     content = {"revision": state["revision"], "steps": ["phone 4 is p"]}
@@ -128,7 +128,7 @@ def test_edits_that_others_make_of_an_open_line_are_seen(studio: OpenStudio) -> 
 
 
 def test_a_sound_that_was_exchanged_is_neither_opened_nor_played_nor_exported(studio: OpenStudio) -> None:
-    sound = studio.folder.sound(studio.folder.line(1))
+    sound = studio.folder.sound(studio.folder.recording(1))
     assert studio.ask("/api/lines/1/sound.wav").status == 200
     sound.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
     refused = [studio.ask("/api/lines/1/sound.wav"), studio.ask("/api/lines/1/video", {"start_s": 0, "end_s": 0.2})]
@@ -146,7 +146,7 @@ def test_a_project_of_an_earlier_version_adopts_its_sounds(
     with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
         studio.ready()
         assert studio.edit("phone 3 is p").status == 200
-        file, project = studio.folder.edits(studio.folder.line(1)), studio.folder.path / "project.json"
+        file, project = studio.folder.edits(studio.folder.recording(1)), studio.folder.path / "project.json"
     for path, name in ((file, "recording_sha256"), (project, "sha256")):
         document = json.loads(path.read_text(encoding="utf-8"))
         for each in (document, *document.get("lines", ())):
@@ -156,7 +156,7 @@ def test_a_project_of_an_earlier_version_adopts_its_sounds(
     with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
         assert (studio.ready()["steps"], "is taken to be" in caplog.text) == (["phone 3 is p"], True)
     digest = sha256_of(toy_speech)
-    assert (read_edits(file).sha256, ProjectFolder(project.parent).line(1).sha256) == (digest, digest)
+    assert (read_edits(file).sha256, ProjectFolder(project.parent).recording(1).sha256) == (digest, digest)
     assert (project.parent / "copies" / file.name).read_bytes() == file.read_bytes()
 
 

@@ -29,17 +29,17 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
-from lipmotion_studio.access import Access
 from lipmotion_studio.application import studio_application
-from lipmotion_studio.folder import opened_folder
+from lipmotion_studio.folder import open_folder
 from lipmotion_studio.project import digest_of
+from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from studio.open_studio import HOST, TOKEN, OpenStudio, toy
 from study.asgi import Reply
 
 EDITS = ("phone 2 is p", "pin opening 0.1 at 0.2", "set intensity 1.1", "remove phone 3", "phone 99 is p")
 """The last one is refused: there is no such phone."""
-MOST_LINES = 4
+MAX_RECORDINGS = 4
 TWO_WORDS_S = 0.4, 1.24
 """Where the first two words of the sentence are said."""
 DAMAGES: dict[str, Callable[[Path], Any]] = {
@@ -101,7 +101,7 @@ class TwoClients(RuleBasedStateMachine):
         self.open()
 
     def open(self) -> None:
-        folder = self.closing.enter_context(opened_folder(self.folder / "a.studio"))
+        folder = self.closing.enter_context(open_folder(self.folder / "a.studio"))
         studio = self.closing.enter_context(closing(Studio(folder, toy(self.model))))
         folder.change(lambda project: replace(project, recogniser="own"))  # which is the fastest one
         application = studio_application(studio, Access(TOKEN, frozenset({HOST})))
@@ -167,13 +167,13 @@ class TwoClients(RuleBasedStateMachine):
     @rule(sound=st.integers(0, 2))
     def dropped(self, sound: int) -> None:
         """All that is dropped has the same name."""
-        if len(self.lines) >= MOST_LINES:
+        if len(self.lines) >= MAX_RECORDINGS:
             return
         content, words = self.sounds[sound].read_bytes(), self.words[0]
         reply = self.ask("/api/lines?name=take.wav", content, x_lipmotion_transcript=words)
         assert reply.status == 201
         row = reply.content
-        line = self.studio.folder.line(row["id"])
+        line = self.studio.folder.recording(row["id"])
         sha256 = sha256_of(self.sounds[sound])
         shadow = Shadow(row["id"], row["name"], self.studio.folder.sound(line), sha256, words)
         self.lines[shadow.number] = shadow
@@ -302,7 +302,7 @@ class TwoClients(RuleBasedStateMachine):
         line = self.line(pick)
         if line.damage:
             return
-        file = self.studio.folder.edits(self.studio.folder.line(line.number))
+        file = self.studio.folder.edits(self.studio.folder.recording(line.number))
         self.ready(line)
         DAMAGES[damage](file)
         line.damage = f"{damage} {file.read_bytes()[:100]!r}" if file.exists() else damage

@@ -8,7 +8,7 @@ from typing import Any
 
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo, write_manifest
-from lipmotion_studio.study.questions import SCALES
+from lipmotion_studio.study.settings import SCALES
 from lipmotion_studio.study.trials import anchor_trials, attention_trials, main_trials, practice_trials, questions_of
 
 CONDITIONS = ("recording", "visemes", "phones")

@@ -9,17 +9,28 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from lipmotion_studio.study.answers import KINDS, PAIRED, read_answers
-from lipmotion_studio.study.collected import export_answers, forget_rater
+from lipmotion.errors import InputError
+from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_answers
+from lipmotion_studio.study.conduct import export_answers, forget_rater
 from lipmotion_studio.study.manifest import Study, check_videos
-from lipmotion_studio.study.store import StudyStore
+from lipmotion_studio.study.store import AnswerSheet, StudyStore
+from lipmotion_studio.study.trials import trials_of
 from study.asgi import Application, ask
 from study.small_study import scripted_answer, small_study
 
 starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
 
-from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, PAGE, study_application  # noqa: E402
+from lipmotion_studio.study.application import (  # noqa: E402
+    ANSWER_BURST,
+    JOIN_BURST,
+    PAGE,
+    RateLimit,
+    check_sheet,
+    study_application,
+)
 from lipmotion_studio.web.replies import HEADERS  # noqa: E402
+
+SENT = {"trial": 4, "values": ["second"], "plays": [1, 2], "seconds": 1.25}
 
 
 class Open(NamedTuple):
@@ -206,3 +217,82 @@ def test_the_page_has_no_resource_from_elsewhere(place: Open) -> None:
         assert [word for word in text.split() if "://" in word and "www.w3.org/2000/svg" not in word] == []
         assert "innerHTML" not in text
         assert "<style" not in text
+
+
+def test_an_answer_is_taken_as_it_is(tmp_path: Path) -> None:
+    study = small_study(tmp_path / "study")
+    assert check_sheet(study, trials_of(study, 7), 7, SENT) == AnswerSheet(7, 4, ("second",), 1.25, 3)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"trial": -1},
+        {"trial": 1000},
+        {"trial": True},
+        {"trial": "4"},
+        {"trial": 4.0},
+        {"values": []},
+        {"values": ["third"]},
+        {"values": ["first", "first"]},
+        {"values": "first"},
+        {"values": [1]},
+        {"values": None},
+        {"plays": [1]},
+        {"plays": [1, 0]},
+        {"plays": [1, True]},
+        {"plays": [1, 10**9]},
+        {"plays": {}},
+        {"seconds": 0.8},  # two videos of half a second
+        {"seconds": -1},
+        {"seconds": 10**400},
+        {"seconds": "1.25"},
+        {"seconds": None},
+        {"more": 1},
+    ],
+)
+def test_anything_else_is_refused(tmp_path: Path, change: dict[str, Any]) -> None:
+    study = small_study(tmp_path / "study")
+    with pytest.raises(InputError):
+        check_sheet(study, trials_of(study, 7), 7, SENT | change)
+
+
+@pytest.mark.parametrize("content", [None, [], "text", 7, {}, {"trial": 0}])
+def test_only_the_object_is_taken(tmp_path: Path, content: Any) -> None:
+    study = small_study(tmp_path / "study")
+    with pytest.raises(InputError, match="required a"):
+        check_sheet(study, trials_of(study, 7), 7, content)
+
+
+def test_every_scale_and_every_slider_has_a_value(tmp_path: Path) -> None:
+    opinions, ranking = small_study(tmp_path / "m", MOS), small_study(tmp_path / "r", RANKING)
+    sent = {"trial": 0, "values": ["01", "2", "3", "4", "5"], "plays": [1], "seconds": 0.5}
+    sheet = check_sheet(opinions, trials_of(opinions, 1), 1, sent)
+    assert sheet.values == ("1", "2", "3", "4", "5")
+    for values in (["1"] * 4, ["0", "2", "3", "4", "5"], ["6", "2", "3", "4", "5"]):
+        with pytest.raises(InputError):
+            check_sheet(opinions, trials_of(opinions, 1), 1, sent | {"values": values})
+    sent = {"trial": 0, "values": ["0", "50", "100", "7"], "plays": [1] * 4, "seconds": 2.0}
+    assert check_sheet(ranking, trials_of(ranking, 1), 1, sent).values == ("0", "50", "100", "7")
+    with pytest.raises(InputError):
+        check_sheet(ranking, trials_of(ranking, 1), 1, sent | {"values": ["0", "50", "101", "7"]})
+
+
+def test_a_burst_and_then_a_rate() -> None:
+    now_s = [100.0]
+    limit = RateLimit(2.0, 5, lambda: now_s[0])
+    assert [limit.allows("a") for _ in range(7)] == [True] * 5 + [False] * 2
+    assert limit.allows("b")
+    now_s[0] += 0.5
+    assert [limit.allows("a") for _ in range(2)] == [True, False]
+    now_s[0] += 60
+    assert [limit.allows("a") for _ in range(7)] == [True] * 5 + [False] * 2
+
+
+def test_nothing_is_kept_of_those_who_have_gone() -> None:
+    now_s = [0.0]
+    limit = RateLimit(1.0, 2, lambda: now_s[0])
+    for asker in range(20_000):
+        now_s[0] += 0.01
+        assert limit.allows(asker)
+    assert len(limit._full_at_s) < 3000

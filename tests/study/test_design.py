@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion.types import Audio
@@ -18,12 +20,11 @@ from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.design import design_study
-from lipmotion_studio.study.encoding import encode_shown
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
-from lipmotion_studio.study.region import Region
-from lipmotion_studio.study.settings import StudySettings
-from lipmotion_studio.study.sources import condition_of, drawn_job, named_conditions, split_sentences
+from lipmotion_studio.study.settings import Region, StudySettings
+from lipmotion_studio.study.sources import condition_of, encode_shown, named_conditions, read_sentences
 
+DRAWN = Job(Request(), Outputs(face="portrait"))
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
 
 
@@ -169,18 +170,18 @@ def test_conditions_that_are_refused(conditions: list[str], says: str) -> None:
 )
 def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], object], source: str, says: str) -> None:
     prepare(here)
-    said = split_sentences([here / "said"])
+    said = read_sentences([here / "said"])
     if not says:
-        assert callable(condition_of(str(here / source), said, drawn_job("portrait", None, "auto")))
+        assert callable(condition_of(str(here / source), said, DRAWN))
         return
     with pytest.raises(InputError, match=says):
-        condition_of(str(here / source), said, drawn_job("portrait", None, "auto"))
+        condition_of(str(here / source), said, DRAWN)
 
 
 def test_recordings_without_pictures_cannot_be_shown() -> None:
-    said = split_sentences([Path("examples/welcome.flac")])
+    said = read_sentences([Path("examples/welcome.flac")])
     with pytest.raises(InputError, match="has no pictures"):
-        condition_of("recording", said, drawn_job("portrait", None, "auto"))
+        condition_of("recording", said, DRAWN)
 
 
 def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) -> None:
@@ -196,7 +197,7 @@ def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) 
 
 def test_two_sentences_of_one_name_are_refused(here: Path) -> None:
     with pytest.raises(InputError, match="two sentences are called 'one'"):
-        split_sentences([here / "said", here / "ours" / "one.mp4"])
+        read_sentences([here / "said", here / "ours" / "one.mp4"])
 
 
 @pytest.mark.long

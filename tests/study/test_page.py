@@ -14,7 +14,7 @@ from children import wait_until
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
-from lipmotion_studio.study.collected import collected_answers
+from lipmotion_studio.study.conduct import collected_answers
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo
 from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screen
 from study.firefox import BOTH, Opens

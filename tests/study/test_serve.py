@@ -11,9 +11,8 @@ import pytest
 
 from children import LIPMOTION, environment, run_child, wait_until
 from lipmotion.errors import InputError
-from lipmotion_studio.study.collected import collected_answers
+from lipmotion_studio.study.conduct import collected_answers, serve_study
 from lipmotion_studio.study.manifest import VIDEOS
-from lipmotion_studio.study.serve import serve_study
 from lipmotion_studio.study.store import ANSWERS
 from study.hostile import FOREIGN, hostile_requests
 from study.served import Connection, ScriptedRater, raw_reply, send_junk, served

@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion_faces.tracking import face_follower as follow
-from lipmotion_faces.tracking.landmarks import TRACKED_POINTS
-from lipmotion_faces.tracking.trackers import FaceBox, LandmarkTracker
+from lipmotion_faces.tracking.trackers import TRACKED_POINTS, FaceBox, LandmarkTracker
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 

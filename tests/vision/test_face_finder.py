@@ -48,32 +48,32 @@ def bright(height: int, width: int, left: int, top: int, side: int) -> NDArray[n
 @pytest.fixture
 def finder() -> FaceFinder:
     found = FaceFinder()
-    found._detector = Detector()
+    found._running = Detector()
     return found
 
 
 def test_the_whole_picture_is_enough(finder):
     boxes = finder.boxes(bright(720, 1280, 300, 100, 80))
     assert [(box.x, box.y, box.side) for box in boxes] == [pytest.approx((340, 140, 80))]
-    assert finder._detector.shapes == [(720, 1280)]
+    assert finder._running.shapes == [(720, 1280)]
 
 
 def test_what_is_smaller_is_found_in_a_part_once(finder):
     image = bright(720, 1280, 400, 300, 20)  # in the left part and in the middle one
     assert [(box.x, box.y, box.side) for box in finder.boxes(image)] == [pytest.approx((410, 310, 20))]
-    assert finder._detector.shapes[1:] == [(720, 720)] * 3
+    assert finder._running.shapes[1:] == [(720, 720)] * 3
     assert finder.boxes(image, thorough=False) == []
 
 
 def test_a_small_picture_has_no_parts(finder):
     finder.boxes(np.zeros((288, 360, 3), np.uint8))
-    assert finder._detector.shapes == [(288, 360)]
+    assert finder._running.shapes == [(288, 360)]
 
 
 def test_a_large_picture_is_reduced_and_the_box_is_not(finder):
     pytest.importorskip("cv2")
     boxes = finder.boxes(bright(2160, 3840, 900, 600, 300))
-    assert finder._detector.shapes == [(720, 1280)]
+    assert finder._running.shapes == [(720, 1280)]
     assert (boxes[0].x, boxes[0].y, boxes[0].side) == pytest.approx((1050, 750, 300), abs=3)
 
 

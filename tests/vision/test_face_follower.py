@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion_faces.tracking import face_follower as follow
 from lipmotion_faces.tracking.face_follower import JUMP, LOST_FRAMES, MOST_THUMBNAILS, FaceFollower
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion_faces.tracking.trackers import FaceBox, LandmarkTracker
+from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, FaceBox, LandmarkTracker
 
 pytestmark = pytest.mark.video
 

@@ -8,7 +8,7 @@ import pytest
 from children import run_child
 from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import install_command
-from lipmotion_faces.tracking.face_mesh import FaceMesh, quiet_stderr
+from lipmotion_faces.tracking.mediapipe import FaceMesh, quiet_stderr
 from lipmotion_faces.tracking.packages import import_face_mesh, import_opencv
 from lipmotion_faces.tracking.trackers import tracker_named
 

@@ -30,7 +30,7 @@ def middle_of_bright(image: NDArray[np.uint8]) -> NDArray[np.float64]:
 def test_positions_in_the_window_are_those_in_the_picture():
     for side in (96, 384, 800):
         window = FaceWindow.around(500, 300, side)
-        shown = window.shown(dot(720, 1280, 480, 310))
+        shown = window.cut(dot(720, 1280, 480, 310))
         assert shown.shape == (SIZE_PX, SIZE_PX, 3)
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [484, 314, 0], atol=0.6)
 
@@ -38,10 +38,10 @@ def test_positions_in_the_window_are_those_in_the_picture():
 def test_beyond_the_edges_it_is_black():
     for x, y in ((4, 4), (1270, 4), (4, 710), (1270, 710)):
         window = FaceWindow.around(x, y, 300)
-        shown = window.shown(dot(720, 1280, x - 4, y - 4))
+        shown = window.cut(dot(720, 1280, x - 4, y - 4))
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [x, y, 0], atol=3)
         assert (shown == 0).mean() > 0.9
-    assert not FaceWindow(2000, 0, 100).shown(np.full((72, 128, 3), 255, np.uint8)).any()
+    assert not FaceWindow(2000, 0, 100).cut(np.full((72, 128, 3), 255, np.uint8)).any()
 
 
 def test_depth_is_scaled_too():

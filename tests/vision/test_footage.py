@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion_faces.tracking.footage import footage_frames, footage_groups, track_footage, untracked_frames
+from lipmotion_faces.tracking.footage import footage_frames, footage_groups, read_video_frames, track_footage
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 from vision.scripted import face, script
@@ -136,7 +136,7 @@ def test_untracked_frames_hold_the_last_picture(write_video):
     """At a constant rate; where pictures were dropped, the one before is shown again."""
     for dropped in ((), (3,), (7, 8, 9), (19,)):
         ticks = [n for n in range(20) if n not in dropped]
-        frames, rate_hz = untracked_frames(write_video(ticks=ticks))
+        frames, rate_hz = read_video_frames(write_video(ticks=ticks))
         assert rate_hz == 25.0
         wanted = [sum(tick <= n for tick in ticks) - 1 for n in range(ticks[-1] + 1)]
         assert levels(frames) == wanted

@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from lipmotion_faces.tracking.head_pose import similarity_transforms, without_head_motion
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking.head_pose import fit_similarities, remove_head_motion
+from lipmotion_faces.tracking.trackers import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 FRAMES = 40
@@ -33,8 +33,8 @@ def moved(speech) -> NDArray[np.float64]:
 
 
 def test_head_motion_is_removed_and_speech_is_not(speech, moved):
-    still = without_head_motion(speech, TRACKED_POINTS)
-    np.testing.assert_allclose(without_head_motion(moved, TRACKED_POINTS), still, atol=1e-6)
+    still = remove_head_motion(speech, TRACKED_POINTS)
+    np.testing.assert_allclose(remove_head_motion(moved, TRACKED_POINTS), still, atol=1e-6)
     np.testing.assert_allclose(  # distances within a frame, in eye distances, are those of the speech
         np.linalg.norm(still[:, COLUMN[13]] - still[:, COLUMN[14]], axis=1),
         np.linalg.norm(speech[:, COLUMN[13]] - speech[:, COLUMN[14]], axis=1),
@@ -43,7 +43,7 @@ def test_head_motion_is_removed_and_speech_is_not(speech, moved):
 
 
 def test_the_axes_are_those_of_the_head(moved):
-    head = without_head_motion(moved, TRACKED_POINTS)
+    head = remove_head_motion(moved, TRACKED_POINTS)
     right, left = (head[:, COLUMN[index]].mean(axis=0) for index in EYE_CORNERS)
     np.testing.assert_allclose(right, [-0.5, 0, 0], atol=1e-6)
     np.testing.assert_allclose(left, [0.5, 0, 0], atol=1e-6)
@@ -55,10 +55,10 @@ def test_the_axes_are_those_of_the_head(moved):
 
 
 def test_noise_of_the_rigid_points_hardly_reaches_the_lips(speech, moved):
-    clean = without_head_motion(speech, TRACKED_POINTS)
+    clean = remove_head_motion(speech, TRACKED_POINTS)
     noise = np.random.default_rng(7).normal(size=moved.shape)
     noise[:, [COLUMN[index] for index in LIP_POINTS]] = 0
-    noisy = without_head_motion(moved + 0.5 * noise, TRACKED_POINTS)  # under 1 % of the distance between the eyes
+    noisy = remove_head_motion(moved + 0.5 * noise, TRACKED_POINTS)  # under 1 % of the distance between the eyes
     lips = [COLUMN[index] for index in LIP_POINTS]
     assert np.sqrt(np.square(noisy - clean)[:, lips].mean()) < 0.01
 
@@ -67,7 +67,7 @@ def test_similarity_agrees_with_scipy_where_only_rotation_is_asked():
     rng = np.random.default_rng(8)
     target = rng.normal(size=(12, 3))
     points = rng.normal(size=(5, 12, 3))
-    turn, scale, shift = similarity_transforms(points, target)
+    turn, scale, shift = fit_similarities(points, target)
     for n in range(5):
         centred = points[n] - points[n].mean(axis=0)
         oracle, _ = Rotation.align_vectors(target - target.mean(axis=0), centred)
@@ -79,7 +79,7 @@ def test_similarity_agrees_with_scipy_where_only_rotation_is_asked():
 def test_similarity_is_the_least_squares_solution():
     rng = np.random.default_rng(9)
     target, points = rng.normal(size=(12, 3)), rng.normal(size=(1, 12, 3))
-    turn, scale, shift = similarity_transforms(points, target)
+    turn, scale, shift = fit_similarities(points, target)
 
     def cost(turned: NDArray[np.float64], scaled: float, shifted: NDArray[np.float64]) -> float:
         return float(np.square(scaled * points[0] @ turned.T + shifted - target).sum())
@@ -92,7 +92,7 @@ def test_similarity_is_the_least_squares_solution():
 
 def test_a_mirrored_face_is_not_reflected():
     points = np.random.default_rng(10).normal(size=(1, 12, 3))
-    turn, _, _ = similarity_transforms(points * (-1, 1, 1), points[0])
+    turn, _, _ = fit_similarities(points * (-1, 1, 1), points[0])
     assert np.linalg.det(turn[0]) == pytest.approx(1)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lipmotion_faces.tracking.landmarks import FOREHEAD_SLOPE_DEG, LIP_POINTS, TRACKED_POINTS
-from lipmotion_faces.tracking.mouth_pictures import eyes_to_image, face_to_image, mouth_crop, region_to_image
+from lipmotion_faces.tracking.head_pose import crop_mouth, eyes_to_image, face_to_image, region_to_image
+from lipmotion_faces.tracking.trackers import FOREHEAD_SLOPE_DEG, LIP_POINTS, TRACKED_POINTS
 
 pytestmark = pytest.mark.video
 cv2 = pytest.importorskip("cv2")
@@ -22,13 +22,13 @@ def ramp(width: int, height: int) -> np.ndarray:
 def test_an_upright_face_of_the_right_size_is_cut_out_as_it_is():
     eyes = np.array([[60.0, 50.0], [150.0, 50.0]])  # 90 px apart, the middle at 105, 50
     image = ramp(256, 200)
-    np.testing.assert_array_equal(mouth_crop(image, eyes_to_image(eyes)), image[98 : 98 + 56, 69 : 69 + 72])
+    np.testing.assert_array_equal(crop_mouth(image, eyes_to_image(eyes)), image[98 : 98 + 56, 69 : 69 + 72])
 
 
 def test_the_eyes_of_the_turned_head_become_level():
     angle = np.deg2rad(20)
     half = 45 * np.array([np.cos(angle), np.sin(angle)])
-    crop = mouth_crop(ramp(256, 200), eyes_to_image(np.array([130, 80]) + np.stack([-half, half])))
+    crop = crop_mouth(ramp(256, 200), eyes_to_image(np.array([130, 80]) + np.stack([-half, half])))
     along = np.diff(crop[28].astype(int), axis=0).mean(axis=0)
     np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
 
@@ -44,14 +44,14 @@ def test_region_pixels_map_to_the_head():
 def test_a_large_face_is_averaged_not_skipped():
     rng = np.random.default_rng(0)
     image = rng.integers(0, 256, (2000, 2000, 3)).astype(np.uint8)
-    crop = mouth_crop(image, eyes_to_image(np.array([[600.0, 600.0], [1320.0, 600.0]])))  # eight times the size
+    crop = crop_mouth(image, eyes_to_image(np.array([[600.0, 600.0], [1320.0, 600.0]])))  # eight times the size
     assert crop.shape == (56, 72, 3)
     assert crop.std() < 20  # of noise with a deviation of 74
 
 
 def test_outside_of_the_image_its_edge_repeats():
     image = np.full((100, 160, 3), 77, np.uint8)
-    assert (mouth_crop(image, eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
+    assert (crop_mouth(image, eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
 
 
 def nodding(frames: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -89,5 +89,5 @@ def test_a_face_straight_ahead_is_cut_out_as_by_its_eyes():
     eyes = points[0][[TRACKED_POINTS.index(33), TRACKED_POINTS.index(263)], :2]
     np.testing.assert_allclose(face_to_image(points)[0], eyes_to_image(eyes), atol=1e-9)
     image = np.random.default_rng(1).integers(0, 256, (220, 260, 3)).astype(np.uint8)
-    crops = [mouth_crop(image, to_image) for to_image in (face_to_image(points)[0], eyes_to_image(eyes))]
+    crops = [crop_mouth(image, to_image) for to_image in (face_to_image(points)[0], eyes_to_image(eyes))]
     assert np.abs(np.subtract(*crops, dtype=int)).max() <= 1

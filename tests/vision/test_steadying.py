@@ -10,7 +10,7 @@ from lipmotion.types import Motion, Track
 from lipmotion_faces.tracking import steadying
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE
-from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
+from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
 
 STILL = np.array([[0.8, 0, 100], [0, 0.8, 60]])
 MOUTH = np.array([0.0, 76.0, 1.0])
@@ -104,9 +104,7 @@ class TestRegistration:
     def test_trembling_of_the_tracker_is_corrected(self, scene):
         places = np.stack([3 * np.sin(np.arange(30) / 5), 2 * np.cos(np.arange(30) / 7)], axis=1)
         footage = scene(places, trembling(0.4, 30))
-        wrong, right = (
-            maps[:, :, 2] - at(places)[:, :, 2] for maps in (footage.face_to_image, registered_maps(footage))
-        )
+        wrong, right = (maps[:, :, 2] - at(places)[:, :, 2] for maps in (footage.face_to_image, register_maps(footage)))
         before, after = (np.sqrt(np.square(np.diff(error, axis=0)).mean()) for error in (wrong, right))
         assert before > 0.4
         assert after < 0.15 * before
@@ -116,23 +114,23 @@ class TestRegistration:
         places[15:] = 6
         wrong = np.where(np.arange(30)[:, None] < 15, 0.0, -6.0)  # the tracker has not noticed that the face moved
         seen = np.ones(30, bool)
-        noticed = registered_maps(scene(places, wrong))
+        noticed = register_maps(scene(places, wrong))
         assert np.abs(noticed - scene(places, wrong).face_to_image).max() > 2
         for footage in (
             scene(places, wrong, cuts=(15,)),
             replace(scene(places, wrong, seen=seen & (places[:, 0] < 1))),
         ):
-            np.testing.assert_allclose(registered_maps(footage), footage.face_to_image, atol=0.05)
+            np.testing.assert_allclose(register_maps(footage), footage.face_to_image, atol=0.05)
 
     def test_what_an_unseen_frame_shows_moves_nothing(self, scene):
         """Somebody walks by, and the tracker's places are interpolated."""
         places, seen = np.zeros((30, 2)), np.ones(30, bool)
         places[12:17], seen[12:17] = 6, False
         footage = scene(places, -places, seen=seen)
-        np.testing.assert_allclose(registered_maps(footage), footage.face_to_image, atol=0.05)
+        np.testing.assert_allclose(register_maps(footage), footage.face_to_image, atol=0.05)
 
     def test_a_region_without_texture_stays(self, scene, monkeypatch):
         footage = scene(np.zeros((5, 2)), 0.0)
         monkeypatch.setattr(steadying, "footage_frames", lambda _: iter([np.full((120, 170, 3), 90, np.uint8)] * 5))
         with np.errstate(invalid="raise"):
-            np.testing.assert_array_equal(registered_maps(footage), footage.face_to_image)
+            np.testing.assert_array_equal(register_maps(footage), footage.face_to_image)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion_faces.tracking.timing import frame_count, nearest_indices, nominal_rate_hz, resample_to_constant_rate
+from lipmotion_faces.tracking.frames import frame_count, nearest_indices, nominal_rate_hz, resample_to_constant_rate
 
 
 def test_the_stated_rate_is_believed_when_it_fits():

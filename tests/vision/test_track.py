@@ -10,8 +10,8 @@ import pytest
 from children import run_child
 from lipmotion.errors import InputError
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.landmarks import JAW_POINTS, LIP_POINTS
-from lipmotion_faces.tracking.track import CHANNELS, motion_values, track
+from lipmotion_faces.tracking.track import CHANNELS, measure_motion, track
+from lipmotion_faces.tracking.trackers import JAW_POINTS, LIP_POINTS
 from vision.scripted import COLUMN, face, script
 
 
@@ -36,7 +36,7 @@ def test_channels_are_named_and_ordered():
 def test_distances_are_measured_in_the_image_plane():
     points = np.stack([face(0.2)])
     points[0, COLUMN[14], 2] += 100  # depth has no part in them
-    values = motion_values(points)[0]
+    values = measure_motion(points)[0]
     assert values[0] == pytest.approx(0.2)
     expected = np.linalg.norm(points[0, COLUMN[61], :2] - points[0, COLUMN[291], :2]) / 60
     assert values[1] == pytest.approx(expected)

@@ -12,10 +12,9 @@ import pytest
 from lipmotion import prepare
 from lipmotion.errors import InputError
 from lipmotion.extensions import GROUPS
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion_faces.tracking.mediapipe import FaceFinder, MediaPipe
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.trackers import TRACKERS, LandmarkTracker, tracker_named
+from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, TRACKERS, LandmarkTracker, tracker_named
 from vision.scripted import NoFinder
 
 

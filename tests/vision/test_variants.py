@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Track
-from lipmotion_faces.tracking.face_mesh import FaceMesh
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
+from lipmotion_faces.tracking.mediapipe import FaceMesh
 from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS
 from vision.variants import Image, covered, frames_of, half_size, in_a_room, side_by_side, write_frames, zoomed
 
 pytestmark = [pytest.mark.video, pytest.mark.recordings]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.motion import interpolate_rows
-from lipmotion.units import mark_closing_phones
+from lipmotion.units.phones import mark_closing_phones
 
 Curve = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -37,7 +37,7 @@ GAP: Final = "lip_gap"
 """The channel of the distance between the inner lips itself, of motion that comes from a rig, in eye distances."""
 
 
-def gap_of(opening: Curve) -> Curve:
+def opening_to_gap(opening: Curve) -> Curve:
     """Return the distance between the inner lips for a measured opening [shape=(T,)]; 0 where they touch.
 
     Both in eye distances. It never falls where the opening rises.
@@ -48,19 +48,19 @@ def gap_of(opening: Curve) -> Curve:
     return np.minimum(gap, MEASURED_GAP) + over
 
 
-def opening_of(gap: Curve) -> Curve:
-    """Return the opening that trackers measure for a distance between the inner lips [shape=(T,)]: of ``gap_of``."""
+def gap_to_opening(gap: Curve) -> Curve:
+    """Return the opening that trackers measure for a distance between the inner lips [shape=(T,)]."""
     openings = np.concatenate(
         [np.linspace(CLOSED_OPENING, FULL_DEFICIT_GAP, 24), np.linspace(FULL_DEFICIT_GAP, 1.0, 200)[1:]]
     )
-    return np.where(gap > 0, np.interp(gap, gap_of(openings), openings), CLOSED_OPENING - 0.002)
+    return np.where(gap > 0, np.interp(gap, opening_to_gap(openings), openings), CLOSED_OPENING - 0.002)
 
 
-def gap_in(motion: Motion) -> Curve:
+def read_gap(motion: Motion) -> Curve:
     """Return the distance between the inner lips in every frame [shape=(T,)]: ``lip_gap``, or that of ``opening``."""
     if GAP in motion.names:
         return np.maximum(motion[GAP].astype(np.float64), 0)
-    return gap_of(motion["opening"].astype(np.float64))
+    return opening_to_gap(motion["opening"].astype(np.float64))
 
 
 class ClosedPhone(NamedTuple):
@@ -71,14 +71,14 @@ class ClosedPhone(NamedTuple):
     end_s: float
 
 
-def closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
+def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
     """Return the closures of p, b and m, of the frame of least gap each, ascending; one for phones of one frame.
 
     None where the motion has no ``opening``. Where the lips touch in several frames, it is the middle one.
     """
     if "opening" not in motion.names:
         return []
-    gap, found = gap_in(motion), dict[int, ClosedPhone]()
+    gap, found = read_gap(motion), dict[int, ClosedPhone]()
     for span, closing in zip(units, mark_closing_phones(units), strict=True):
         if closing:
             first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
@@ -92,7 +92,7 @@ def closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
     return [found[frame] for frame in sorted(found)]
 
 
-def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
+def close_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
     """Return a gap with the lips in contact in every p, b and m, for ``CONTACT_S`` or longer [shape=(T,)].
 
     gap : of the frames of the motion, with all that phones but p, b and m ask of it [shape=(T,)]
@@ -100,7 +100,7 @@ def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
     """
     time_s, open_share = motion.time_s, np.ones(len(gap))
     parted = np.concatenate([[-1], np.flatnonzero(gap >= LEAST_GAP / 2), [len(gap)]])
-    for frame, begin_s, end_s in closures(motion, units):
+    for frame, begin_s, end_s in find_closures(motion, units):
         length_s = float(np.clip(CONTACT_SHARE * (end_s - begin_s), *CONTACT_S))
         after = int(np.searchsorted(parted, frame))  # the first frame in which the lips are apart, from this one on
         touching_s = float(parted[after] - parted[after - 1]) / motion.rate_hz if parted[after] > frame else 0.0
@@ -116,7 +116,7 @@ def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
     return np.where(gap < LEAST_GAP / 2, 0.0, np.maximum(gap, LEAST_GAP))
 
 
-def shown_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
+def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
     """Return in which pictures the lips touch [shape=(len(time_s),), bool].
 
     contact : of frames at ``rate_hz`` [shape=(T,), bool]
@@ -136,8 +136,8 @@ def shown_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
     return shown
 
 
-def in_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -> Curve:
-    """Return rows of curves in pictures, in which the lips touch in those of ``shown_contact`` and in no other.
+def sample_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -> Curve:
+    """Return rows of curves in pictures, in which the lips touch in those of ``show_contact`` and in no other.
 
     rows   : one a frame [shape=(T,) or (T, N)], which lips touch where ``contact`` says so [shape=(T,), bool]
     time_s : of the pictures in seconds, evenly spaced
@@ -146,7 +146,7 @@ def in_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -> Cu
     """
     table = rows.reshape(len(rows), -1)
     values = interpolate_rows(table, rate_hz, time_s)
-    shown = shown_contact(contact, rate_hz, time_s)
+    shown = show_contact(contact, rate_hz, time_s)
     position = time_s * rate_hz
     low = np.clip(np.floor(position + 1e-6).astype(int), 0, len(rows) - 1)
     at_frame = position - low <= 1e-6

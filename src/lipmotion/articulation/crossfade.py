@@ -18,7 +18,7 @@ LEAST_FADE_S = 0.025
 """Shortest half of a cross-fade: no curve jumps, and a phone under 50 ms is not wholly said."""
 
 
-def phone_weights(units: Timeline[Unit], time_s: Array, kind: Callable[[str], str]) -> dict[str, Array]:
+def crossfade_phones(units: Timeline[Unit], time_s: Array, kind: Callable[[str], str]) -> dict[str, Array]:
     """Return how far each kind of phone is being said, 0 to 1 [each shape=(T,)]; at every time they add up to 1.
 
     kind : the kind of each phone; before the first and after the last unit, and in gaps, it is that of an empty phone

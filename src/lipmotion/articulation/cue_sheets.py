@@ -16,13 +16,14 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.liveliness import phrases
+from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import parse_clock, parse_number
-from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones
+from lipmotion.units import SILENCE, VISEMES, is_silent, mark_closing_phones
 from lipmotion.units.mouth_chart import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape
+from lipmotion.units.word_spans import group_words
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
@@ -98,7 +99,7 @@ def whole_hundredths(duration_s: float) -> float:
     return int(duration_s * 100 + 1e-6) / 100
 
 
-def cue_sheet(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
+def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
     """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
     starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
     shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
@@ -106,7 +107,7 @@ def cue_sheet(segments: Sequence[tuple[int, str]], duration_s: float, fps: float
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
 
 
-def shown_shapes(sheet: CueSheet) -> list[str]:
+def list_frame_shapes(sheet: CueSheet) -> list[str]:
     """Return the shape of every frame of the animation, to the end of the sheet."""
     frames = max(1, int(sheet.fps * sheet.duration_s + 1 - 1e-9))
     starts = [min(int(sheet.fps * cue.start_s), frames) for cue in sheet.cues] + [frames]
@@ -251,7 +252,7 @@ def _lines(units: Timeline[Unit], edges_s: Array) -> list[slice]:
     Pauses of ``LINE_PAUSE_S`` divide lines; a short one belongs to a near one, as a word says little of a voice.
     """
     lines: list[tuple[float, float]] = []
-    for start_s, end_s in phrases(units, LINE_PAUSE_S):
+    for start_s, end_s in find_phrases(units, LINE_PAUSE_S):
         before_s, until_s = lines[-1] if lines else (0.0, -np.inf)
         if start_s - until_s < NEAR_S and min(end_s - start_s, until_s - before_s) < SHORT_S:
             lines[-1] = before_s, end_s
@@ -349,7 +350,7 @@ def choose_cues(
     if frames:
         cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE_COST)
-    sheet = cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
+    sheet = lay_out_cues([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
     return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
 
 
@@ -379,7 +380,7 @@ MILLISECONDS = 20.0
 """Shapes other than rest of which half seem to last so many whole seconds are in milliseconds."""
 
 
-def shape_of(name: str, names: dict[str, str], place: str) -> str:
+def parse_shape(name: str, names: dict[str, str], place: str) -> str:
     """Return the shape of a name. Raises InputError: it is none, with its place."""
     found = names.get(name.strip().lower().removeprefix(PREFIX))
     if found is None:
@@ -393,7 +394,7 @@ def is_shape(name: str) -> bool:
     return any(name.lower().removeprefix(PREFIX) in chart for chart in CHARTS)
 
 
-def chart_of(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, str]:
+def choose_chart(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, str]:
     """Return the shapes by the names of one set that programs offer: the first that has all of them.
 
     The usual one, Preston Blair's, Rhubarb's letters, Fleming and Dobbs', Meta's visemes, or the phones of CMU's
@@ -403,7 +404,7 @@ def chart_of(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, s
     return next((chart for chart in (usual, *CHARTS) if given <= {*chart}), usual)
 
 
-def cue_time(text: str, place: str) -> float:
+def parse_cue_time(text: str, place: str) -> float:
     """Return a time in seconds, as 1.5, 1,5 or 0:01.5, or a number of frames.
 
     Raises InputError: it is none, with its place.
@@ -416,7 +417,7 @@ def cue_time(text: str, place: str) -> float:
     return value
 
 
-def sheet_of(
+def build_cue_sheet(
     rows: Sequence[tuple[float, str]], end_s: float, fps: float, words: Timeline[str] | None = None
 ) -> CueSheet:
     """Return a sheet of shapes that each last to the next one, with rest before the first.

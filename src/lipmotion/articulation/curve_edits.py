@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.delivery import intensified
-from lipmotion.articulation.rest import rest_frames
+from lipmotion.articulation.delivery import intensify
+from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.types import WEIGHT, CurveEdit, DrawnCurve, Gain, Generation, Hold, Motion, Pin, Timeline, Unit, frame_of
@@ -25,7 +25,7 @@ LOCK_EDGE_S = 0.05
 """Motion goes over into a locked span, or one that is held, and out of it, in this time."""
 
 
-def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
+def apply_curve_edits(motion: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
     """Return motion with edits of its channels; those of other channels change nothing.
 
     A pinned value holds exactly in the frame nearest to its time, also where a gain acts; the curve bends towards it
@@ -38,13 +38,13 @@ def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Cu
     edited = {edit.channel for edit in ours}
     if not ours:
         return motion
-    values, rest = motion.values.astype(np.float64), rest_frames(motion, units)
+    values, rest = motion.values.astype(np.float64), find_rest_frames(motion, units)
     pins = []
     for edit in ours:
         column = motion.column(edit.channel)
         is_weight = motion.channels[column].unit == WEIGHT
         if isinstance(edit, Pin):
-            pins.append((pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
+            pins.append((find_pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
             continue
         if isinstance(edit, DrawnCurve):
             check_drawn(edit, is_weight=is_weight)
@@ -100,7 +100,7 @@ def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], rea
         values[frame, column] = value
 
 
-def pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
+def find_pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
     """Return the frame of a pin in motion.
 
     is_weight : whether its curve is a weight, 0 to 1
@@ -116,21 +116,21 @@ def pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
     return frame
 
 
-def with_gain(generation: Generation, gain: Gain) -> Generation:
-    """Return a generation whose mouth moves more, or less, for a time; what is closed stays so (``intensified``)."""
+def apply_gain(generation: Generation, gain: Gain) -> Generation:
+    """Return a generation whose mouth moves more, or less, for a time; what is closed stays so (``intensify``)."""
     motion = generation.motion
     weight = span_weight(motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
-    larger = intensified(generation, gain.factor)
-    return with_stretch(generation, _stretch(larger, weight))
+    larger = intensify(generation, gain.factor)
+    return apply_stretch(generation, _stretch(larger, weight))
 
 
-def with_held(generation: Generation, hold: Hold) -> Generation:
+def hold_mouth(generation: Generation, hold: Hold) -> Generation:
     """Return a generation whose mouth stays for a time as it is at the start of it, and goes over into that."""
     motion = generation.motion
     frame = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1)
     still = replace(motion, values=np.broadcast_to(motion.values[frame], motion.values.shape))
     weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S)
-    return with_stretch(generation, _stretch(replace(generation, motion=still), weight))
+    return apply_stretch(generation, _stretch(replace(generation, motion=still), weight))
 
 
 class MotionStretch(NamedTuple):
@@ -148,7 +148,7 @@ class MotionStretch(NamedTuple):
     variance: NDArray[np.floating[Any]]
 
 
-def locked_stretch(generation: Generation, start_s: float, end_s: float) -> MotionStretch:
+def cut_locked_stretch(generation: Generation, start_s: float, end_s: float) -> MotionStretch:
     """Return what a lock keeps of motion from ``start_s`` to ``end_s``, and beside this span."""
     return _stretch(generation, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
 
@@ -160,7 +160,7 @@ def _stretch(generation: Generation, weight: Curve) -> MotionStretch:
     return MotionStretch(frames, weight[frames, None], generation.motion.values[frames], generation.variance_of(frames))
 
 
-def with_stretch(first: Generation, other: MotionStretch) -> Generation:
+def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
     """Return a generation that goes over to other motion where its share is more than 0; also variances.
 
     other : of the same recording, with the same channels

@@ -11,16 +11,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import CLOSED_OPENING, closures
+from lipmotion.articulation.contact import CLOSED_OPENING, find_closures
 from lipmotion.articulation.expression import is_mood
-from lipmotion.articulation.rest import rest_frames
+from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.types import EYE_DISTANCE, WEIGHT, CurveEdit, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
 from lipmotion.types.delivery import Delivery as Delivery  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.units import is_silent
 
 
-def best_holds(rows: NDArray[np.float64], hold: int, fixed: Sequence[int] = ()) -> list[int]:
+def choose_holds(rows: NDArray[np.float64], hold: int, fixed: Sequence[int] = ()) -> list[int]:
     """Return the first frame of every held pose, in order, and the number of frames after them [B + 1 numbers].
 
     rows  : curves over time, scaled so that their differences count alike [shape=(T, D)]
@@ -76,7 +76,7 @@ DECIDING = ("opening", "width", "outer")
 """The channels that decide where held poses begin, where the motion has them."""
 
 
-def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
+def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
     """Return a generation whose mouth moves by the anticipation earlier, and all of it by the offset later.
 
     It lasts as long as before, and the offset longer. What is before time 0 is left out; where nothing is known, at the
@@ -99,7 +99,7 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
         values = motion.values[nearest]
     else:
         values = motion.at(position / rate_hz)
-        for frame, *_ in closures(motion, generation.units):
+        for frame, *_ in find_closures(motion, generation.units):
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
@@ -107,7 +107,7 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
         generation,
         motion=Motion(values, rate_hz, motion.channels),
         spread=generation.changed_spread(lambda rows: rows[nearest]),
-        units=moved_units(
+        units=shift_units(
             generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
         ),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
@@ -124,7 +124,7 @@ def _moved_edits(edits: Sequence[CurveEdit], by_s: float, end_s: float) -> Itera
             yield replace(edit, time_s=edit.time_s + by_s)
 
 
-def moved_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Unit]:
+def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Unit]:
     """Return phones in time so many seconds later, from 0 to ``end_s``; silence at an edge goes to that edge."""
     first, last = 0, len(units) - 1
     spans = []
@@ -138,7 +138,7 @@ def moved_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Un
     return Timeline(tuple(spans))
 
 
-def intensified(generation: Generation, intensity: float, opening: Curve | None = None) -> Generation:
+def intensify(generation: Generation, intensity: float, opening: Curve | None = None) -> Generation:
     """Return a generation with movements away from the rest pose so many times as large.
 
     opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
@@ -152,7 +152,7 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
         return generation
     if opening is None and "opening" in motion.names:
         opening = motion["opening"].astype(np.float64)
-    rest = rest_frames(motion, generation.units, opening)
+    rest = find_rest_frames(motion, generation.units, opening)
     factor = np.full(len(motion.values), float(intensity))
     if opening is not None:
         closed = float(np.median(opening[rest]))
@@ -175,12 +175,12 @@ ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", *GROWING)
 """Channels that are not movements away from a rest pose (docs/articulation.md)."""
 
 
-def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) -> Generation:
+def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = ()) -> Generation:
     """Return a generation whose poses are held, each for at least so many frames, and change at once.
 
     frames   : less than 2: the curves stay as they are
-    closed_s : times in seconds at which the lips are closed in p, b and m (``closed_times``)
-    Where the poses begin is chosen so that they differ least from the curves (``sequences.holds.best_holds``). The pose
+    closed_s : times in seconds at which the lips are closed in p, b and m (``find_closed_times``)
+    Where the poses begin is chosen so that they differ least from the curves (``choose_holds``). The pose
     that shows p, b or m is that of the frame in which the lips are closed; every other pose is the mean of its frames.
     """
     motion = generation.motion
@@ -188,7 +188,7 @@ def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) ->
     if frames < 2 or not count:
         return generation
     closed = np.unique([min(round(time_s * motion.rate_hz), count - 1) for time_s in closed_s]).astype(int)
-    borders = best_holds(_deciding(motion), frames, closed.tolist())
+    borders = choose_holds(_deciding(motion), frames, closed.tolist())
     starts, lengths = np.array(borders[:-1]), np.diff(borders)
     values = np.add.reduceat(motion.values.astype(np.float64), starts, axis=0) / lengths[:, None]
     poses = np.searchsorted(starts, closed, side="right") - 1
@@ -203,23 +203,23 @@ def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) ->
     )
 
 
-def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
+def close_on_frame_grid(generation: Generation, rate_hz: float) -> Generation:
     """Return a generation that shows every closure of p, b and m at the nearest time n / ``rate_hz`` seconds.
 
     Motion at that rate shows them then; between two times a closure of 10 ms would be lost.
     """
     motion = generation.motion
     values = motion.values.copy()
-    for frame, *_ in closures(motion, generation.units):
+    for frame, *_ in find_closures(motion, generation.units):
         position = round(frame / motion.rate_hz * rate_hz) / rate_hz * motion.rate_hz
         first, last = int(np.floor(position + 1e-6)), int(np.ceil(position - 1e-6))
         values[min(first, len(values) - 1) : last + 1] = motion.values[frame]
     return replace(generation, motion=replace(motion, values=values))
 
 
-def closed_times(generation: Generation) -> list[float]:
+def find_closed_times(generation: Generation) -> list[float]:
     """Return the time in seconds at which each p, b and m closes the lips; none where no opening is known."""
-    return [each.frame / generation.motion.rate_hz for each in closures(generation.motion, generation.units)]
+    return [each.frame / generation.motion.rate_hz for each in find_closures(generation.motion, generation.units)]
 
 
 def _factors(further: Curve, touching: float, intensity: float) -> Curve:
@@ -249,10 +249,10 @@ def _deciding(motion: Motion) -> Curve:
     return rows
 
 
-def sound_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:
+def delay_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:
     """Return the phones in time of the sound, for label files: later by the offset, whatever the mouth anticipates."""
     later_s = delivery.offset_ms / 1000
-    return moved_units(units, later_s, max(_end_s(units), end_s) + later_s) if later_s else units
+    return shift_units(units, later_s, max(_end_s(units), end_s) + later_s) if later_s else units
 
 
 def _end_s(units: Timeline[Unit]) -> float:

@@ -138,7 +138,7 @@ def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve
     return {unit: np.clip(curve, 0, 1) for unit, curve in found.items()}
 
 
-def moods_shown(motion: Motion) -> dict[str, Curve]:
+def read_moods(motion: Motion) -> dict[str, Curve]:
     """Return how strong each mood of a motion is, 0 to 1, by its name [each shape=(T,)]."""
     return {
         name[len(PREFIX) :]: np.clip(motion[name].astype(np.float64), 0, 1) for name in motion.names if is_mood(name)

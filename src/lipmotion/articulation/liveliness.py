@@ -124,7 +124,7 @@ class Liveliness:
         return self.units.get(number, np.zeros(len(self.lids)))
 
 
-def liveliness(  # noqa: PLR0913
+def compute_liveliness(  # noqa: PLR0913
     time_s: Curve,
     motion: Motion,
     units: Timeline[Unit],
@@ -144,7 +144,7 @@ def liveliness(  # noqa: PLR0913
     eyes still hold their target while the head turns.
     """
     still, end_s = np.zeros(len(time_s)), float(time_s[-1]) if len(time_s) else 0.0
-    spoken = phrases(units)
+    spoken = find_phrases(units)
     accent = _accents(motion, prosody)
     if len(units):
         accent = accent * _talking(spoken, np.arange(len(accent)) / FRAME_RATE_HZ)
@@ -188,7 +188,7 @@ def _in_mood(moved: Liveliness, mood: Mapping[int, Curve], *, head: bool) -> Liv
     )
 
 
-def phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list[tuple[float, float]]:
+def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of every stretch of speech without a pause of ``pause_s``."""
     found: list[tuple[float, float]] = []
     for span in units:

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import GAP, closed_lips, gap_in, in_pictures
+from lipmotion.articulation.contact import GAP, close_lips, read_gap, sample_pictures
 from lipmotion.articulation.expression import action_units
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, TIP_OUT, TIP_UP, gesture_curves
-from lipmotion.articulation.rest import rest_frames, size_at_rest
+from lipmotion.articulation.rest import find_rest_frames, measure_at_rest
 from lipmotion.errors import InputError
 from lipmotion.types import Motion, Timeline, Unit
 
@@ -125,12 +125,12 @@ class SpokenMouth:
         return replace(self, smile=np.minimum(self.smile + up, 1), frown=np.minimum(self.frown + down, 1))
 
     def at(self, fps: float) -> SpokenMouth:
-        """Return the same mouth at another frame rate, to its last frame, with the contact of ``shown_contact``."""
+        """Return the same mouth at another frame rate, to its last frame, with the contact of ``show_contact``."""
         if abs(fps - self.rate_hz) < 1e-9:
             return self
         time_s = frame_times(len(self.gap), self.rate_hz, fps)
         rows = np.stack(list(self._curves().values()), axis=1)
-        sampled = in_pictures(rows, self.contact, self.rate_hz, time_s)
+        sampled = sample_pictures(rows, self.contact, self.rate_hz, time_s)
         return SpokenMouth(fps, *(np.ascontiguousarray(column) for column in sampled.T))
 
     def within(self, frames: slice) -> SpokenMouth:
@@ -160,14 +160,14 @@ class MouthAtRest(NamedTuple):
     chin: float | None
 
 
-def mouth_at_rest(motion: Motion, units: Timeline[Unit]) -> MouthAtRest:
+def measure_mouth_at_rest(motion: Motion, units: Timeline[Unit]) -> MouthAtRest:
     """Return the sizes of the rest pose of a motion. Raises InputError: as ``spoken_mouth``."""
     check_spoken(motion, motion.rate_hz)
-    rest, across, thickness = rest_frames(motion, units), _across(motion), _thickness(motion)
+    rest, across, thickness = find_rest_frames(motion, units), _across(motion), _thickness(motion)
     name = "width" if "width" in motion.names else "distance of the lip corners"
     return MouthAtRest(
-        None if across is None else size_at_rest(name, across, rest),
-        None if thickness is None else size_at_rest("thickness of the lips (outer - opening)", thickness, rest),
+        None if across is None else measure_at_rest(name, across, rest),
+        None if thickness is None else measure_at_rest("thickness of the lips (outer - opening)", thickness, rest),
         float(np.median(motion["y_152"][rest].astype(np.float64))) if "y_152" in motion.names else None,
     )
 
@@ -201,22 +201,22 @@ def spoken_mouth(
     units  : phones in time; may be empty
     fps    : frames per second, to the end of the motion; None: those of the motion
     at_rest : of the whole motion, where this is a part of it; None: this is the whole
-    In every p, b and m the lips touch (``contact.closed_lips``).
+    In every p, b and m the lips touch (``contact.close_lips``).
     Raises InputError: no channel ``opening``, no frames, values that are not finite, fps not positive, or lips without
     width or thickness at rest.
     """
     check_spoken(motion, motion.rate_hz if fps is None else fps)
-    time_s, rest = motion.time_s, at_rest or mouth_at_rest(motion, units)
+    time_s, rest = motion.time_s, at_rest or measure_mouth_at_rest(motion, units)
     said = gesture_curves(units, time_s, [name for name in (*GESTURES, OVAL) if name not in motion.names])
     said |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*GESTURES} & {*motion.names}}
     # w has half the press of p, with protruded lips: a hole that is almost closed
     said["pursed"] = np.clip(said["lip_press"] / (0.8 * PURSED_PRESS), 0, 1) * said["protrusion"]
     said["pursed"] *= np.clip((0.75 - said["lip_press"]) / 0.15, 0, 1)
     mood = action_units(motion)
-    gap = _parted(gap_in(motion), said, mood)
+    gap = _parted(read_gap(motion), said, mood)
     if GAP not in motion.names:
         gap = _articulated(gap, said, time_s)
-    gap = closed_lips(gap, motion, units)
+    gap = close_lips(gap, motion, units)
     expressed = _expressed(mood, said)
     oval = said[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
     mouth = SpokenMouth(

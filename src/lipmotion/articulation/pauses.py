@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import CLOSED_OPENING
-from lipmotion.articulation.rest import rest_frames
+from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.voice_event import BREATH, LAUGHTER
 from lipmotion.units import is_silent, mark_closing_phones
@@ -38,7 +38,7 @@ PINNED_S: Final = 0.15
 """Within this time of a pin the motion stays as it is."""
 
 
-def pauses(units: Timeline[Unit]) -> list[tuple[float, float, bool, bool]]:
+def find_pauses(units: Timeline[Unit]) -> list[tuple[float, float, bool, bool]]:
     """Return the pauses in which the mouth rests: start and end in seconds, and whether speech is before and after."""
     runs: list[list[float]] = []
     for span in units:
@@ -59,7 +59,7 @@ def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
     It leaves 0 where a phrase ends and is 0 again where the next one begins.
     """
     weight = np.zeros(len(time_s))
-    for start_s, end_s, after_speech, before_speech in pauses(units):
+    for start_s, end_s, after_speech, before_speech in find_pauses(units):
         longest_s = end_s - start_s
         share = longest_s / (CLOSING_S + OPENING_S) if after_speech and before_speech else longest_s / CLOSING_S
         share = min(share, 1.0)
@@ -73,9 +73,9 @@ def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
     return weight
 
 
-def without_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
+def share_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
     """Return phones in time in which each pause that the mouth does not rest in is shared by the phones beside it."""
-    starts_s, ends_s = np.array([(start_s, end_s) for start_s, end_s, *_ in pauses(units)]).reshape(-1, 2).T
+    starts_s, ends_s = np.array([(start_s, end_s) for start_s, end_s, *_ in find_pauses(units)]).reshape(-1, 2).T
     kept: list[Span[Unit]] = []
     short_s = 0.0
     for span in units:
@@ -90,7 +90,7 @@ def without_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
     return Timeline(tuple(kept))
 
 
-def with_pauses(
+def rest_in_pauses(
     generation: Generation, style: str, pinned_s: Sequence[float] = (), events: Sequence[VoiceEvent] = ()
 ) -> Generation:
     """Return generated motion whose mouth is in its rest pose in pauses, with closed lips.
@@ -102,14 +102,14 @@ def with_pauses(
     stays as it is.
     """
     motion, units = generation.motion, generation.units
-    if style == NATURAL or not pauses(units) or not len(motion.values):
+    if style == NATURAL or not find_pauses(units) or not len(motion.values):
         return generation
     time_s = motion.time_s
     weight = pause_weight(units, time_s)
     for pin_s in pinned_s:
         weight *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
     values, resting = motion.values.copy(), np.flatnonzero(weight)
-    pose = np.median(values[rest_frames(motion, units)].astype(np.float64), axis=0)
+    pose = np.median(values[find_rest_frames(motion, units)].astype(np.float64), axis=0)
     if "opening" in motion.names:
         pose[motion.column("opening")] = min(pose[motion.column("opening")], 0.5 * CLOSED_OPENING)
     values[resting] += weight[resting, None] * (pose - values[resting])
@@ -128,7 +128,7 @@ def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
     phones = zip(units, mark_closing_phones(units), strict=True)
     spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
     begins_s = np.array([span.start_s for span, _ in spoken])
-    for start_s, end_s, _, before_speech in pauses(units):
+    for start_s, end_s, _, before_speech in find_pauses(units):
         following = int(np.searchsorted(begins_s, end_s - 1e-6))
         if before_speech and end_s - start_s >= LEAST_BREATH_S and following < len(spoken) and not spoken[following][1]:
             near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))

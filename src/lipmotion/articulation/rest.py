@@ -16,7 +16,7 @@ LARGEST_REST = 0.06
 """A rest pose more open than this, in eye distances, is speech: the recording has hardly any silence."""
 
 
-def rest_frames(motion: Motion, units: Timeline[Unit], opening: Array | None = None) -> NDArray[np.bool_]:
+def find_rest_frames(motion: Motion, units: Timeline[Unit], opening: Array | None = None) -> NDArray[np.bool_]:
     """Return the frames of the rest pose [shape=(T,), bool]: silence, or else the most closed tenth of the frames.
 
     units   : phones in time. Silence whose median opening is more than ``LARGEST_REST`` does not count
@@ -39,13 +39,13 @@ def rest_frames(motion: Motion, units: Timeline[Unit], opening: Array | None = N
     return rest
 
 
-def beside_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Motion, Timeline[Unit], slice]:
+def add_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Motion, Timeline[Unit], slice]:
     """Return frames of a motion with their phones, beside silence in the rest pose of the whole, and where they are.
 
     So the rest pose of what is returned is that of the whole: there is more of that silence than of others in it. It
     comes before the frames; after them, where they are the first ones, which nothing then smooths.
     """
-    values, rate_hz, rest = motion.values[frames], motion.rate_hz, rest_frames(motion, units)
+    values, rate_hz, rest = motion.values[frames], motion.rate_hz, find_rest_frames(motion, units)
     still = np.median(motion.values[rest], axis=0)
     count = int(np.count_nonzero(rest[frames])) + len(values) // 5 + 1
     start_s, long_s, silent_s = (number / rate_hz for number in (frames.start, len(values), count))
@@ -59,11 +59,11 @@ def beside_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[M
     return replace(motion, values=together), Timeline(spans), slice(count, len(together))
 
 
-def size_at_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> float:
+def measure_at_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> float:
     """Return the median of a curve at rest.
 
     name : of the curve, for the message
-    rest : of ``rest_frames``
+    rest : of ``find_rest_frames``
     Raises InputError: the median is not positive.
     """
     value = float(np.median(curve[rest]))

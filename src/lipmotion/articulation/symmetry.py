@@ -9,7 +9,7 @@ BLOCK_FRAMES = 10_000
 """Frames that are computed at a time, so that hours of motion take little memory beside their copy."""
 
 
-def symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
+def make_symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
     """Return motion whose lip and jaw points move alike on both sides; distances and weights stay as they are.
 
     asymmetry : 0 to 1: the share that is left of the difference between the sides of the speaker's own mouth

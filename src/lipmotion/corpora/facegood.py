@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, MotionFile, RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import labels_beside
+from lipmotion.formats.label_files import find_labels
 from lipmotion.storage.archive import array_in
 from lipmotion.storage.files import check_regular
 from lipmotion.types import WEIGHT, Channel, Motion
@@ -51,7 +51,7 @@ def read_facegood(directory: Path) -> RecordingFolder | None:
         try:
             if len(same_name) != 1:
                 raise InputError(f"{path}: {len(same_name)} sounds named {name}, required one: {name}.wav")
-            labels = labels_beside(same_name[0], ignored=ignored)
+            labels = find_labels(same_name[0], ignored=ignored)
             motion_file = MotionFile(path, RATE_HZ, channels)
             recordings.append(
                 SourceRecording(

@@ -14,11 +14,11 @@ from lipmotion.corpora.source_recordings import (
     MotionFile,
     RecordingFolder,
     SourceRecording,
-    video_files,
+    filter_videos,
 )
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import RecordingLabels, labels_beside
+from lipmotion.formats.label_files import RecordingLabels, find_labels
 from lipmotion.formats.tables import is_live_link_file
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
@@ -37,21 +37,23 @@ def read_folder(directory: Path) -> RecordingFolder:
     in a sub-folder ``anna`` have the speaker ``anna``, and names as ``anna-take1``.
     """
     by_name: dict[str, list[Path]] = {}
-    for path in files_in(directory):
-        if _has_motion(path) or video_files([path]):
+    for path in list_files(directory):
+        if _has_motion(path) or filter_videos([path]):
             name = "-".join(path.relative_to(directory).with_suffix("").parts)
             by_name.setdefault(name, []).append(path)
     lists = frozenset(directory / name for name in LISTS)
-    return gathered(_kind(by_name), by_name, lambda name, path: _recording(name, path, directory, lists), directory)
+    return gather_recordings(
+        _kind(by_name), by_name, lambda name, path: _recording(name, path, directory, lists), directory
+    )
 
 
-def files_in(directory: Path) -> list[Path]:
+def list_files(directory: Path) -> list[Path]:
     """Return what is in a folder and its sub-folders, sorted, without what is hidden."""
     paths = ((path, path.relative_to(directory).parts) for path in directory.rglob("*"))
     return sorted(path for path, parts in paths if not any(part.startswith(".") for part in parts))
 
 
-def gathered(
+def gather_recordings(
     kind: str,
     by_name: Mapping[str, list[Path]],
     recording_of: Callable[[str, Path], SourceRecording],
@@ -73,8 +75,8 @@ def gathered(
 
 
 def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> SourceRecording:
-    labels: RecordingLabels = labels_beside(path, ignored=lists)
-    beside = motion_files(path) if _is_sound(path) else captures(path)
+    labels: RecordingLabels = find_labels(path, ignored=lists)
+    beside = find_motion_files(path) if _is_sound(path) else find_captures(path)
     if len(beside) > 1:
         raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
     motion_file = MotionFile(beside[0]) if beside else None
@@ -83,12 +85,12 @@ def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -
     return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, motion_file=motion_file)
 
 
-def motion_files(sound: Path) -> list[Path]:
+def find_motion_files(sound: Path) -> list[Path]:
     """Return the motion files with the name of a sound, beside it."""
     return [path for suffix in MOTION_SUFFIXES if (path := sound.with_suffix(suffix)).is_file()]
 
 
-def captures(video: Path) -> list[Path]:
+def find_captures(video: Path) -> list[Path]:
     """Return the tables of Live Link Face with the name of a video, beside it: its motion need not be tracked."""
     tables = (video.with_suffix(suffix) for suffix in CAPTURE_SUFFIXES)
     return [path for path in tables if path.is_file() and is_live_link_file(path)]
@@ -99,7 +101,7 @@ def _is_sound(path: Path) -> bool:
 
 
 def _has_motion(path: Path) -> bool:
-    return _is_sound(path) and not is_of_recorder(path) and path.is_file() and bool(motion_files(path))
+    return _is_sound(path) and not is_of_recorder(path) and path.is_file() and bool(find_motion_files(path))
 
 
 def _only(paths: list[Path]) -> Path:

@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lipmotion.corpora.folder import files_in, gathered
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, video_files
+from lipmotion.corpora.folder import gather_recordings, list_files
+from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, filter_videos
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError, shortened
-from lipmotion.formats.label_files import labels_beside, read_labels
+from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.storage.files import read_text_file
 from lipmotion.units import split_words
 
@@ -45,8 +45,8 @@ def read_grid(directory: Path) -> RecordingFolder | None:
     directory : with clips/ or the videos themselves; align/ or .align files beside the videos; the lists of the splits
     """
     clips = directory / "clips"
-    files = video_files((clips if clips.is_dir() else directory).iterdir())
-    if 2 * sum(words_of_name(path.stem) is not None for path in files) <= len(files):
+    files = filter_videos((clips if clips.is_dir() else directory).iterdir())
+    if 2 * sum(spell_name(path.stem) is not None for path in files) <= len(files):
         return None
     recordings, problems, speaker = [], {}, speaker_of_folder(directory.resolve().name)
     for path in files:
@@ -63,7 +63,7 @@ def speaker_of_folder(folder: str) -> str:
     return found[1] if found else ""
 
 
-def words_of_name(name: str) -> tuple[str, ...] | None:
+def spell_name(name: str) -> tuple[str, ...] | None:
     """Return the six words that a GRID file name spells out, or None if it is not one."""
     if not NAME.fullmatch(name):
         return None
@@ -76,7 +76,7 @@ def words_of_name(name: str) -> tuple[str, ...] | None:
 
 def _words(directory: Path, video: Path) -> tuple[str, ...] | None:
     """Return the words of a video: from its word-time file, else from its name; None if neither gives them."""
-    return aligned_words(video, (directory / "align", video.parent)) or words_of_name(video.stem)
+    return aligned_words(video, (directory / "align", video.parent)) or spell_name(video.stem)
 
 
 def aligned_words(video: Path, folders: Iterable[Path]) -> tuple[str, ...] | None:
@@ -156,7 +156,7 @@ class Layout:
 
 def read_layouts(directory: Path) -> RecordingFolder | None:
     """Return the recordings in a folder whose videos mostly lie as one of ``LAYOUTS`` says, or None."""
-    videos, root = video_files(files_in(directory)), directory.resolve().name
+    videos, root = filter_videos(list_files(directory)), directory.resolve().name
     for layout in LAYOUTS:
         found = {
             path: said
@@ -178,7 +178,7 @@ def _read(layout: Layout, directory: Path, groups: Mapping[Path, Mapping[str, st
 
     def recording_of(name: str, video: Path) -> SourceRecording:
         said = groups[video]
-        beside = labels_beside(video, ignored=lists) if layout.words is None else None
+        beside = find_labels(video, ignored=lists) if layout.words is None else None
         return SourceRecording(
             name,
             video,
@@ -189,7 +189,7 @@ def _read(layout: Layout, directory: Path, groups: Mapping[Path, Mapping[str, st
             phones=beside.phones if beside else None,
         )
 
-    return gathered(layout.kind, by_name, recording_of, directory)
+    return gather_recordings(layout.kind, by_name, recording_of, directory)
 
 
 def _grid_words(directory: Path, video: Path, said: Mapping[str, str]) -> Words | None:
@@ -197,7 +197,7 @@ def _grid_words(directory: Path, video: Path, said: Mapping[str, str]) -> Words 
     above = [folder for folder in video.parents if folder == directory or directory in folder.parents]
     folders = [video.parent, *(folder / "align" for folder in above)]
     folders += [folder / inner / said["speaker"] for folder in above for inner in ("align", "alignments")]
-    return aligned_words(video, folders) or words_of_name(video.stem)
+    return aligned_words(video, folders) or spell_name(video.stem)
 
 
 def _crema_words(_directory: Path, _video: Path, said: Mapping[str, str]) -> Words | None:

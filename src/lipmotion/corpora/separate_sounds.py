@@ -20,7 +20,7 @@ LARGEST_TABLE_BYTES = 1 << 22
 LARGEST_OFFSET_S = 6 * 3600.0
 
 
-def with_separate_sounds(
+def add_separate_sounds(
     folder: RecordingFolder, directory: Path, offset_s: float | None = None, *, is_whole: bool = True
 ) -> RecordingFolder:
     """Return the recordings with the sounds of their recorders, and with the offsets of the table ``offsets.csv``.

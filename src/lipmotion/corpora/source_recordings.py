@@ -76,6 +76,6 @@ class RecordingFolder:
     problems: dict[str, str] = field(default_factory=dict)
 
 
-def video_files(paths: Iterable[Path]) -> list[Path]:
+def filter_videos(paths: Iterable[Path]) -> list[Path]:
     """Return the files with the suffix of a video, sorted."""
     return sorted(path for path in paths if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file())

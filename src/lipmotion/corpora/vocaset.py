@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.folder import gathered
+from lipmotion.corpora.folder import gather_recordings
 from lipmotion.corpora.source_recordings import MotionFile, RecordingFolder, SourceRecording
 from lipmotion.errors import InputError, shortened
-from lipmotion.formats.label_files import labels_beside
-from lipmotion.formats.markers import in_head_frame, motion_of_markers
+from lipmotion.formats.label_files import find_labels
+from lipmotion.formats.markers import measure_markers, to_head_frame
 from lipmotion.types import Motion
 
 KIND = "VOCASET meshes"
@@ -60,7 +60,7 @@ def read_vocaset(directory: Path) -> RecordingFolder | None:
         first = min(sentence.glob(f"*{MESH}"), default=None)
         if first is None:
             raise InputError(f"{sentence}: no meshes (.ply) of {sound}; unpack them, or remove the sound")
-        labels = labels_beside(sound)
+        labels = find_labels(sound)
         return SourceRecording(
             name,
             sound,
@@ -72,7 +72,7 @@ def read_vocaset(directory: Path) -> RecordingFolder | None:
         )
 
     by_name = {f"{sound.parent.name}-{sound.stem}": [sound] for sound in sorted(sounds.glob("*/*.wav"))}
-    return gathered(KIND, by_name, recording_of, directory)
+    return gather_recordings(KIND, by_name, recording_of, directory)
 
 
 def mesh_files(first: Path) -> list[Path]:
@@ -102,7 +102,7 @@ def read_mesh_motion(first: Path, rate_hz: float) -> Motion:
         for column, name in enumerate(FLAME_MARKERS)
     }
     try:
-        return motion_of_markers(in_head_frame(markers, METRES), rate_hz)
+        return measure_markers(to_head_frame(markers, METRES), rate_hz)
     except InputError as error:
         raise InputError(f"{first}: {error}") from error
 

@@ -323,7 +323,7 @@ LARGEST_VALUE = 1e9
 """Blocks with larger values are formatted number by number: their digits do not fit in 64 bits."""
 
 
-def formatted_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
+def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
     """Yield each row of values [shape=(T, P)] as text: numbers with commas between them, rounded to ``DECIMALS``.
 
     Raises ExportError: a value is not finite.
@@ -367,7 +367,7 @@ def write_json(
     start, end = as_json(before, ensure_ascii=False)[:-1], as_json(after, ensure_ascii=False)[1:]
     with path.open("w", encoding="utf-8") as file:
         file.write(f'{start}, "{rows_of}": [\n')
-        for number, row in enumerate(formatted_rows(values)):
+        for number, row in enumerate(format_rows(values)):
             file.write(f",\n[{row}]" if number else f"[{row}]")
         file.write(f"\n]{', ' if after else ''}{end}\n")
 
@@ -379,7 +379,7 @@ def key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: bool)
     """
     if stepped:
         return sorted({0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values) - 1})
-    return Thinning(tolerance).kept(time_s, values[:, None]).tolist()
+    return Thinning(tolerance).choose(time_s, values[:, None]).tolist()
 
 
 MOST_ITEMS = 1 << 20

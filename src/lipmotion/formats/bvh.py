@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import MotionFormat, formatted_rows
-from lipmotion.meshes.fitting.point_motion import point_motion
+from lipmotion.formats.base import MotionFormat, format_rows
+from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.types import Generation, Motion
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def check(motion: Motion) -> None:
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write the points; of motion with distances alone, they move as mouths usually do (``fitting.point_motion``)."""
     motion, template = generation.motion, mouth_template()
-    moved = point_motion(motion, generation.units).expressed
+    moved = move_points(motion, generation.units).expressed
     offsets = [" ".join(f"{value:.5f}" for value in place * CENTIMETRES) for place in template.places]
     lines = ["HIERARCHY", "ROOT head", "{", "  OFFSET 0 0 0", f"  CHANNELS 6 {ROOT_CHANNELS}"]
     for point, jaw, offset in zip(template.points, template.jaw, offsets, strict=True):
@@ -47,7 +47,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     places = ((template.places + moved) * CENTIMETRES).reshape(len(moved), -1)
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.write("\n".join(lines) + "\n")
-        for row in formatted_rows(places):
+        for row in format_rows(places):
             file.write(f"0 0 0 0 0 0 {row.replace(',', ' ')}\n")
 
 

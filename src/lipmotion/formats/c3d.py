@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import CHIN, mouth_template
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.formats.base import MotionFormat
-from lipmotion.formats.markers import MARKER, MILLIMETRES, in_head_frame, motion_of_markers
+from lipmotion.formats.markers import MARKER, MILLIMETRES, measure_markers, to_head_frame
 from lipmotion.meshes.files.steady_rate import exact_rate
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
 
@@ -346,7 +346,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     if lost:
         what = f"{len(lost)} of {len(lost) + len(markers)} markers are seen in less than half of the frames"
         LOG.warning("%s: %s and left out: %s", path, what, ", ".join(lost[:8]))
-    return motion_of_markers(in_head_frame(markers, content.unit), content.rate_hz), Timeline(())
+    return measure_markers(to_head_frame(markers, content.unit), content.rate_hz), Timeline(())
 
 
 def _points(motion: Motion) -> list[int]:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lipmotion.articulation.contact import opening_of
-from lipmotion.articulation.crossfade import phone_weights
+from lipmotion.articulation.contact import gap_to_opening
+from lipmotion.articulation.crossfade import crossfade_phones
 from lipmotion.articulation.cue_sheets import CueSheet
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError, InputError
@@ -110,9 +110,9 @@ def cue_motion(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:
         spans.append(Span(cue.start_s, cue.end_s, Unit(phone, word=words[place].label if inside else "")))
     units = Timeline(tuple(spans))
     time_s = np.arange(int(sheet.duration_s * RATE_HZ + 1e-6) + 1) / RATE_HZ
-    said = phone_weights(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
+    said = crossfade_phones(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
     gap = np.sum([SHAPES[name].opening * weight for name, weight in said.items()], axis=0) * WIDEST_GAP
     spread = np.sum([SHAPES[name].spread * weight for name, weight in said.items()], axis=0)
     width = mouth_template().width * (1 + WIDENING * spread)
-    values = np.stack([opening_of(np.where(gap < 1e-6, 0.0, gap)), width], axis=1)
+    values = np.stack([gap_to_opening(np.where(gap < 1e-6, 0.0, gap)), width], axis=1)
     return Motion(values, RATE_HZ, (Channel("opening"), Channel("width"))), units

@@ -12,7 +12,7 @@ from pathlib import Path
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.formats.base import motion_suffix
 from lipmotion.formats.base import read_units as read_units_of_motion
-from lipmotion.formats.label_services import DamagedJsonError, described, is_json, service_tiers
+from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, service_tiers
 from lipmotion.formats.label_tiers import (
     LINES,
     OTHER,
@@ -23,12 +23,12 @@ from lipmotion.formats.label_tiers import (
     LabelTier,
     TimedLabel,
     holds_phones,
-    in_inventory,
-    in_seconds,
-    merged_timelines,
+    map_to_inventory,
+    merge_timelines,
+    parse_seconds,
     phone_timeline,
+    split_speakers,
     tier_transcript,
-    tiers_of_speakers,
     with_words,
 )
 from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, subtitle_tier, write_subrip, write_webvtt
@@ -94,7 +94,7 @@ class RecordingLabels:
         return tuple(word for token in said for word in list_readings(token)[0]) or None
 
 
-def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
+def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
     """Return the labels from the files beside a recording that have its name, with a suffix of ``FOR_WORDS``.
 
     Those of ``RECOGNISED`` may have a language as well (``take.en.vtt``), or the whole name (``take.mp4.srt``); JSON
@@ -104,7 +104,7 @@ def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) ->
     """
     seen: list[Path] = []
     found: list[tuple[Path, RecordingLabels]] = []
-    for path in label_files_beside(recording):
+    for path in find_label_files(recording):
         if path not in ignored and not any(path.samefile(other) for other in seen):
             labels = _read(path, unknown_json=path.suffix == ".json")
             found += [(path, labels)] if labels is not None else []
@@ -114,8 +114,8 @@ def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) ->
     return RecordingLabels(next(transcripts, None), next((each.phones for _, each in in_order if each.phones), None))
 
 
-def label_files_beside(recording: Path) -> list[Path]:
-    """Return the files beside a recording that ``labels_beside`` reads, in the order of ``FOR_WORDS``."""
+def find_label_files(recording: Path) -> list[Path]:
+    """Return the files beside a recording that ``find_labels`` reads, in the order of ``FOR_WORDS``."""
     names: list[Path] = []
     for suffix in dict.fromkeys((*FOR_WORDS, *FOR_PHONES)):
         names.append(recording.with_suffix(suffix))
@@ -172,13 +172,13 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     if not phones and any(each.role in (WORDS, LINES) for each in tiers):
         raise InputError(f"{where}: holds words in time, but no phones; give it as a transcript (--transcript)")
     if not phones:
-        held = f"{described(text, where)}; " if is_json(text) else "holds no phones in time, "
+        held = f"{describe_json(text, where)}; " if is_json(text) else "holds no phones in time, "
         raise InputError(
             f"{where}: {held}required a motion file (.json, .npz), a TextGrid with a tier of "
             "phones, or labels with times, one phone a line"
         )
     _name_speakers(phones, where)
-    units = merged_timelines(
+    units = merge_timelines(
         [with_words(phone_timeline(each, (), where, with_gaps=True), _words_of(each, tiers)) for each in phones]
     )
     recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
@@ -195,7 +195,7 @@ def speakers_in(path: Path) -> tuple[str, ...]:
         tiers = _timed_tiers(_text(path), "") or []
     except InputError:  # said by the reader
         return ()
-    return tuple(dict.fromkeys(tier.speaker for tier in tiers_of_speakers(tiers) if tier.speaker))
+    return tuple(dict.fromkeys(tier.speaker for tier in split_speakers(tiers) if tier.speaker))
 
 
 def holds_timings(path: Path) -> bool:
@@ -239,7 +239,7 @@ def _labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
             raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
         return RecordingLabels(transcript)
     several = len(phones) > 1
-    timeline = merged_timelines(
+    timeline = merge_timelines(
         [phone_timeline(tier, _words_of(tier, chosen), where, with_gaps=several) for tier in phones]
     )
     unknown = [span for span in timeline if span.label.unit == UNKNOWN_PHONES]
@@ -258,7 +258,7 @@ def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of a text whose form has times, in the phones of the inventory; None of any other text."""
     try:
         if is_textgrid(text):
-            tiers: list[LabelTier] | None = in_seconds(parse_interval_tiers(text, where), where)
+            tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
         elif (found := ROOT.match(text)) and found[1] in READ_ROOTS:
             tiers = xml_tiers(text, where)
         elif is_subtitles(text):
@@ -267,7 +267,7 @@ def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
             tiers = service_tiers(text, where) if is_json(text) else line_tiers(text, where)
     except RecursionError as error:
         raise InputError(f"{where}: is nested too deeply; give the words in time alone") from error
-    return None if tiers is None else [in_inventory(tier, where) for tier in tiers]
+    return None if tiers is None else [map_to_inventory(tier, where) for tier in tiers]
 
 
 def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> list[LabelTier]:
@@ -276,7 +276,7 @@ def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "
     tier, speaker : names, in any case; of a tier, all of its speaker stay that hold something else
     Raises InputError: there is no such tier or speaker.
     """
-    tiers = tiers_of_speakers(tiers)
+    tiers = split_speakers(tiers)
     if speaker:
         tiers = [each for each in tiers if each.speaker.lower() == speaker.lower()] or _refuse(
             "speaker", speaker, [each.speaker for each in tiers], where
@@ -290,7 +290,7 @@ def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "
             named = replace(named, role=PHONE_LABELS if holds_phones(replace(named, role="")) else LINES)
         same = (WORDS, LINES, "", OTHER) if named.role in (WORDS, LINES) else (PHONE_LABELS,)
         others = [each for each in tiers if each.role not in same and each.speaker == named.speaker]
-        return [in_inventory(named, where), *(each for each in others if each.role and each.name != named.name)]
+        return [map_to_inventory(named, where), *(each for each in others if each.role and each.name != named.name)]
     return [each for each in tiers if each.role != OTHER]
 
 
@@ -406,7 +406,7 @@ def _check_plain(text: str, path: Path) -> None:
             f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT_BYTES}: is it a transcript?"
         )
     if is_json(text):
-        raise InputError(f"{path}: {described(text, str(path))}")
+        raise InputError(f"{path}: {describe_json(text, str(path))}")
     _check_no_labels(remove_known_tags(text), str(path))
 
 

@@ -28,12 +28,12 @@ from lipmotion.formats.label_tiers import (
     WORDS,
     LabelTier,
     TimedLabel,
+    add_pauses,
     check_count,
-    in_seconds,
+    find_tier,
     ipa_labels,
-    named_tier,
+    parse_seconds,
     unit_of_times,
-    with_pauses,
 )
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
@@ -195,10 +195,10 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
             break
     else:
         tiers = _listed_tiers(objects, where) if len(objects) == len(numbered) else None
-    return tiers and [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
+    return tiers and [replace(t, labels=add_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
 
 
-def described(text: str, where: str) -> str:
+def describe_json(text: str, where: str) -> str:
     """Return what JSON is that holds no words in time, for a message."""
     value = next(_documents(text, where), (1, None))[1]
     first = value[0] if isinstance(value, list) and value else value
@@ -515,7 +515,7 @@ def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
         first, last = characters[owner_of[match.start()]], characters[owner_of[match.end() - 1]]
         found[WORDS].append(replace(first, end_s=last.end_s, text=match[0]))
     tiers = _word_and_phone_tiers(found[WORDS], found[PHONE_LABELS], where)
-    return in_seconds(tiers, where) if any(found.values()) else None
+    return parse_seconds(tiers, where) if any(found.values()) else None
 
 
 def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
@@ -580,5 +580,5 @@ def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
             labels.append(TimedLabel(times_s[0], times_s[-1], require(_TEXT, text, f"{where}: {place}"), place))
         if len(tier["entries"][0] if tier["entries"] else ()) == 3:
-            tiers.append(named_tier(name, labels))
+            tiers.append(find_tier(name, labels))
     return tiers

@@ -111,7 +111,7 @@ class LabelTier:
     speaker: str = ""
 
 
-def named_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
+def find_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
     """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
     found = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
     role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
@@ -129,7 +129,7 @@ def check_count(count: int, where: str) -> None:
         raise InputError(f"{where}: more than {MOST_LABELS} labels; give those of one recording")
 
 
-def required_time(text: str, place: str, where: str) -> float:
+def require_time(text: str, place: str, where: str) -> float:
     """Return a time from its text, also with a decimal comma. Raises InputError: it is none, or not finite."""
     return parse_number(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
 
@@ -164,7 +164,7 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
     return per_s
 
 
-def in_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[LabelTier]:
+def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[LabelTier]:
     """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
 
     per_s : how many of their units are a second; 0: how long words last decides
@@ -189,7 +189,7 @@ def holds_phones(tier: LabelTier) -> bool:
     return bool(spoken) and sum(phone_of(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
 
 
-def tiers_of_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
+def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     """Return tiers; those of unknown kinds that hold words at other times than each other are named as speakers."""
     unknown = [tier for tier in tiers if not tier.role and any(label.text for label in tier.labels)]
     if len(unknown) < 2 or any(tier.speaker or tier.role in (WORDS, LINES) for tier in tiers):
@@ -325,7 +325,7 @@ def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -
         end_s = label.end_s
 
 
-def merged_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
+def merge_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
     """Return what several speakers say in order, without silence; where two speak at once, who began goes on."""
     if len(timelines) == 1:
         return timelines[0]
@@ -426,7 +426,7 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
     return found
 
 
-def in_inventory(tier: LabelTier, where: str) -> LabelTier:
+def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     """Return a tier; one of phones in the phones of the inventory, from those, X-SAMPA or IPA, as they make sense.
 
     Raises InputError: as ``ipa_labels``.
@@ -435,9 +435,9 @@ def in_inventory(tier: LabelTier, where: str) -> LabelTier:
     spoken = [
         WITH_GLIDES.get(label.text, label.text) for label in labels if classify_label(label.text) is SpokenAs.SPEECH
     ]
-    in_inventory = sum(phone_of(text) is not None for text in spoken)
+    known = sum(phone_of(text) is not None for text in spoken)
     in_xsampa = sum(bool(xsampa_to_ipa(text)) for text in spoken)
-    if in_inventory == len(spoken) or (in_inventory >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
+    if known == len(spoken) or (known >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
         return tier
     as_ipa = WITH_GLIDES
     if all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
@@ -446,7 +446,7 @@ def in_inventory(tier: LabelTier, where: str) -> LabelTier:
     return replace(tier, labels=tuple(ipa_labels(symbols, where)))
 
 
-def with_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:
+def add_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:
     """Return phones with silence in the gaps between them; where it is short, a pause."""
     filled: list[TimedLabel] = []
     for label in phones:

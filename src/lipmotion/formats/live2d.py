@@ -16,7 +16,7 @@ from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_t
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat, key_frames
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion
 

@@ -34,7 +34,7 @@ MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
 """The name of a marker at a point of the face mesh."""
 
 
-def motion_of_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:
+def measure_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:
     """Return the channels of markers in the head's frame, and the distances between those of the lips."""
     points = {int(found[1]): places for name, places in markers.items() if (found := MARKER.match(name))}
     names = [str(int(found[1])) if (found := MARKER.match(name)) else name for name in markers]
@@ -51,7 +51,7 @@ def motion_of_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:
     return Motion(np.stack(list(curves.values()), axis=1), rate_hz, tuple(map(Channel, curves)))
 
 
-def in_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
+def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     """Return the places of all markers but the rigid ones, in the head's frame [each shape=(T, 3)].
 
     markers : places by name, in ``unit`` [each shape=(T, 3)]

@@ -46,11 +46,11 @@ def _document(
     channels = [{"name": channel.name, "unit": channel.unit} for channel in motion.channels]
     checked = require(items(members(_CHANNEL)), channels, "channels")
     outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
-    after = {**unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
+    after = {**list_unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
     return {"format": FORMAT, "version": VERSION, "rate_hz": float(motion.rate_hz), "channels": checked}, after
 
 
-def unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
+def list_unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
     """Return the members ``units`` and ``recognised`` (if phones were), for ``parse_units``."""
     rows = []
     for span in units:

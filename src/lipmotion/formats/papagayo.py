@@ -11,7 +11,14 @@ from bisect import bisect_left
 from dataclasses import replace
 from itertools import islice, takewhile
 
-from lipmotion.articulation.cue_sheets import CueSheet, chart_of, cue_time, shape_of, sheet_of, shown_shapes
+from lipmotion.articulation.cue_sheets import (
+    CueSheet,
+    build_cue_sheet,
+    choose_chart,
+    list_frame_shapes,
+    parse_cue_time,
+    parse_shape,
+)
 from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
@@ -34,8 +41,8 @@ def project_text(sheet: CueSheet, sound_file: str) -> str:
     29.97) at the same times, so that they do not drift from the sound.
     """
     sheet = replace(sheet, fps=float(math.ceil(sheet.fps - WHOLE_RATE_TOLERANCE)))
-    shown = shown_shapes(sheet)
-    phrases = [words_of_run(sheet, first, last) for first, last in _runs(shown)]
+    shown = list_frame_shapes(sheet)
+    phrases = [find_words_of_run(sheet, first, last) for first, last in _runs(shown)]
     said = [" ".join(word for *_, word in phrase) for phrase in phrases]
     lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(shown)}"]
     lines += ["1", "\tVoice 1", f"\t{'|'.join(said)}", f"\t{len(phrases)}"]
@@ -48,7 +55,7 @@ def project_text(sheet: CueSheet, sound_file: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
+def find_words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
     """Return the words from one frame to another, each with at least one frame, without gaps.
 
     What is said in less than a frame is joined to the word before by a hyphen.
@@ -103,7 +110,7 @@ class _Lines:
     def count(self) -> int:
         """Return the number on the next line. Raises InputError: it is none."""
         text = self.next()
-        return int(cue_time(text, self.place))
+        return int(parse_cue_time(text, self.place))
 
 
 def parse_project(text: str) -> CueSheet:
@@ -132,12 +139,12 @@ def parse_project(text: str) -> CueSheet:
             words.append(Span(first / fps, (last + 1) / fps, word))
             for _ in range(count):
                 frame, _, name = lines.next().partition(" ")
-                found.append((cue_time(frame, lines.place) / fps, name, lines.place))
+                found.append((parse_cue_time(frame, lines.place) / fps, name, lines.place))
             found.append(((last + 1) / fps, "", ""))
-    chart = chart_of(name for _, name, _ in found if name)
-    rows = [(start_s, shape_of(name, chart, place) if name else REST) for start_s, name, place in found]
+    chart = choose_chart(name for _, name, _ in found if name)
+    rows = [(start_s, parse_shape(name, chart, place) if name else REST) for start_s, name, place in found]
     kept = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=False) if row[0] < after[0]]
-    return sheet_of(kept, frames / fps, float(fps), Timeline(tuple(words)))
+    return build_cue_sheet(kept, frames / fps, float(fps), Timeline(tuple(words)))
 
 
 def _word(lines: _Lines) -> tuple[str, int, int, int]:
@@ -148,5 +155,5 @@ def _word(lines: _Lines) -> tuple[str, int, int, int]:
         raise InputError(
             f"{lines.place} is {shortened(line)!r}, required a word, its frames and the number of its shapes"
         )
-    first, last, count = (int(cue_time(field, lines.place)) for field in fields[1:])
+    first, last, count = (int(parse_cue_time(field, lines.place)) for field in fields[1:])
     return fields[0], first, last, count

@@ -16,7 +16,14 @@ from html import escape
 from itertools import pairwise
 from typing import Any
 
-from lipmotion.articulation.cue_sheets import CUES_FPS, CueSheet, chart_of, cue_time, shape_of, sheet_of
+from lipmotion.articulation.cue_sheets import (
+    CUES_FPS,
+    CueSheet,
+    build_cue_sheet,
+    choose_chart,
+    parse_cue_time,
+    parse_shape,
+)
 from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json
 from lipmotion.units.mouth_chart import LETTERS, SHAPES
@@ -55,10 +62,10 @@ def parse_tsv(text: str) -> CueSheet:
     follow = all(before[1] == after[0] for before, after in pairwise(spans))
     if mark == "," and not follow and all(f"{a}{b}".isdecimal() for a, b, _ in spans):  # decimal commas
         cues = [(place, [",".join(fields[:-1]), fields[-1]]) for place, fields in cues]
-    chart = chart_of((fields[-1] for _, fields in cues), LETTERS)
-    rows = [(cue_time(fields[0], place), shape_of(fields[-1], chart, place)) for place, fields in cues]
-    ends_s = [cue_time(fields[-2], place) for place, fields in cues[-1:]]
-    return sheet_of(rows, max(ends_s, default=0.0), CUES_FPS)
+    chart = choose_chart((fields[-1] for _, fields in cues), LETTERS)
+    rows = [(parse_cue_time(fields[0], place), parse_shape(fields[-1], chart, place)) for place, fields in cues]
+    ends_s = [parse_cue_time(fields[-2], place) for place, fields in cues[-1:]]
+    return build_cue_sheet(rows, max(ends_s, default=0.0), CUES_FPS)
 
 
 def xml_text(sheet: CueSheet, sound_file: str) -> str:
@@ -105,9 +112,11 @@ def parse_json(text: str) -> CueSheet:
         fields = cue if isinstance(cue, dict) else {}
         start, shape = (next((str(fields[n]) for n in names if n in fields), "None") for names in (STARTS, NAMES))
         found.append((f"cue {number}", start, str(fields.get("end", start)), shape))
-    chart = chart_of((shape for *_, shape in found), LETTERS)
-    rows = [(cue_time(start, place), shape_of(shape, chart, place)) for place, start, _, shape in found]
-    return sheet_of(rows, max((cue_time(end, place) for place, _, end, _ in found[-1:]), default=0.0), CUES_FPS)
+    chart = choose_chart((shape for *_, shape in found), LETTERS)
+    rows = [(parse_cue_time(start, place), parse_shape(shape, chart, place)) for place, start, _, shape in found]
+    return build_cue_sheet(
+        rows, max((parse_cue_time(end, place) for place, _, end, _ in found[-1:]), default=0.0), CUES_FPS
+    )
 
 
 def _of_cues(cues: Iterable[Iterable[str]]) -> CueSheet:
@@ -115,9 +124,9 @@ def _of_cues(cues: Iterable[Iterable[str]]) -> CueSheet:
     rows, end_s = [], 0.0
     for number, (start, end, letter) in enumerate(cues, 1):
         place = f"cue {number}"
-        rows.append((cue_time(start, place), shape_of(letter, LETTERS, place)))
-        end_s = cue_time(end, place)
-    return sheet_of(rows, end_s, CUES_FPS)
+        rows.append((parse_cue_time(start, place), parse_shape(letter, LETTERS, place)))
+        end_s = parse_cue_time(end, place)
+    return build_cue_sheet(rows, end_s, CUES_FPS)
 
 
 def dat_text(sheet: CueSheet, _sound_file: str) -> str:
@@ -139,9 +148,9 @@ def parse_dat(text: str, fps: float = CUES_FPS) -> CueSheet:
     wrong = next((number for number, fields in lines[1:] if len(fields) != 2), None)
     if wrong is not None:
         raise InputError(f"line {wrong}: required a frame and a mouth shape")
-    chart = chart_of(name for _, (_, name) in lines[1:])
+    chart = choose_chart(name for _, (_, name) in lines[1:])
     rows = [
-        (max(cue_time(frame, f"line {number}") - 1, 0) / fps, shape_of(name, chart, f"line {number}"))
+        (max(parse_cue_time(frame, f"line {number}") - 1, 0) / fps, parse_shape(name, chart, f"line {number}"))
         for number, (frame, name) in lines[1:]
     ]
-    return sheet_of(rows, 0.0, fps)
+    return build_cue_sheet(rows, 0.0, fps)

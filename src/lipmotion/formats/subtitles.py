@@ -223,7 +223,7 @@ def _dialogue(text: str, where: str) -> Iterator[TimedLabel]:
             yield TimedLabel(*times, BREAK.sub("\n", shown), f"line {number}")
 
 
-def shown_labels(path: Path, units: Timeline[Unit]) -> list[tuple[float, float, str]]:
+def list_shown_labels(path: Path, units: Timeline[Unit]) -> list[tuple[float, float, str]]:
     """Return start, end and text of each word, or of each phone where the name of the file asks for them; no silence.
 
     Words are those of ``units.group_words``.
@@ -247,7 +247,7 @@ def write_subrip(path: Path, units: Timeline[Unit]) -> None:
     After a failure there is no partial file. Raises ExportError: the file cannot be written.
     """
     lines: list[str] = []
-    for number, (start_s, end_s, text) in enumerate(shown_labels(path, units), 1):
+    for number, (start_s, end_s, text) in enumerate(list_shown_labels(path, units), 1):
         lines += [f"{number}", f"{clock(start_s, ',')} --> {clock(end_s, ',')}", text, ""]
     with whole_file(path) as temporary:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
@@ -259,7 +259,7 @@ def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
     After a failure there is no partial file. Raises ExportError: the file cannot be written.
     """
     lines = ["WEBVTT", ""]
-    for start_s, end_s, text in shown_labels(path, units):
+    for start_s, end_s, text in list_shown_labels(path, units):
         shown = "".join(_ESCAPES.get(letter, letter) for letter in text)
         lines += [f"{clock(start_s, '.')} --> {clock(end_s, '.')}", shown, ""]
     with whole_file(path) as temporary:

@@ -24,14 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shortened
-from lipmotion.formats.base import MotionFormat, formatted_rows
+from lipmotion.formats.base import MotionFormat, format_rows
 from lipmotion.meshes.files.steady_rate import (
     TIME_COLUMN,
     column_key,
     exact_rate,
-    in_seconds,
-    motion_at_times,
-    tabulated,
+    resample_rows,
+    tabulate_frames,
+    times_to_seconds,
 )
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, is_known
 from lipmotion.storage.text_table import LONGEST_LINE, TextTable, numbers_in, open_table
@@ -94,7 +94,7 @@ def write_table(path: Path, generation: Generation, _source: Mapping[str, str], 
     motion = generation.motion
     with path.open("w", encoding="utf-8") as file:
         file.write(",".join([TIME, *motion.names]) + "\n")
-        for time_s, row in zip(motion.time_s.tolist(), formatted_rows(motion.values), strict=True):
+        for time_s, row in zip(motion.time_s.tolist(), format_rows(motion.values), strict=True):
             shortest = f"{time_s:.9f}".rstrip("0").rstrip(".")
             file.write(f"{shortest},{row}\n")
 
@@ -208,7 +208,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
 
     Names that are understood become ARKit's. Angles have the unit ``radian``; all others are weights in a take of Live
     Link Face, and else eye distances where they are no blendshapes. What is done with rows without a face, and with
-    times that are not even, ``motion_at_times`` says.
+    times that are not even, ``resample_rows`` says.
     Raises InputError: not such a table, a field that is no number, times that go back, or gaps without end.
     """
     try:
@@ -227,8 +227,8 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
             if coded:
                 time_s = _seconds([_timecode(text, line) for line, text in times])
             else:
-                time_s = in_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
-            return motion_at_times(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
+                time_s = times_to_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
+            return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
     except (ValueError, OverflowError) as error:
         if isinstance(error, InputError):
             raise
@@ -296,7 +296,7 @@ def _of_single_scores(
         time = fields[timed].strip()
         lines.setdefault(time, line)
         frames.setdefault(time, {})[fields[named].strip()] = numbers_in([fields[score]], line)[0]
-    known, values = tabulated(list(frames.values()))
+    known, values = tabulate_frames(list(frames.values()))
     return [(line, time) for time, line in lines.items()], known, values
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, named_tier, required_time
+from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, find_tier, require_time
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
@@ -62,10 +62,10 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
                 raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
             labels = []
             for position in (f"{place}, interval {i + 1}" for i in range(count)):
-                start_s = required_time(_take(tokens, "number"), position, where)
-                end_s = required_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
+                start_s = require_time(_take(tokens, "number"), position, where)
+                end_s = require_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
                 labels.append(TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), position))
-            tiers += [named_tier(name, labels)] if kind == INTERVALS else []
+            tiers += [find_tier(name, labels)] if kind == INTERVALS else []
         place = "what follows the last tier"
         if next(tokens, None) is not None:
             raise _DamagedError("more is there than the counts say")

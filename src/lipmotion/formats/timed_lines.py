@@ -23,10 +23,10 @@ from lipmotion.formats.label_tiers import (
     LabelTier,
     TimedLabel,
     check_count,
-    in_seconds,
-    named_tier,
+    find_tier,
+    parse_seconds,
     phone_of,
-    required_time,
+    require_time,
 )
 
 SHORTEST_TICKS = 10_000
@@ -81,7 +81,7 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
     if last and float(last[1]) >= SHORTEST_TICKS:
         rows = list(_fitted(text, STARTS, "start label", where))
-        edges_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
+        edges_s = [require_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
         spans = zip(edges_s, edges_s[1:], rows, strict=False)
         return [LabelTier("labels", tuple(TimedLabel(a, b, row[1], f"line {number}") for a, b, (number, row) in spans))]
     first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
@@ -124,18 +124,18 @@ def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
     labels = []
     for number, (start, end, *words) in _fitted(text, form, "start end label", where):
         place = f"line {number}"
-        start_s, end_s = (required_time(time, place, where) for time in (start, end))
+        start_s, end_s = (require_time(time, place, where) for time in (start, end))
         labels.append(TimedLabel(start_s, end_s, words[0].strip() if words else "", place))
     tier = LabelTier("labels", tuple(labels))
     if form is SECONDS:
-        return in_seconds([tier], where)[0]
+        return parse_seconds([tier], where)[0]
     lengths = [label.end_s - label.start_s for label in labels if label.end_s > label.start_s]
     is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(label.text == TIMIT_SILENCE for label in labels)
     short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
     if is_timit or not short:
-        return in_seconds([tier], where, TIMIT_HZ if short else TICKS_PER_S)[0]
+        return parse_seconds([tier], where, TIMIT_HZ if short else TICKS_PER_S)[0]
     role = PHONE_LABELS if all(phone_of(label.text) for label in labels) else WORDS
-    return in_seconds([replace(tier, role=role)], where)[0]
+    return parse_seconds([replace(tier, role=role)], where)[0]
 
 
 def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
@@ -151,7 +151,7 @@ def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
         if name != recording:
             names = f"{shortened(recording)!r} and {shortened(name)!r}"
             raise InputError(f"{where}: line {number}: words of two recordings, {names}; keep those of one")
-        start_s, end_s = (required_time(time, f"line {number}", where) for time in (start, end))
+        start_s, end_s = (require_time(time, f"line {number}", where) for time in (start, end))
         if form is CTM and end_s < 0:
             raise InputError(f"{where}: line {number}: a duration of {end_s:g} s, required 0 or more")
         end_s += start_s if form is CTM else 0.0
@@ -203,9 +203,9 @@ def _table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
             times = (row["start"], row.get("end") or row["duration"])
         except (ValueError, IndexError, KeyError, csv.Error) as error:
             raise InputError(f"{where}: {place} is {shortened(line)!r}; required, as in line 1: {header}") from error
-        start_s, end_s = (required_time(time, place, where) for time in times)
+        start_s, end_s = (require_time(time, place, where) for time in times)
         end_s += 0.0 if row.get("end") else start_s
         key = (row.get("kind", named), row.get("speaker", ""))
         kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
-    tiers = [named_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
-    return in_seconds(tiers, where)
+    tiers = [find_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
+    return parse_seconds(tiers, where)

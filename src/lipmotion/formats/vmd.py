@@ -16,10 +16,9 @@ import numpy as np
 
 from lipmotion.errors import InputError
 from lipmotion.formats.base import MotionFormat, key_frames
-from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_weights, given_gaze
-from lipmotion.meshes.model.head_angles import ANGLES, head_angles, head_quaternions
-from lipmotion.meshes.model.other_shapes import CLOSED
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_VOWELS, arkit_name, vowel_name
+from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_to_weights, weights_to_gaze
+from lipmotion.meshes.model.bones import ANGLES, head_angles, head_quaternions
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, CLOSED, VRM_VOWELS, arkit_name, vowel_name
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 from lipmotion.types.motion import RADIAN
 
@@ -88,7 +87,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         angles[HEAD] = np.stack([curves[name] for name in ANGLES], axis=1)
     if {*MOVED_BY["gaze"]} & {*curves}:
         still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
-        angles[EYES] = np.pad(given_gaze(still | curves), ((0, 0), (0, 1)))
+        angles[EYES] = np.pad(weights_to_gaze(still | curves), ((0, 0), (0, 1)))
     turns = {bone: (head_quaternions(turned) * MIRRORED).tolist() for bone, turned in angles.items()}
     bones = [
         (frame, bone, turn)
@@ -131,7 +130,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             name: (curve, RADIAN) for name, curve in zip(ANGLES, _turned(HEAD, bones[HEAD], frames).T, strict=True)
         }
     if EYES in bones:
-        looks = gaze_weights(_turned(EYES, bones[EYES], frames)[:, :2])
+        looks = gaze_to_weights(_turned(EYES, bones[EYES], frames)[:, :2])
         curves |= {name: (curve, WEIGHT) for name, curve in looks.items()}
     table = np.stack([curve for curve, _ in curves.values()], axis=1)
     return Motion(table, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())

@@ -34,17 +34,17 @@ def element(name: str, *content: str, **attributes: str | bool | None) -> Html:
     for key, value in attributes.items():
         if value is not None and value is not False:
             attribute = _simple(key.rstrip("_").replace("_", "-"))
-            words.append(attribute if value is True else f'{attribute}="{escaped(value)}"')
+            words.append(attribute if value is True else f'{attribute}="{escape_html(value)}"')
     start = f"<{' '.join(words)}>"
     return Html(start if name in VOID else f"{start}{joined(*content)}</{name}>")
 
 
 def joined(*content: str) -> Html:
     """Return some content one after another, escaped as in ``element``."""
-    return Html("".join(text if isinstance(text, Html) else escaped(text) for text in content))
+    return Html("".join(text if isinstance(text, Html) else escape_html(text) for text in content))
 
 
-def escaped(text: str) -> str:
+def escape_html(text: str) -> str:
     """Return a text as it stands in an element or an attribute, in one line, without anything invisible."""
     return escape(printable(text))
 
@@ -64,14 +64,14 @@ def whole_page(title: str, style: str, *content: str, script: str = "") -> str:
         element("meta", name_="viewport", content_="width=device-width, initial-scale=1"),
         Html(GENERATOR),
         element("title", title),
-        Html(f"<style>\n{coloured(style)}</style>"),
+        Html(f"<style>\n{colour_code(style)}</style>"),
     )
     scripts = Html(f"<script>\n{script}</script>" if script else "")
     body = element("body", *content, scripts)
     return f'<!DOCTYPE html>\n<html lang="en">\n{element("head", head)}\n{body}\n</html>\n'
 
 
-def coloured(style: str) -> str:
+def colour_code(style: str) -> str:
     """Return a style with the colours of all pages, light and dark."""
     return style.replace(SHARED_COLOURS, resources.files(__package__).joinpath("colours.css").read_text("utf-8"))
 

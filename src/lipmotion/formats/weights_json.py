@@ -24,7 +24,7 @@ import numpy as np
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.formats.base import MotionFormat, read_members, write_json
-from lipmotion.meshes.files.steady_rate import TIME_COLUMN, column_key, in_seconds, motion_at_times, tabulated
+from lipmotion.meshes.files.steady_rate import TIME_COLUMN, column_key, resample_rows, tabulate_frames, times_to_seconds
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
 from lipmotion.storage.json_text import json_errors
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
@@ -148,7 +148,7 @@ def _of_azure(pieces: list[dict[str, Any]]) -> Motion:
                 f"frames from {start} on are there twice, with other weights; required: the pieces of one utterance"
             )
         place[:] = table
-    return motion_at_times(AZURE_NAMES, np.arange(count) / AZURE_HZ, values)[0]
+    return resample_rows(AZURE_NAMES, np.arange(count) / AZURE_HZ, values)[0]
 
 
 def _of_frames(objects: list[dict[str, Any]]) -> Motion:
@@ -156,17 +156,17 @@ def _of_frames(objects: list[dict[str, Any]]) -> Motion:
     if not any(weights for _, weights in frames):
         raise InputError("no frames of blendshapes by their names, required a list of {time, blendshapes}")
     timed = next((key for key in frames[0][0] if TIME_COLUMN.fullmatch(key)), None)
-    names, values = tabulated([weights for _, weights in frames])
+    names, values = tabulate_frames([weights for _, weights in frames])
     if timed is not None:
         missing = sum(each.get(timed) is None for each, _ in frames)
         if missing:
             raise InputError(f"{missing} of {len(frames)} frames have no {timed!r}, required a time in each")
         times = np.array([float(each[timed]) for each, _ in frames])
-        return motion_at_times(names, in_seconds(times, timed), values)[0]
+        return resample_rows(names, times_to_seconds(times, timed), values)[0]
     rate_hz = next((float(each[key]) for each in objects for key in RATES if each.get(key)), 0.0)
     if not rate_hz > 0:
         raise InputError(f"{len(frames)} frames have no time, required one in each, or a member fps")
-    return motion_at_times(names, np.arange(len(frames)) / rate_hz, values)[0]
+    return resample_rows(names, np.arange(len(frames)) / rate_hz, values)[0]
 
 
 def _weights(frame: Mapping[str, Any]) -> dict[str, float] | None:

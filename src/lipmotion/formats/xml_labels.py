@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, named_tier
+from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, find_tier
 from lipmotion.types.values import parse_clock
 
 ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
@@ -60,7 +60,7 @@ def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
         timed = [(spans_s.get(aligned, (math.nan, math.nan)), " ".join(parts)) for aligned, parts in texts.items()]
         rows = enumerate(sorted(timed, key=lambda row: (math.isnan(row[0][0]), row[0])), 1)
         labels = [TimedLabel(*span_s, text, f"tier {name!r}, annotation {number}") for number, (span_s, text) in rows]
-        found = named_tier(name, labels, tier.get("PARTICIPANT") or "")
+        found = find_tier(name, labels, tier.get("PARTICIPANT") or "")
         role = found.role or (OTHER if tier.get("PARENT_REF") else LINES if found.speaker else "")
         tiers.append(LabelTier(name, found.labels, role, found.speaker))
     return tiers

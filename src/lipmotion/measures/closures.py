@@ -54,7 +54,7 @@ def closed_threshold(openings: Sequence[Curve], share: float = CLOSED_SHARE) -> 
     return float(share * np.percentile(np.concatenate(openings), 95))
 
 
-def closings(opening: Curve, threshold: float) -> NDArray[np.intp]:
+def find_closings(opening: Curve, threshold: float) -> NDArray[np.intp]:
     """Return the frames of all closings; a closing is the first closed frame after an open one."""
     closed = opening < threshold
     return np.nonzero(closed[1:] & ~closed[:-1])[0] + 1
@@ -83,7 +83,7 @@ def match_closings(
     return pairs
 
 
-def matched_count(some: NDArray[np.intp], others: NDArray[np.intp], reach: int = REACH) -> int:
+def count_matches(some: NDArray[np.intp], others: NDArray[np.intp], reach: int = REACH) -> int:
     """Return the number of closings that have any of the others within ``reach`` frames."""
     return int((np.abs(some[:, None] - others) <= reach).any(axis=1).sum())
 
@@ -92,15 +92,15 @@ def closure_figures(
     generated: Sequence[Curve], original: Sequence[Curve], threshold: float, rate_hz: float
 ) -> Closures:
     """Return the closure figures of openings, which are given clip by clip."""
-    g_closings = [closings(g, threshold) for g in generated]
-    o_closings = [closings(o, threshold) for o in original]
+    g_closings = [find_closings(g, threshold) for g in generated]
+    o_closings = [find_closings(o, threshold) for o in original]
     both = list(zip(g_closings, o_closings, strict=True))
     g_count, o_count = sum(map(len, g_closings)), sum(map(len, o_closings))
     errors = [g_frame - o_frame for g, o in both for g_frame, o_frame in match_closings(g, o)]
     closed = g_count + o_count
     return Closures(
-        score=sum(matched_count(o, g) for g, o in both) / o_count if o_count else float("nan"),
-        precision=sum(matched_count(g, o) for g, o in both) / g_count if g_count else float("nan"),
+        score=sum(count_matches(o, g) for g, o in both) / o_count if o_count else float("nan"),
+        precision=sum(count_matches(g, o) for g, o in both) / g_count if g_count else float("nan"),
         f1=2 * len(errors) / closed if closed else float("nan"),
         timing_ms=float(np.median(errors)) / rate_hz * 1000 if errors else float("nan"),
         original=o_count,
@@ -117,8 +117,8 @@ def clip_closure_counts(
     Both are arrays [shape=(1,)] for each clip; the closure score is the sum of the first divided by the sum of the
     second, also for clips that are drawn for a bootstrap interval.
     """
-    expected = [closings(o[:, 0], threshold) for o in original]
-    hits = [matched_count(o, closings(g[:, 0], threshold)) for g, o in zip(generated, expected, strict=True)]
+    expected = [find_closings(o[:, 0], threshold) for o in original]
+    hits = [count_matches(o, find_closings(g[:, 0], threshold)) for g, o in zip(generated, expected, strict=True)]
     return [np.array([hit], float) for hit in hits], [np.array([len(o)], float) for o in expected]
 
 
@@ -145,8 +145,8 @@ def phone_closures(
             if (o[first:stop] < threshold).any():
                 closed += 1
                 hit += bool((g[first:stop] < threshold).any())
-        false += int((~inside[closings(g, threshold)]).sum())
-        natural += int((~inside[closings(o, threshold)]).sum())
+        false += int((~inside[find_closings(g, threshold)]).sum())
+        natural += int((~inside[find_closings(o, threshold)]).sum())
     minutes = speech_s / 60
     return PhoneClosures(
         recall=hit / closed if closed else float("nan"),

@@ -48,7 +48,7 @@ def correlation(generated: Array, original: Array) -> Array:
     return (a * b).sum(axis=0) / np.where(moves, scale, np.inf)
 
 
-def moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
+def select_moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
     """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit.
 
     units : of the channels

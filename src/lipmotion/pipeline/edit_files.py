@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError
-from lipmotion.formats.motion_document import parse_units, unit_rows
+from lipmotion.formats.motion_document import list_unit_rows, parse_units
 from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, located
@@ -214,7 +214,7 @@ def write_edits(file: EditFile, path: str | Path) -> None:
     if file.undone:
         members["undone"] = list(map(str, file.undone))
     if file.units is not None:
-        members |= unit_rows(file.units)
+        members |= list_unit_rows(file.units)
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
     content = _as_toml(members) if kind == TOML else as_json_rows(members)

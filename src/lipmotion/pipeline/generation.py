@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.curve_edits import bend_through_pins, pinned_frame
-from lipmotion.articulation.pauses import with_pauses
-from lipmotion.articulation.symmetry import symmetrical
+from lipmotion.articulation.curve_edits import bend_through_pins, find_pinned_frame
+from lipmotion.articulation.pauses import rest_in_pauses
+from lipmotion.articulation.symmetry import make_symmetrical
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.extensions import provided
@@ -87,9 +87,9 @@ def generation_of(
     def finish(generation: Generation, start_s: float) -> Generation:
         pinned_s = [pin.time_s - start_s for pin in constraints.pins] if constraints else []
         if request.onto is None:
-            generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
+            generation = replace(generation, motion=make_symmetrical(generation.motion, request.asymmetry))
         events = [event.shifted(-start_s) for event in understood.events]
-        return with_pauses(generation, request.pauses, pinned_s, events)
+        return rest_in_pauses(generation, request.pauses, pinned_s, events)
 
     paused = generate_for(person, model.engine, model.learned, understood.speech, constraints, finish)
     speech, fit = understood.speech, understood.fit
@@ -300,7 +300,7 @@ def generate_passages(
     values = np.require(values, None, "W")
     spread = _join_spread(parts, made, rest, np.empty((frames, 0), dtype))
     motion = replace(rest.motion, values=values)
-    held = [(pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
+    held = [(find_pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
     bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest
     clip_at_zero(motion)
     if held and isinstance(spread, ReducedVariance):

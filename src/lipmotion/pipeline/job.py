@@ -161,9 +161,9 @@ def open_face(outputs: Outputs) -> ShownFace:
 
 def open_character(outputs: Outputs) -> DrivenCharacter:
     """Return the character that outputs name, from its files. Raises InputError: they cannot be read."""
-    from lipmotion.meshes.fitting.driven import driven_character
+    from lipmotion.meshes.fitting.driven import load_character
 
-    return driven_character(
+    return load_character(
         outputs.character or Path(),
         points=outputs.lip_points,
         binding=outputs.binding,

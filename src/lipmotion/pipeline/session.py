@@ -19,13 +19,13 @@ from typing import Any, TypeVar
 
 from lipmotion.articulation.curve_edits import (
     MotionStretch,
+    apply_curve_edits,
+    apply_gain,
+    apply_stretch,
     check_drawn,
-    locked_stretch,
-    pinned_frame,
-    with_edited_curves,
-    with_gain,
-    with_held,
-    with_stretch,
+    cut_locked_stretch,
+    find_pinned_frame,
+    hold_mouth,
 )
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import AlignmentError, InputError, shortened
@@ -333,7 +333,7 @@ class Session:
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            generation = with_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
+            generation = apply_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
         return generation
 
     def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
@@ -342,7 +342,7 @@ class Session:
         def stretch() -> MotionStretch:
             generation = self._after(before)
             motion = with_gestures(generation.motion, generation.units, names)
-            return locked_stretch(generation.with_motion(motion), lock.start_s, lock.end_s)
+            return cut_locked_stretch(generation.with_motion(motion), lock.start_s, lock.end_s)
 
         return self._cache.cached("locked", (before, lock, names, self.is_sketching), stretch)
 
@@ -356,16 +356,16 @@ class Session:
         generation = self._with_pins(self._phone_steps(steps), modelled)
         for edit in edits:
             if isinstance(edit, Gain) and not edit.channel:
-                generation = with_gain(generation, edit)
+                generation = apply_gain(generation, edit)
             elif isinstance(edit, Hold):
-                generation = with_held(generation, edit)
+                generation = hold_mouth(generation, edit)
         curves = [edit for edit in edits if not isinstance(edit, Hold) and edit.channel and edit not in modelled]
         if any(not edit.channel for edit in edits):
             curves = [*modelled, *curves]  # a gain or a held pose has moved their values
         asked = [edit.channel for edit in curves if edit.channel in GESTURES]
         if asked:
             generation = generation.with_motion(with_gestures(generation.motion, generation.units, asked))
-        motion = with_edited_curves(generation.motion, generation.units, curves)
+        motion = apply_curve_edits(generation.motion, generation.units, curves)
         others = tuple(edit for edit in curves if edit.channel not in motion.names)
         for edit in edits:
             self._check_edit(edit, motion)
@@ -390,7 +390,7 @@ class Session:
             )
         last_s = (len(motion.values) - 1) / motion.rate_hz
         if isinstance(edit, Pin):
-            pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
+            find_pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
         elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
             kind = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
             raise InputError(f"{kind} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")

@@ -11,9 +11,8 @@ import numpy as np
 
 from lipmotion.errors import LipMotionError
 from lipmotion.formats.base import MotionFormat
-from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.model.other_shapes import CLOSED
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS
+from lipmotion.formats.fap import FAP
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, CLOSED
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.testing.examples import example
 from lipmotion.types import Generation, StateTrace

@@ -58,12 +58,15 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
     products, down, across, pixels = np.zeros((3, 3)), np.zeros(2), np.zeros(2), 0
     for pictures in clips:
         if pictures.ndim != 4 or pictures.shape[3] != 3 or pictures.dtype != np.uint8:
-            raise InputError(
-                f"pictures of shape {pictures.shape} and type {pictures.dtype}, required (T, H, W, 3), uint8"
-            )
+            found = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
+            raise InputError(f"{found}, required (T, H, W, 3), uint8")
         if len(pictures) < 3 or not pictures.size:
             continue
-        still = _still_differences(pictures)
+        steps = np.diff(pictures.astype(np.float32), axis=0)
+        moved = np.abs(steps).mean(axis=(1, 2, 3))
+        moved = np.maximum(moved[1:], moved[:-1])
+        stillest = np.argsort(moved, kind="stable")[: max(1, round(STILL_SHARE * len(moved)))]
+        still = steps[stillest + 1] - steps[stillest]  # second differences over time
         products += np.einsum("thwc,thwd->cd", still, still)
         down += _neighbours(still, 1)
         across += _neighbours(still, 2)
@@ -97,13 +100,10 @@ class NoiseSource:
                       its number alone, so a video can be made in parts of any length
         Raises InputError: not pictures, or of another size.
         """
-        required = (*self.size, 3)
-        if pictures.ndim != 4 or pictures.shape[1:] != required or pictures.dtype != np.uint8:
-            raise InputError(
-                f"pictures of shape {pictures.shape} and type {pictures.dtype}, required (T, {required[0]}, "
-                f"{required[1]}, 3), uint8"
-            )
         height, width = self.size
+        if pictures.ndim != 4 or pictures.shape[1:] != (height, width, 3) or pictures.dtype != np.uint8:
+            found = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
+            raise InputError(f"{found}, required (T, {height}, {width}, 3), uint8")
         result = np.empty_like(pictures)
         for number, picture in enumerate(pictures):
             draw = np.random.default_rng([self.seed, first_frame + number])
@@ -120,12 +120,14 @@ class NoiseSource:
         values, vectors = np.linalg.eigh(self.noise.covariance)
         mixing = (vectors * np.sqrt(np.maximum(values, 0))).T.astype(np.float32)
         height, width = self.size
-        field = np.random.default_rng(self.seed).standard_normal(
-            (FIELD_SCALE * height, FIELD_SCALE * width, 3), np.float32
-        )
-        for axis, spread in enumerate(self.noise.spread_px):
+        size = FIELD_SCALE * height, FIELD_SCALE * width, 3
+        field = np.random.default_rng(self.seed).standard_normal(size, np.float32)
+        for axis, spread in enumerate(self.noise.spread_px.tolist()):
             if spread > 0:
-                field = convolve1d(field, _window(float(spread)), axis=axis, mode="wrap")
+                reach = int(np.ceil(4 * spread))
+                window = np.exp(-(np.arange(-reach, reach + 1) ** 2) / (2 * spread**2))
+                window = (window / np.linalg.norm(window)).astype(np.float32)  # white noise keeps its variance
+                field = convolve1d(field, window, axis=axis, mode="wrap")
         return np.pad(field @ mixing, ((0, height), (0, width), (0, 0)), mode="wrap")
 
 
@@ -141,9 +143,8 @@ def camera_noise_from_arrays(arrays: Arrays) -> CameraNoise:
         stored = checked_arrays(arrays, NOISE_ARRAYS)
         covariance = stored["noise_covariance"]
         if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -EIGENVALUE_TOLERANCE:
-            raise ValueError(
-                "noise_covariance is no covariance matrix, required a symmetric one without negative eigenvalues"
-            )
+            required = "required a symmetric one without negative eigenvalues"
+            raise ValueError(f"noise_covariance is no covariance matrix, {required}")
         return CameraNoise(covariance, stored["noise_spread_px"])
 
 
@@ -154,15 +155,6 @@ NOISE_ARRAYS = {
     "noise_spread_px": ArraySpec(np.float64, "2", 0, LARGEST_SPREAD_PX),
 }
 """The arrays of the noise of a camera."""
-
-
-def _still_differences(pictures: Pictures) -> NDArray[np.float32]:
-    """Return the second differences over time at the stillest frames of a clip [shape=(N, H, W, 3)], N ≥ 1."""
-    steps = np.diff(pictures.astype(np.float32), axis=0)
-    moved = np.abs(steps).mean(axis=(1, 2, 3))
-    moved = np.maximum(moved[1:], moved[:-1])
-    still = np.argsort(moved, kind="stable")[: max(1, round(STILL_SHARE * len(moved)))]
-    return steps[still + 1] - steps[still]
 
 
 def _neighbours(values: NDArray[np.float32], axis: int) -> Array:
@@ -178,10 +170,3 @@ def _spread(sums: Array) -> float:
     if correlation < LEAST_CORRELATION:
         return 0.0
     return float(min(np.sqrt(-1 / (4 * np.log(min(correlation, 1 - LEAST_CORRELATION)))), LARGEST_SPREAD_PX))
-
-
-def _window(spread_px: float) -> NDArray[np.float32]:
-    """Return a Gaussian window of unit energy: white noise keeps its variance."""
-    reach = int(np.ceil(4 * spread_px))
-    window = np.exp(-(np.arange(-reach, reach + 1) ** 2) / (2 * spread_px**2))
-    return (window / np.linalg.norm(window)).astype(np.float32)

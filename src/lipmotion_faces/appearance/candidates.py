@@ -87,13 +87,21 @@ def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CAND
     """
     values = np.asarray(coefficients, np.float32)
     if values.ndim != 2 or not values.size or not np.isfinite(values).all():
-        raise InputError(
-            f"eigenlips of shape {values.shape}, required finite ones of at least one picture (T, 3·K), "
-            "as Eigenlips.project gives them"
-        )
+        required = "finite ones of at least one picture (T, 3·K), as Eigenlips.project gives them"
+        raise InputError(f"eigenlips of shape {values.shape}, required {required}")
     if count < 1:
         raise InputError(f"{count} candidate mouths asked for, required at least 1 (the paper has {CANDIDATES})")
-    centres = values[_furthest(values, count)]
+    centred = values - values.mean(axis=0, dtype=np.float64).astype(np.float32)
+    lengths = np.einsum("td,td->t", centred, centred)
+    chosen, distance = [int(lengths.argmin())], np.full(len(values), np.inf, np.float32)
+    while len(chosen) < count:
+        latest = chosen[-1]
+        np.minimum(distance, lengths + lengths[latest] - 2 * (centred @ centred[latest]), out=distance)
+        furthest = int(distance.argmax())
+        if not distance[furthest] > NO_DISTANCE * lengths.max():
+            break  # no more mouths differ
+        chosen.append(furthest)
+    centres = values[chosen]
     for _ in range(ROUNDS):
         group = _nearest(values, centres)
         order = np.argsort(group, kind="stable")
@@ -108,7 +116,7 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
 
     eigenlips    : of the same person
     pictures     : those chosen [shape=(N, H, W, 3)], uint8
-    coefficients : of the same pictures [shape=(N, 3·K)], for eigenlips that are ``enlarged``; None: their projections
+    coefficients : of the same pictures [shape=(N, 3·K)], for eigenlips of ``enlarge``; None: their projections
     A picture that differs from what its eigenlips restore by over ``LARGEST_DETAIL`` grey levels somewhere is left out.
     Raises InputError: no pictures, none that is whole, or of another size than those of the eigenlips.
     """
@@ -143,7 +151,7 @@ def recorded_details(
     return details, deepest
 
 
-def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
+def draw_to_recorded(wanted: Values, recorded: Values) -> Values:
     """Return coefficients [shape=(T, D)] that are drawn towards recorded ones: no mouth is an impossible one.
 
     wanted   : coefficients that a regression predicts [shape=(T, D)]
@@ -184,20 +192,6 @@ def squared_distances(some: Values, others: Values) -> Values:
 
 LARGEST_COEFFICIENT = 1e6
 """No coefficient of a picture is larger: 255 · √D of D pixels, and pictures have at most 10⁷."""
-
-
-def _furthest(values: Values, count: int) -> Index:
-    """Return mouths, each the furthest from those before it; fewer than ``count`` if no more differ."""
-    centred = values - values.mean(axis=0, dtype=np.float64).astype(np.float32)
-    lengths = np.einsum("td,td->t", centred, centred)
-    chosen, distance = [int(lengths.argmin())], np.full(len(values), np.inf, np.float32)
-    while True:
-        latest = chosen[-1]
-        np.minimum(distance, lengths + lengths[latest] - 2 * (centred @ centred[latest]), out=distance)
-        furthest = int(distance.argmax())
-        if len(chosen) == count or not distance[furthest] > NO_DISTANCE * lengths.max():
-            return np.array(chosen)
-        chosen.append(furthest)
 
 
 def _nearest(values: Values, others: Values) -> Index:

@@ -1,19 +1,155 @@
-"""The order in which frames of a background are shown, for speech of any length, without a visible jump."""
+"""The order in which frames of a background are shown, for speech of any length, without a visible jump.
+
+Frames are compared by descriptors: what a viewer would see change from one to another, mouth aside.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion_faces.appearance.frame_descriptors import FrameDescriptors, row_distances
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
+Scenes = Sequence[tuple[int, int]]
+
+FRAME_CELLS = 32
+"""Cells of the thumbnail of the whole frame along its longer side."""
+UPPER_FACE = (-54.0, -45.0, 54.0, 42.0)
+EYES = (-50.0, -14.0, 50.0, 14.0)
+"""Left, top, right and bottom of the regions that are compared with the face aligned, px of the face that looks
+straight ahead, from the point between the eyes."""
+LOWER_FACE = (-60.0, 42.0, 60.0, 140.0)
+"""The region that is replaced, or moves with speech: not compared."""
+FACE_STEP, EYES_STEP = 6.0, 4.0
+"""Distance of the samples of these regions, px of the face that looks straight ahead."""
+LEAST_ORDINARY = (0.2, 0.2, 0.2)
+"""Least ordinary difference of neighbouring frames, in the whole frame and the upper face, levels, and of the
+place of the face, px of the frame: smaller differences are not seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameDescriptors:
+    """What T frames look like, in levels of green.
+
+    whole : thumbnails of the whole frame; the cells of the lower face are 0 in all of them [shape=(T, A)]
+    face  : the upper face, aligned [shape=(T, B)]
+    eyes  : the eyes, aligned [shape=(T, C)]
+    place : x and then y of the eye corners and the mouth in the frame, px [shape=(T, 6)]
+    """
+
+    whole: Array
+    face: Array
+    eyes: Array
+    place: Array
+
+    def __len__(self) -> int:
+        return len(self.whole)
+
+    def part(self, start: int, stop: int) -> FrameDescriptors:
+        """Return the descriptors of frames from ``start`` (included) to ``stop`` (excluded)."""
+        return FrameDescriptors(*(rows[start:stop] for rows in (self.whole, self.face, self.eyes, self.place)))
+
+    def standardised(self, scenes: Scenes, fade: int = 1) -> Array:
+        """Return rows whose distances count in ordinary differences: that of neighbours has a median of about 1.
+
+        scenes : first frame of each part without a cut, and the one after its last
+        fade   : frames over which the whole frame and the place of the face change from one to another; the upper face
+                 is aligned, and counts as it is
+        Whole frame, upper face and place of the face have the same weight [shape=(T, A + B + 6)].
+        """
+        groups = []
+        for rows, least, frames in zip(
+            (self.whole, self.face, self.place), LEAST_ORDINARY, (fade, 1, fade), strict=True
+        ):
+            steps = [np.linalg.norm(np.diff(rows[start:stop], axis=0), axis=1) for start, stop in scenes]
+            different = np.concatenate([part[part > 0] for part in steps])
+            ordinary = float(np.median(different)) if len(different) else 0.0
+            groups.append(rows / (frames * max(ordinary, least * np.sqrt(rows.shape[1]))))
+        return np.concatenate(groups, axis=1) / np.sqrt(len(groups))
+
+
+def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -> FrameDescriptors:
+    """Return descriptors of the frames of a background.
+
+    frames        : uint8 RGB, all of one size [shape=(H, W, 3)]; taken one at a time
+    face_to_image : the affine map of each frame, from px of the face that looks straight ahead to px of the frame
+                    [shape=(T, 2, 3)]
+    Raises InputError: another number of frames, or frames of several sizes.
+    """
+    whole, face, eyes = [], [], []
+    lower: NDArray[np.bool_] | None = None
+    cell = 1
+    size: tuple[int, ...] = ()
+    for n, frame in enumerate(frames):
+        if n == len(face_to_image) or (size and frame.shape != size):
+            raise InputError(
+                f"frame {n} of shape {frame.shape} with {len(face_to_image)} maps; required as many frames, of one size"
+            )
+        if not size:
+            size, cell = frame.shape, max(1, round(max(frame.shape[:2]) / FRAME_CELLS))
+        grey = frame[:, :, 1].astype(np.float32)  # green, of which a camera has most pixels
+        thumbnail = _average_cells(grey, cell)
+        rows, columns = np.mgrid[: thumbnail.shape[0], : thumbnail.shape[1]]
+        centres = np.stack([(columns.ravel() + 0.5) * cell, (rows.ravel() + 0.5) * cell])
+        x, y = np.linalg.solve(face_to_image[n][:, :2], centres - face_to_image[n][:, 2:])
+        left, top, right, bottom = LOWER_FACE
+        hidden = ((x > left) & (x < right) & (y > top) & (y < bottom)).reshape(thumbnail.shape)
+        lower = hidden if lower is None else lower | hidden
+        whole.append(thumbnail)
+        face.append(_sample(grey, face_to_image[n], UPPER_FACE, FACE_STEP))
+        eyes.append(_sample(grey, face_to_image[n], EYES, EYES_STEP))
+    if len(whole) != len(face_to_image) or lower is None:
+        raise InputError(f"{len(whole)} frames with {len(face_to_image)} maps, required as many, at least one")
+    points = np.array([[-45.0, 0, 1], [45, 0, 1], [0, 76, 1]]).T
+    place = (face_to_image @ points).reshape(len(whole), 6)
+    shown = (np.stack(whole) * ~lower).reshape(len(whole), -1)
+    alike, eye_levels = np.stack(face).astype(np.float64), np.stack(eyes).astype(np.float64)
+    return FrameDescriptors(shown.astype(np.float64), alike, eye_levels, place)
+
+
+def row_distances(rows: Array) -> Array:
+    """Return the distance between every two rows, such as of ``FrameDescriptors.standardised`` [shape=(T, T)]."""
+    rows = rows - rows.mean(axis=0)
+    power = np.square(rows).sum(axis=1)
+    return np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
+
+
+def _average_cells(grey: Floats, cell: int) -> Floats:
+    """Return means of square cells; pixels beyond the last whole cell are left out."""
+    height, width = (side // cell for side in grey.shape)
+    if not height or not width:
+        return grey.mean(keepdims=True)
+    if cell == 1:
+        return grey
+    rows = grey[: height * cell, : width * cell].reshape(height, cell, -1).sum(axis=1)
+    return rows.reshape(height, width, cell).sum(axis=2) / cell**2
+
+
+def _sample(grey: Floats, to_image: Array, box: tuple[float, float, float, float], step: float) -> Floats:
+    """Return a region of the aligned face on a grid, each sample the mean of about its part [shape=(N,)]."""
+    left, top, right, bottom = box
+    scale = float(np.sqrt(abs(np.linalg.det(to_image[:, :2]))))
+    shrink = max(1, int(scale * step / 2))
+    x, y = np.meshgrid(np.arange(left + step / 2, right, step), np.arange(top + step / 2, bottom, step))
+    columns, rows = (to_image[:, :2] @ np.stack([x.ravel(), y.ravel()]) + to_image[:, 2:]) / shrink - 0.5
+    image = _average_cells(grey, shrink)
+    height, width = image.shape  # bilinear samples; outside, the picture is as at its edge
+    rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+    top, left = np.minimum(rows.astype(int), max(height - 2, 0)), np.minimum(columns.astype(int), max(width - 2, 0))
+    below, beside = np.minimum(top + 1, height - 1), np.minimum(left + 1, width - 1)
+    down, across = rows - top, columns - left
+    upper = (1 - across) * image[top, left] + across * image[top, beside]
+    under = (1 - across) * image[below, left] + across * image[below, beside]
+    return (1 - down) * upper + down * under
+
+
 Numbers = NDArray[np.intp]
 Kind = Literal["turn", "jump"]
 
@@ -116,7 +252,7 @@ def loop_order(
     if count <= longest[1] - longest[0]:
         starts = np.arange(longest[0], longest[1] - count + 1)
         start = int(starts[np.argmin(plan.restless[starts] + plan.restless[starts + count - 1])])
-        return _as_order([(start, 1, count)], (), count, 0)
+        return _make_order([(start, 1, count)], (), count, 0)
     draws = np.random.default_rng(seed)
     orders = [plan.order(count, longest, draws) for _ in range(TRIES)]
     return min(orders, key=plan.blemish)
@@ -145,13 +281,19 @@ class _Plan:
         self._scene_of = np.full(len(allowed), -1)
         for index, (start, stop) in enumerate(self.scenes):
             self._scene_of[start:stop] = index
-        self.busy = _busy(descriptors.eyes, rate_hz, self.scenes)
-        self.restless = _restlessness(descriptors.standardised(self.scenes), self.scenes) + BUSY_COST * self.busy
+        self.busy = _find_blinks(descriptors.eyes, rate_hz, self.scenes)
+        self.restless = _measure_restlessness(descriptors, self.scenes) + BUSY_COST * self.busy
         self._least = max(1, round(LEAST_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
         self._repeat = REPEAT_S * rate_hz
         self._fade = fade_frames(rate_hz)
-        self._jumps = self._best_jumps(descriptors)
+        count = len(descriptors)
+        if count > MOST_COMPARED_FRAMES:
+            none = np.full((count, 1), -1), np.full((count, 1), np.inf)
+            self._jumps = {1: none, -1: none}
+        else:
+            distance = row_distances(descriptors.standardised(self.scenes, self._fade))
+            self._jumps = {way: self._find_jumps(distance, way) for way in (1, -1)}
 
     def order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
         """Return one order of frames, drawn by chance."""
@@ -161,9 +303,10 @@ class _Plan:
         runs: list[tuple[int, int, int]] = []
         joins: list[Join] = []
         while shown < count:
-            options = self._joins_from(at, way)
+            options = self._list_joins(at, way)
             lengths = np.abs(options.ends - at) + 1
-            seen = self._last_seen(options, way, last_shown)
+            following = options.nexts[:, None] + way * np.arange(self._least)
+            seen = last_shown[np.clip(following, 0, len(last_shown) - 1)].max(axis=1)  # -inf: never
             ages = np.where(options.nexts < 0, 0, shown + lengths - seen)
             costs = options.costs + self._usual / lengths + REPEAT_COST * np.exp(-ages / self._repeat)
             chosen = int(draws.choice(np.flatnonzero(costs <= costs.min() + CHOICE_COST_RANGE)))
@@ -173,14 +316,12 @@ class _Plan:
             last_shown[at : end + way if end + way >= 0 else None : way] = shown
             if shown >= count:
                 break
-            is_turn = after < 0
-            joins.append(Join(shown, "turn" if is_turn else "jump", float(options.costs[chosen])))
-            if is_turn:
+            joins.append(Join(shown, "turn" if after < 0 else "jump", float(options.costs[chosen])))
+            if after < 0:
                 way = -way
-                at = end + way if self._room(end, way) else end
-            else:
-                at = after
-        return _as_order(runs, tuple(joins), count, self._fade)
+                after = end + way if self._room(end, way) else end
+            at = after
+        return _make_order(runs, tuple(joins), count, self._fade)
 
     def blemish(self, order: LoopOrder) -> float:
         """Return how bad an order is: the cost of its worst join, how restless its last frame is, and its repeats."""
@@ -189,7 +330,7 @@ class _Plan:
         again = (np.diff(order.first[shown]) == 0) & (np.diff(shown) < self._repeat)
         return worst + REPEATS_COST * float(again.sum()) / len(order)
 
-    def _joins_from(self, at: int, way: int) -> _Joins:
+    def _list_joins(self, at: int, way: int) -> _Joins:
         room = self._room(at, way)
         least = min(self._least, max(room, 1))
         lengths = np.arange(least, room + 1) if room >= least else np.array([room])
@@ -202,30 +343,16 @@ class _Plan:
             np.concatenate([np.full(len(ends), -1), targets[row, scene]]),
         )
 
-    def _last_seen(self, options: _Joins, way: int, last_shown: Array) -> Array:
-        """Return when any of the frames that would follow a join was shown last, -inf for never [shape=(K,)]."""
-        following = options.nexts[:, None] + way * np.arange(self._least)
-        newest: Array = last_shown[np.clip(following, 0, len(last_shown) - 1)].max(axis=1)
-        return newest
-
     def _room(self, at: int, way: int) -> int:
         """Return how many frames there are behind a frame, in its scene."""
         start, stop = self.scenes[int(self._scene_of[at])]
         return stop - 1 - at if way > 0 else at - start
 
-    def _best_jumps(self, descriptors: FrameDescriptors) -> dict[int, tuple[Numbers, Array]]:
+    def _find_jumps(self, distance: Array, way: int) -> tuple[Numbers, Array]:
         """Return the frame of each scene to which each frame is best followed by a jump, -1 for none, and the cost.
 
-        For both ways [each shape=(T, S)].
+        distance : of frames [shape=(T, T)];  way : 1 or -1. Both results have the shape (T, S).
         """
-        count = len(descriptors)
-        if count > MOST_COMPARED_FRAMES:
-            return {way: (np.full((count, 1), -1), np.full((count, 1), np.inf)) for way in (1, -1)}
-        distance = row_distances(descriptors.standardised(self.scenes, self._fade))
-        return {way: self._best_jumps_on(distance, way) for way in (1, -1)}
-
-    def _best_jumps_on(self, distance: Array, way: int) -> tuple[Numbers, Array]:
-        """Return the same for one direction, from the distances of frames [shape=(T, T)]."""
         count = len(distance)
         frames = np.arange(count)
         power = np.zeros((count, count))
@@ -264,7 +391,7 @@ def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int
     return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]
 
 
-def _busy(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
+def _find_blinks(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
     """Return the frames in a blink, or near one: the eyes change much [shape=(T,)]."""
     from scipy.ndimage import binary_dilation
 
@@ -277,20 +404,20 @@ def _busy(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDA
     return binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
 
 
-def _restlessness(rows: Array, scenes: Sequence[tuple[int, int]]) -> Array:
+def _measure_restlessness(descriptors: FrameDescriptors, scenes: Sequence[tuple[int, int]]) -> Array:
     """Return the speed of the background at each frame, relative to the median [shape=(T,)]."""
     from scipy.ndimage import gaussian_filter1d
 
+    rows = descriptors.standardised(scenes)
     speed = np.zeros(len(rows))
     for start, stop in scenes:
         if stop - start > 1:
             smooth = gaussian_filter1d(rows[start:stop], 1.0, axis=0, mode="nearest")
             speed[start:stop] = np.linalg.norm(np.gradient(smooth, axis=0), axis=1)
-    median = float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0
-    return speed / median
+    return speed / (float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0)
 
 
-def _as_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], count: int, fade: int) -> LoopOrder:
+def _make_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], count: int, fade: int) -> LoopOrder:
     """Return the order of some runs (first frame, direction, number of frames), of which ``count`` frames are shown.
 
     fade : frames over which a jump is cross-faded, smoothly (3s² − 2s³)

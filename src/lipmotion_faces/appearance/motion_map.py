@@ -104,8 +104,9 @@ def fit_motion_map(values: Array, channels: tuple[Channel, ...], targets: NDArra
     mean, scale = values[:, used].mean(axis=0), values[:, used].std(axis=0)
     standardised = (values[:, used] - mean) / scale
     variances, vectors = np.linalg.eigh(standardised.T @ standardised / len(standardised))
-    kept = variances[::-1][:COMPONENTS] > LEAST_DEVIATION
-    basis = vectors[:, ::-1][:, :COMPONENTS][:, kept] / np.sqrt(variances[::-1][:COMPONENTS][kept])
+    variances, vectors = variances[::-1][:COMPONENTS], vectors[:, ::-1][:, :COMPONENTS]
+    moving = variances > LEAST_DEVIATION
+    basis = vectors[:, moving] / np.sqrt(variances[moving])
     components = standardised @ basis
     limits = np.percentile(components, [OUTER_PERCENTAGE, 100 - OUTER_PERCENTAGE], axis=0)
     near = np.clip(components, *limits)[:, :LIKENESS_COMPONENTS].astype(np.float32)
@@ -122,15 +123,7 @@ def fit_motion_map(values: Array, channels: tuple[Channel, ...], targets: NDArra
 
 def motion_map_arrays(fitted: MotionMap) -> dict[str, NDArray[Any]]:
     """Return a regression serialised as arrays (``MOTION_MAP``)."""
-    return {
-        "names": np.array(fitted.names),
-        "mean": fitted.mean,
-        "scale": fitted.scale,
-        "basis": fitted.basis,
-        "limits": fitted.limits,
-        "centres": fitted.centres,
-        "coefficients": fitted.coefficients,
-    }
+    return {name: np.asarray(getattr(fitted, name)) for name in MOTION_MAP}
 
 
 def motion_map_from_arrays(arrays: Arrays, values: int) -> MotionMap:

@@ -1,4 +1,7 @@
-"""The appearance of a person: what mouth and jaw look like, for any motion of the face, learned from footage."""
+"""The appearance of a person, learned from footage: what mouth and jaw look like, for any motion of the face.
+
+It is stored as arrays.
+"""
 
 from __future__ import annotations
 
@@ -11,30 +14,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.eigenlips import COLOURS, COMPONENTS, Eigenlips, fit_eigenlips
+from lipmotion.motion.eigenlips import (
+    COLOURS,
+    COMPONENTS,
+    Eigenlips,
+    eigenlips_from_arrays,
+    eigenlips_to_arrays,
+    fit_eigenlips,
+)
+from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
+from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.stats.pca import choose_evenly
+from lipmotion.storage.coded_video import decode_pictures, encode_pictures
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
-from lipmotion_faces.appearance.camera_noise import CameraNoise, estimate_noise
+from lipmotion_faces.appearance.camera_noise import (
+    CameraNoise,
+    camera_noise_arrays,
+    camera_noise_from_arrays,
+    estimate_noise,
+)
 from lipmotion_faces.appearance.candidates import (
     CANDIDATES,
+    LARGEST_COEFFICIENT,
     LARGEST_DETAIL,
     Candidates,
     choose_candidates,
-    drawn_to_recorded,
+    draw_to_recorded,
     make_candidates,
     recorded_details,
     squared_distances,
 )
 from lipmotion_faces.appearance.lower_face import (
+    CORNER,
     HEIGHT,
+    LARGEST_SCALE,
+    NARROWEST_PX,
+    WIDEST_PX,
+    WIDTH,
     FaceShape,
     cheek_light,
     mouth_ellipse,
     mouth_part,
-    relit,
+    relight,
     replaced_part,
 )
-from lipmotion_faces.appearance.motion_map import LEAST_DEVIATION, MotionMap, channel_values, fit_motion_map
+from lipmotion_faces.appearance.motion_map import (
+    LEAST_DEVIATION,
+    MotionMap,
+    channel_values,
+    fit_motion_map,
+    motion_map_arrays,
+    motion_map_from_arrays,
+)
 from lipmotion_faces.appearance.refinement import RefinementOptions, Refiner
 
 Array = NDArray[np.float64]
@@ -148,21 +180,21 @@ class Appearance:
     @cached_property
     def mouth_candidates(self) -> Candidates:
         """The recorded mouths as eigenlips and detail."""
-        return make_candidates(enlarged(self.mouth, self.scale), self.mouths, self.mouth_codes)
+        return make_candidates(enlarge(self.mouth, self.scale), self.mouths, self.mouth_codes)
 
     @cached_property
     def jaw_candidates(self) -> Candidates:
         """The recorded lower faces as components and detail."""
-        details, _ = recorded_details(enlarged(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        details, _ = recorded_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
         return Candidates(self.jaw_codes, details)
 
     def mouth_refiner(self, options: RefinementOptions) -> Refiner:
         """Return what makes pictures of the mouth from eigenlips."""
-        return Refiner(enlarged(self.mouth, self.scale), self.mouth_candidates, options)
+        return Refiner(enlarge(self.mouth, self.scale), self.mouth_candidates, options)
 
     def jaw_refiner(self, options: RefinementOptions = JAW_OPTIONS) -> Refiner:
         """Return what makes pictures of the lower face from components of the jaw."""
-        return Refiner(enlarged(self.jaw, self.scale), self.jaw_candidates, options)
+        return Refiner(enlarge(self.jaw, self.scale), self.jaw_candidates, options)
 
     def of_motion(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
         """Return the lower face for motion of tracked points.
@@ -172,16 +204,16 @@ class Appearance:
         """
         values = self.from_motion.predict(motion)
         count = self.mouth_codes.shape[1]
-        mouth = self._recorded_mouths(values[:, :count], motion, contact)
+        mouth = self._mix_mouths(values[:, :count], motion, contact)
         return FaceCodes(mouth, values[:, count:-1], values[:, -1])
 
-    def _recorded_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
+    def _mix_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
         """Return mixtures of recorded mouths [shape=(T, 90)] that look as predicted and are as open and as wide as the
         motion, as far as this person has been; in closures, recorded mouths that are closed.
         """
         measured = self.mouth_distances
         if measured is None:
-            return drawn_to_recorded(predicted, self.mouth_codes)
+            return draw_to_recorded(predicted, self.mouth_codes)
         middle = measured.mean(axis=0)
         wanted = middle + DISTANCE_GAINS * (channel_values(motion, LIP_DISTANCES) - middle)
         wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
@@ -190,10 +222,13 @@ class Appearance:
             np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
             for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
         )
-        mouths = drawn_to_recorded(sought, recorded)[:, : predicted.shape[1]]
+        mouths = draw_to_recorded(sought, recorded)[:, : predicted.shape[1]]
         if contact is None:
             return mouths
-        for first, stop in _closures(contact, motion.rate_hz):
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
+        for first, stop in ends.tolist():
+            if stop - first > max(1, LONGEST_CLOSURE_S * motion.rate_hz):
+                continue
             closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
             apart = squared_distances(sought[first:stop], recorded).mean(axis=0)
             pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
@@ -203,7 +238,7 @@ class Appearance:
 
     def of_mouths(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
-        codes = self.mouth.project(relit(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
+        codes = self.mouth.project(relight(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
         values = codes @ self.from_mouth[1:] + self.from_mouth[0]
         return FaceCodes(codes, values[:, :-1], values[:, -1])
 
@@ -216,39 +251,31 @@ class Appearance:
         return FaceCodes(codes.mouth, values[:, :-1], values[:, -1])
 
 
-def _closures(contact: Array, rate_hz: float) -> list[tuple[int, int]]:
-    """Return the closures of at most ``LONGEST_CLOSURE_S``: the first frame of each, and the one after its last."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
-    return [(first, stop) for first, stop in ends.tolist() if stop - first <= max(1, LONGEST_CLOSURE_S * rate_hz)]
-
-
 def learn_appearance(footage: FootagePictures) -> Appearance:
     """Return the appearance of a person.
 
     Raises InputError: no pictures, or motion of another number of frames.
     Cost: about 10 s for four minutes of footage; 100 kB a frame.
     """
-    pictures, light, reference = _in_one_light(footage)
+    pictures, light, reference = _equalise_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
-    mouth = fit_eigenlips(mouths[choose_evenly(TRAINING_PICTURES, len(mouths))], COMPONENTS)
+    training = choose_evenly(TRAINING_PICTURES, len(pictures))
+    mouth = fit_eigenlips(mouths[training], COMPONENTS)
     codes = mouth.project(mouths)
-    around = pictures[choose_evenly(TRAINING_PICTURES, len(pictures))].mean(axis=0, dtype=np.float32)
-    faces = _jaw_alone(pictures[choose_evenly(TRAINING_PICTURES, len(pictures))], around, footage.shape)
-    jaw = fit_eigenlips(faces, JAW_COMPONENTS)
-    jaw_codes = np.concatenate(
-        [
-            jaw.project(_jaw_alone(pictures[start : start + PICTURES_PER_BLOCK], around, footage.shape))
-            for start in range(0, len(pictures), PICTURES_PER_BLOCK)
-        ]
-    )
-    chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
+    around = pictures[training].mean(axis=0, dtype=np.float32)
+    jaw = fit_eigenlips(_isolate_jaw(pictures[training], around, footage.shape), JAW_COMPONENTS)
+    blocks = (pictures[start : start + PICTURES_PER_BLOCK] for start in range(0, len(pictures), PICTURES_PER_BLOCK))
+    jaw_codes = np.concatenate([jaw.project(_isolate_jaw(block, around, footage.shape)) for block in blocks])
+    chosen = choose_candidates(codes, CANDIDATES)
+    undamaged = recorded_details(mouth, mouths[chosen], codes[chosen])[1] <= LARGEST_DETAIL
+    chosen = chosen[undamaged] if undamaged.any() else chosen
     chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
     names = [channel.name for channel in footage.channels]
 
     def recorded(frames: Index) -> Pictures:
         if footage.scale == 1:
             return pictures[frames]
-        return relit(footage.finer(frames), reference / light[frames])
+        return relight(footage.finer(frames), reference / light[frames])
 
     chosen_faces = recorded(chosen_jaws)
     jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
@@ -262,16 +289,16 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         codes[chosen],
         footage.motion[chosen][:, [names.index(name) for name in LIP_DISTANCES]],
         jaw,
-        _jaw_alone(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
+        _isolate_jaw(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
         jaw_codes[chosen_jaws],
         fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
-        _regression(codes, jaw_and_chin),
-        _regression(footage.levels_db[:, None], jaw_and_chin),
+        _fit_regression(codes, jaw_and_chin),
+        _fit_regression(footage.levels_db[:, None], jaw_and_chin),
         estimate_noise(np.split(mouths, ends)),
     )
 
 
-def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
+def _equalise_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
     """Return all pictures in the same light, their own light [shape=(N, 3)], and that light [shape=(3,)]."""
     count = sum(len(clip) for clip in footage.clips)
     if not count or len(footage.motion) != count or len(footage.levels_db) != count:
@@ -282,16 +309,15 @@ def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
     part = (slice(None), *mouth_part(1))
     light = np.maximum(np.concatenate([cheek_light(clip[part]) for clip in footage.clips]), 1.0)
     reference = np.median(light, axis=0)
-    pictures = np.empty((count, *footage.clips[0].shape[1:]), np.uint8)
-    start = 0
+    pictures, start = np.empty((count, *footage.clips[0].shape[1:]), np.uint8), 0
     for clip in footage.clips:
         inside = slice(start, start + len(clip))
-        pictures[inside] = relit(clip, reference / light[inside])
+        pictures[inside] = relight(clip, reference / light[inside])
         start += len(clip)
     return pictures, light, reference
 
 
-def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
+def _isolate_jaw(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
     """Return lower faces that differ in the jaw alone: mouth and surroundings are the mean ones [shape=(H, W, 3)]."""
     from scipy.ndimage import binary_dilation
 
@@ -302,13 +328,7 @@ def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
     return result
 
 
-def _undamaged(space: Eigenlips, pictures: Pictures, codes: Floats, chosen: Index) -> Index:
-    """Return those of the chosen pictures that are like what their components restore: damaged video is not."""
-    whole = recorded_details(space, pictures[chosen], codes[chosen])[1] <= LARGEST_DETAIL
-    return chosen[whole] if whole.any() else chosen
-
-
-def _regression(inputs: Values, targets: Values) -> Floats:
+def _fit_regression(inputs: Values, targets: Values) -> Floats:
     """Return the coefficients of a ridge regression on 1 and the inputs [shape=(1 + F, V)]."""
     centre, middle = inputs.mean(axis=0, dtype=np.float64), targets.mean(axis=0, dtype=np.float64)
     x = inputs - centre
@@ -318,7 +338,7 @@ def _regression(inputs: Values, targets: Values) -> Floats:
     return np.concatenate([(middle - centre @ slopes)[None], slopes]).astype(np.float32)
 
 
-def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
+def enlarge(eigenlips: Eigenlips, scale: int) -> Eigenlips:
     """Return eigenlips that restore larger pictures from the same coefficients, by cubic interpolation.
 
     scale : pixels of the new pictures for each of the old ones, along each side; 1: the same eigenlips
@@ -343,3 +363,101 @@ def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
         eigenlips.explained,
         (scale * height, scale * width),
     )
+
+
+CRF = 6.0
+"""Quality of the pictures: detail is what they are kept for."""
+PARTS = ("mouth", "jaw", "from_motion", "noise")
+"""Prefixes of the names of the arrays of parts."""
+REMEDY = "build the face again"
+"""What to do about a damaged file."""
+
+
+def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
+    """Return the appearance of a person serialised as arrays (``APPEARANCE`` and those of ``PARTS``).
+
+    Pictures are coded (``storage.coded_video``), which changes them by about one grey level.
+    """
+    parts = {
+        "mouth": eigenlips_to_arrays(appearance.mouth),
+        "jaw": eigenlips_to_arrays(appearance.jaw),
+        "from_motion": motion_map_arrays(appearance.from_motion),
+        "noise": camera_noise_arrays(appearance.noise),
+    }
+    arrays = {f"{part}/{name}": array for part, inner in parts.items() for name, array in inner.items()}
+    shape = appearance.shape
+    return arrays | {
+        "shape": np.array([shape.half_width_px, shape.bottom_px]),
+        "scale": np.array(appearance.scale),
+        "light": appearance.light,
+        "mouths": encode_pictures(appearance.mouths, CRF),
+        "mouth_codes": appearance.mouth_codes,
+        "jaws": encode_pictures(appearance.jaws, CRF),
+        "jaw_codes": appearance.jaw_codes,
+        "from_mouth": appearance.from_mouth,
+        "from_sound": appearance.from_sound,
+        **({} if appearance.mouth_distances is None else {"mouth_distances": appearance.mouth_distances}),
+    }
+
+
+def appearance_from_arrays(arrays: Arrays) -> Appearance:
+    """Deserialise the appearance of a person.
+
+    Raises ModelFormatError: an array is missing, unknown, out of range, or the parts do not fit together.
+    """
+    inner = {part: arrays_under(arrays, f"{part}/") for part in PARTS}
+    own = {name: array for name, array in arrays.items() if name.partition("/")[0] not in PARTS or "/" not in name}
+    with format_errors("the appearance of the person", REMEDY):
+        refuse_undeclared(own, APPEARANCE)
+        mouth, jaw = (eigenlips_from_arrays(inner[part], REMEDY) for part in ("mouth", "jaw"))
+        _check_size("mouth", mouth, (MOUTH_HEIGHT, MOUTH_WIDTH))
+        _check_size("jaw", jaw, (HEIGHT, WIDTH))
+        codes, jaw_codes = len(mouth.channels), len(jaw.channels)
+        stored = checked_arrays(own, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
+        scale = int(stored["scale"])
+        half_width_px, bottom_px = stored["shape"].tolist()
+        if not NARROWEST_PX <= half_width_px <= WIDEST_PX or not CORNER[1] < bottom_px < CORNER[1] + HEIGHT:
+            raise ValueError(f"a lower face of {half_width_px:g} px to {bottom_px:g} px below the eyes")
+        return Appearance(
+            FaceShape(half_width_px, bottom_px),
+            scale,
+            stored["light"],
+            mouth,
+            _decode(stored["mouths"], len(stored["mouth_codes"]), MOUTH_HEIGHT * scale, MOUTH_WIDTH * scale),
+            stored["mouth_codes"],
+            stored.arrays.get("mouth_distances"),
+            jaw,
+            _decode(stored["jaws"], len(stored["jaw_codes"]), HEIGHT * scale, WIDTH * scale),
+            stored["jaw_codes"],
+            motion_map_from_arrays(inner["from_motion"], codes + jaw_codes + 1),
+            stored["from_mouth"],
+            stored["from_sound"],
+            camera_noise_from_arrays(inner["noise"]),
+        )
+
+
+APPEARANCE = {
+    "shape": ArraySpec(np.float64, "2", 0, 1000),
+    "scale": ArraySpec(np.intp, "", 1, LARGEST_SCALE),
+    "light": ArraySpec(np.float64, "3", 1, 255),
+    "mouths": ArraySpec(np.uint8, "A", 0, 255),
+    "mouth_codes": ArraySpec(np.float32, "N C", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "mouth_distances": ArraySpec(np.float64, "N 3", -100, 100, optional=True),
+    "jaws": ArraySpec(np.uint8, "B", 0, 255),
+    "jaw_codes": ArraySpec(np.float32, "M K", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "from_mouth": ArraySpec(np.float32, "F J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "from_sound": ArraySpec(np.float32, "2 J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+}
+"""The arrays of an appearance, beside those of its parts."""
+
+
+def _check_size(name: str, space: Eigenlips, size: tuple[int, int]) -> None:
+    if space.size != size:
+        raise ValueError(f"pictures of the {name} of {space.size} px, required {size}")
+
+
+def _decode(data: Pictures, count: int, height: int, width: int) -> Pictures:
+    pictures = decode_pictures(data)
+    if pictures.shape != (count, height, width, 3):
+        raise ValueError(f"pictures of shape {pictures.shape}, required ({count}, {height}, {width}, 3)")
+    return pictures

@@ -82,10 +82,10 @@ class NestedGrids:
                 weight = np.where(odd_row, row_weight, 1 / 4) * np.where(odd_column, column_weight, 1 / 4)
                 neighbour = between + (row * odd_row * width + column * odd_column) * spacing
                 weights += csr_array((weight, (between, neighbour)), shape=(count, count))
-        whole = basis
+        matrix = basis
         for _ in range(len(self.nodes) - 1):  # a pixel depends on wider grids, and these on still wider ones
-            whole = basis + weights @ whole
-        return whole
+            matrix = basis + weights @ matrix
+        return matrix
 
 
 class GridFiller:
@@ -108,22 +108,16 @@ class GridFiller:
         count, stop = values.shape[:2]
         for level in reversed(range(len(self._filled))):
             fine = self._filled[level][:count]
-            if level + 1 < len(self._filled):
-                self._widen(self._filled[level + 1][:count], self._half[level][:count], fine)
+            if level + 1 < len(self._filled):  # from every second row and column; near the sides it is not valid
+                coarse, half = self._filled[level + 1][:count], self._half[level][:count]
+                half[:, :, ::2] = coarse
+                self._fill_between(coarse, half[:, :, 1::2], 2)
+                fine[:, ::2] = half
+                self._fill_between(half, fine[:, 1::2], 1)
             start = stop - len(self._grids.nodes[level])
             fine.reshape(count, -1, fine.shape[-1])[:, self._grids.positions[level]] = values[:, start:stop]
             stop = start
         return self._filled[0][:count]
-
-    def _widen(self, coarse: Floats, half: Floats, fine: Floats) -> None:
-        """Fill a grid [shape=(t, h, w, C)] from every second row and column of it.
-
-        Rows and columns nearer than three to the sides of the grid, where a neighbour is missing, are not valid.
-        """
-        half[:, :, ::2] = coarse
-        self._fill_between(coarse, half[:, :, 1::2], 2)
-        fine[:, ::2] = half
-        self._fill_between(half, fine[:, 1::2], 1)
 
     def _fill_between(self, values: Floats, out: Floats, axis: int) -> None:
         """Write the values in the middle between neighbours along an axis, except the first and the last."""
@@ -226,11 +220,11 @@ class CloningSystem:
         """
         self._check(source, background)
         whole = background.dtype == np.uint8
-        result = background.astype(np.uint8) if whole else _grey_levels(background.astype(np.float32))
+        result = background.astype(np.uint8) if whole else _round_levels(background.astype(np.float32))
         new, old = (pictures[(slice(None), *self.box)] for pictures in (source, result))
         for frames, membrane in self._membranes(source, background, largest_difference):
             np.add(membrane, new[frames], out=membrane, casting="same_kind")
-            cloned = _grey_levels(membrane)
+            cloned = _round_levels(membrane)
             flat = cloned.reshape(len(cloned), -1, COLOURS)
             flat[:, self.outside] = old[frames].reshape(flat.shape)[:, self.outside]
             old[frames] = cloned
@@ -244,13 +238,13 @@ class CloningSystem:
         step = max(1, min(CHUNK // (height * width), len(source)))
         filler = GridFiller(self.grids, step, COLOURS)
         for first in range(0, len(source), BATCH):
-            values = self._at_nodes(source[first : first + BATCH], background[first : first + BATCH], limit)
+            values = self._solve_nodes(source[first : first + BATCH], background[first : first + BATCH], limit)
             for start in range(0, len(values), step):
                 part = values[start : start + step]
                 yield slice(first + start, first + start + len(part)), filler.fill(part)
 
     @one_thread()
-    def _at_nodes(self, source: Pictures, background: Pictures, limit: float) -> NDArray[np.float32]:
+    def _solve_nodes(self, source: Pictures, background: Pictures, limit: float) -> NDArray[np.float32]:
         """Return the membranes of some pictures at the nodes [shape=(t, K, 3)]."""
         rows, columns = self.edge // self.grids.region.shape[1], self.edge % self.grids.region.shape[1]
         at = slice(None), rows + self.box[0].start, columns + self.box[1].start
@@ -295,17 +289,20 @@ def cloning_system(mask: Mask) -> CloningSystem:
     rows, columns = (np.flatnonzero(inner.any(axis=axis)) for axis in (1, 0))
     box = slice(int(rows[0]) - 1, int(rows[-1]) + 2), slice(int(columns[0]) - 1, int(columns[-1]) + 2)
     region = inner[box]
-    edge = np.flatnonzero(_neighbours(region) & ~region)
+    beside = np.zeros_like(region)
+    for axis in (0, 1):
+        beside |= np.roll(region, 1, axis) | np.roll(region, -1, axis)
+    edge = np.flatnonzero(beside & ~region)
     if len(edge) > LARGEST_EDGE:
         raise InputError(
             f"region with {len(edge)} pixels on its edge, at most {LARGEST_EDGE} are possible; "
             "use a smaller or smoother mask"
         )
     grids = nested_grids(region)
-    return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, _response(grids, edge))
+    return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, _solve_response(grids, edge))
 
 
-def _response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
+def _solve_response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
     """Return the membrane at the nodes for a difference of 1 at each pixel of the edge [shape=(K, B)].
 
     Of all functions that the grids can interpolate, it is the one of the least energy (Galerkin's method).
@@ -328,15 +325,7 @@ def _response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
     return response
 
 
-def _neighbours(region: Mask) -> Mask:
-    """Return the pixels above, below and beside those of a region that is False on its outermost pixels."""
-    found = np.zeros_like(region)
-    for axis in (0, 1):
-        found |= np.roll(region, 1, axis) | np.roll(region, -1, axis)
-    return found
-
-
-def _grey_levels(pictures: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _round_levels(pictures: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return pictures as grey levels, rounded and cut to 0 to 255 [same shape]; the pictures are changed."""
     np.rint(pictures, out=pictures)
     return np.clip(pictures, 0, 255, out=pictures).astype(np.uint8)

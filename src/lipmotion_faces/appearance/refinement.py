@@ -54,7 +54,7 @@ LIPS_SHARPENING, LIPS_AXES_PX, LIPS_EDGE_PX = 1.4, (28.0, 16.0), 6.0
 half axes and this edge, px of the face."""
 
 
-def sharpened(pictures: Pictures, share: float, scale: int) -> Pictures:
+def sharpen(pictures: Pictures, share: float, scale: int) -> Pictures:
     """Return pictures [shape=(T, H, W, 3)] that are sharper in lightness; colours would have fringes.
 
     share : of the difference between the lightness and its blurred picture that is added to all colours, outside the
@@ -92,8 +92,7 @@ def moving_average(coefficients: Values, frames: int = 3) -> NDArray[np.float64]
     sums = np.concatenate([np.zeros((1, coefficients.shape[1])), np.cumsum(coefficients, axis=0, dtype=np.float64)])
     middle = np.arange(count)
     half = np.minimum(frames // 2, np.minimum(middle, count - 1 - middle))
-    means: NDArray[np.float64] = (sums[middle + half + 1] - sums[middle - half]) / (2 * half + 1)[:, None]
-    return means
+    return (sums[middle + half + 1] - sums[middle - half]) / (2 * half + 1)[:, None]
 
 
 @dataclass(frozen=True, eq=False)

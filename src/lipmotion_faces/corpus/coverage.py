@@ -103,7 +103,7 @@ def coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon: Lexicon
             "transcripts beside the recordings and prepare them again, or give the unknown words (--lexicon)"
         )
     kinds = tuple(
-        _of_kind(kind, _counted(usable.values(), length), _counted(runs, length))
+        _cover_kind(kind, _count_sequences(usable.values(), length), _count_sequences(runs, length))
         for length, kind in enumerate(KINDS, start=1)
     )
     return Coverage(kinds, len(usable), left_out, len(utterances), sum(not each for each in utterances))
@@ -126,15 +126,15 @@ def phone_distances() -> NDArray[np.float64]:
     return distances
 
 
-def coverage_lines(found: Coverage, lines: int) -> Iterator[str]:
+def coverage_lines(result: Coverage, lines: int) -> Iterator[str]:
     """Yield the coverage as text: shares first, then the missing sequences of each kind, the most frequent first.
 
     lines : largest number of missing sequences of each kind
     """
-    yield f"{found.utterances - found.unknown} of {found.utterances} utterances, {found.sentences} sentences"
-    for each in found.kinds:
+    yield f"{result.utterances - result.unknown} of {result.utterances} utterances, {result.sentences} sentences"
+    for each in result.kinds:
         yield f"{each.kind:10} {each.covered:5} of {each.needed:5} different, {each.share:6.1%} of all in the sentences"
-    for each in found.kinds:
+    for each in result.kinds:
         if each.missing:
             yield ""
             yield f"{'missing ' + each.kind:20} {'needed':>8} {'share':>8}   nearest recorded"
@@ -144,14 +144,14 @@ def coverage_lines(found: Coverage, lines: int) -> Iterator[str]:
             yield f"and {len(each.missing) - lines} more {each.kind}"
 
 
-def coverage_document(found: Coverage) -> dict[str, Any]:
+def coverage_document(result: Coverage) -> dict[str, Any]:
     """Return the coverage as an object of JSON, with all missing sequences."""
-    document = asdict(found)
-    document["left_out"] = {printable(text): word for text, word in found.left_out.items()}
+    document = asdict(result)
+    document["left_out"] = {printable(text): word for text, word in result.left_out.items()}
     return document
 
 
-def _counted(runs: Iterable[Sequence[str]], length: int) -> Counter[Phones]:
+def _count_sequences(runs: Iterable[Sequence[str]], length: int) -> Counter[Phones]:
     """Return how often each sequence of some length occurs in phones between silences."""
     counts: Counter[Phones] = Counter()
     for run in runs:
@@ -160,10 +160,10 @@ def _counted(runs: Iterable[Sequence[str]], length: int) -> Counter[Phones]:
     return counts
 
 
-def _of_kind(kind: str, needed: Counter[Phones], recorded: Counter[Phones]) -> KindCoverage:
+def _cover_kind(kind: str, needed: Counter[Phones], recorded: Counter[Phones]) -> KindCoverage:
     total = sum(needed.values())
     missing = sorted((unit for unit in needed if unit not in recorded), key=lambda unit: (-needed[unit], unit))
-    nearest = _nearest(missing, recorded)
+    nearest = _find_nearest(missing, recorded)
     units = tuple(
         MissingUnit("-".join(unit), needed[unit], needed[unit] / total, "-".join(other), recorded[other])
         for unit, other in zip(missing, nearest, strict=True)
@@ -172,7 +172,7 @@ def _of_kind(kind: str, needed: Counter[Phones], recorded: Counter[Phones]) -> K
     return KindCoverage(kind, len(needed), len(needed) - len(missing), covered, units)
 
 
-def _nearest(missing: Sequence[Phones], recorded: Counter[Phones]) -> list[Phones]:
+def _find_nearest(missing: Sequence[Phones], recorded: Counter[Phones]) -> list[Phones]:
     """Return for each sequence the nearest one that is recorded."""
     if missing and len(missing[0]) == 1:
         known = {phone for (phone,) in recorded}
@@ -184,9 +184,7 @@ def _nearest(missing: Sequence[Phones], recorded: Counter[Phones]) -> list[Phone
     weights = (1.0, MIDDLE_WEIGHT, 1.0) if columns.shape[1] == len(KINDS) else (1.0, 1.0)
     chosen = []
     for unit in missing:
-        cost = sum(
-            weight * distances[number[phone]][column]
-            for weight, phone, column in zip(weights, unit, columns.T, strict=True)
-        )
+        terms = zip(weights, unit, columns.T, strict=True)
+        cost = sum(weight * distances[number[phone]][column] for weight, phone, column in terms)
         chosen.append(candidates[int(np.argmin(cost))])
     return chosen

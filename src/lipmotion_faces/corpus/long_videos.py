@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +18,175 @@ from lipmotion.corpora.layouts import LRS
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import labels_beside
+from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
-from lipmotion.types import Audio, Monitor, Progress, TimedTranscript, TranscriptLine
+from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
 from lipmotion.units.written_forms import list_readings
-from lipmotion_faces.corpus.separate_sound import on_own_time, separate_sound
-from lipmotion_faces.corpus.utterance_spans import SpokenPart, utterance_spans
+from lipmotion_faces.corpus.supplied import align_sound, separate_sound
 from lipmotion_faces.tracking.video_scan import VideoScan, scan_video
+
+SHORTEST_S, LONGEST_S = 3.0, 12.0
+"""Wanted length of an utterance. Longer ones are divided at their longest pause, shorter ones joined where they can."""
+LEAST_S = 0.8
+"""Shorter pieces are left out."""
+LONGEST_PAUSE_S = 1.0
+"""A longer pause always divides, and is left out except for its edges."""
+MARGIN_S = 0.3
+"""Silence kept before and after an utterance, at most half of the pause: lips begin before the sound."""
+ROUNDING_S = 0.05
+"""A cut that is this close to the end of a stretch does not divide it."""
+
+Quietest = Callable[[float, float], float]
+"""Returns the time of the lowest level between two times."""
+
+
+@dataclass(frozen=True)
+class SpokenPart:
+    """A part of a recording that is not divided by a pause: between two silences, or a line of a transcript.
+
+    start_s, end_s : seconds
+    words          : what is said in it, or None where it is not known
+    """
+
+    start_s: float
+    end_s: float
+    words: tuple[str, ...] | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """Duration in seconds."""
+        return self.end_s - self.start_s
+
+
+def utterance_spans(
+    stretches: Sequence[SpokenPart], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
+) -> list[SpokenPart]:
+    """Return the utterances of a recording, in order, without overlap.
+
+    stretches  : parts with speech, in order; those with words are never divided
+    cuts_s     : times at which the camera changes, rising; utterances without words are divided there
+    duration_s : of the recording
+    quietest   : finds the best place to divide where there is no pause
+    Between neighbours, the pause is shared; of one longer than twice ``MARGIN_S``, the middle belongs to nobody.
+    """
+    groups: list[list[SpokenPart]] = []
+    for stretch in _separate_overlaps(stretches):
+        edges = [stretch.start_s, stretch.end_s]
+        if stretch.words is None:
+            edges[1:1] = [t for t in cuts_s if stretch.start_s + ROUNDING_S < t < stretch.end_s - ROUNDING_S]
+        for start_s, end_s in pairwise(edges):
+            for part in _divide_speech(replace(stretch, start_s=start_s, end_s=end_s), quietest):
+                before = groups[-1][-1] if groups else None
+                is_pause = before is not None and part.start_s - before.end_s <= LONGEST_PAUSE_S
+                if before is not None and is_pause and not _is_cut_between(before, part, cuts_s):
+                    groups[-1].append(part)
+                else:
+                    groups.append([part])
+    pieces: list[SpokenPart] = []
+    for piece in (_join(parts) for group in groups for parts in _divide(group)):
+        before = pieces[-1] if pieces else None
+        if (
+            before is not None
+            and min(before.duration_s, piece.duration_s) < SHORTEST_S
+            and piece.end_s - before.start_s <= LONGEST_S
+            and piece.start_s - before.end_s <= LONGEST_PAUSE_S
+            and not _is_cut_between(before, piece, cuts_s)
+        ):
+            pieces[-1] = _join([before, piece])
+        else:
+            pieces.append(piece)
+    wanted = [piece for piece in pieces if piece.duration_s >= LEAST_S]
+    return _add_margins(wanted, cuts_s, duration_s, quietest)
+
+
+def _separate_overlaps(stretches: Sequence[SpokenPart]) -> list[SpokenPart]:
+    """Return stretches without overlap: lines of a transcript may be shown together, or a little too long."""
+    ordered: list[SpokenPart] = []
+    for stretch in sorted(stretches, key=lambda stretch: stretch.start_s):
+        if ordered and stretch.start_s < ordered[-1].end_s:
+            border_s = max(ordered[-1].start_s, stretch.start_s)
+            ordered[-1] = replace(ordered[-1], end_s=border_s)
+        ordered.append(stretch)
+    return ordered
+
+
+def _divide_speech(stretch: SpokenPart, quietest: Quietest) -> list[SpokenPart]:
+    """Return the parts of a stretch that is too long, divided where it is quietest in its middle third."""
+    if stretch.words is not None or stretch.duration_s <= LONGEST_S:
+        return [stretch]
+    third = stretch.duration_s / 3
+    border_s = quietest(stretch.start_s + third, stretch.end_s - third)
+    halves = replace(stretch, end_s=border_s), replace(stretch, start_s=border_s)
+    return [part for half in halves for part in _divide_speech(half, quietest)]
+
+
+def _is_cut_between(before: SpokenPart, after: SpokenPart, cuts_s: Sequence[float]) -> bool:
+    following = bisect_left(cuts_s, before.end_s - ROUNDING_S)
+    return following < len(cuts_s) and cuts_s[following] <= after.start_s + ROUNDING_S
+
+
+def _join(parts: Sequence[SpokenPart]) -> SpokenPart:
+    words = [word for part in parts for word in part.words or ()]
+    return SpokenPart(parts[0].start_s, parts[-1].end_s, tuple(words) if parts[0].words is not None else None)
+
+
+def _divide(group: list[SpokenPart]) -> list[list[SpokenPart]]:
+    """Return the parts of a group, none longer than ``LONGEST_S`` unless it is one stretch."""
+    if len(group) < 2 or group[-1].end_s - group[0].start_s <= LONGEST_S:
+        return [group]
+    middle_s = (group[0].start_s + group[-1].end_s) / 2
+
+    def worth(n: int) -> tuple[bool, float]:
+        is_long = min(group[n - 1].end_s - group[0].start_s, group[-1].end_s - group[n].start_s) >= SHORTEST_S
+        pause_s = group[n].start_s - group[n - 1].end_s
+        return is_long, pause_s if is_long else -abs(group[n].start_s - middle_s)
+
+    at = max(range(1, len(group)), key=worth)
+    return _divide(group[:at]) + _divide(group[at:])
+
+
+def _add_margins(
+    pieces: list[SpokenPart], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
+) -> list[SpokenPart]:
+    """Return the pieces with silence at both ends, not beyond a neighbour, a cut or the recording."""
+    result: list[SpokenPart] = []
+    for n, piece in enumerate(pieces):
+        border_s = result[-1].end_s if result else 0.0
+        end_s = min(piece.end_s + MARGIN_S, duration_s)
+        if n + 1 < len(pieces) and pieces[n + 1].start_s - piece.end_s < 2 * MARGIN_S:
+            low_s, high_s = piece.end_s, pieces[n + 1].start_s
+            if piece.words is not None:  # lines begin and end late or early
+                low_s, high_s = low_s - MARGIN_S / 2, high_s + MARGIN_S / 2
+            end_s = quietest(low_s, high_s) if high_s > low_s else low_s
+        start_s = max(piece.start_s - MARGIN_S, border_s)
+        if result and piece.start_s - pieces[n - 1].end_s < 2 * MARGIN_S:
+            start_s = border_s
+        middle_s = (piece.start_s + piece.end_s) / 2
+        near = [t for t in cuts_s if start_s <= t <= end_s]
+        if piece.words is None:
+            start_s = max([start_s, *(t for t in near if t <= middle_s)])
+            end_s = min([end_s, *(t for t in near if t > middle_s)])
+        result.append(replace(piece, start_s=start_s, end_s=end_s))
+    return result
+
+
+LOG = logging.getLogger("lipmotion")
+
+_STAGE = "dividing long videos"
+"""Name of the stage in reports of progress."""
+DIVIDING_SHARE = 0.2
+"""Share of the whole preparation that this takes, for reports of progress."""
+VIDEO = "one video"
+DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO, LRS)
+"""Kinds of recordings of which the long ones are divided; GRID's and others hold a sentence each."""
+LONG_S = 30.0
+"""Videos that state a longer duration are divided; a shorter one is one utterance."""
+LEAST_SPLIT_UTTERANCES = 10
+"""A single video with fewer utterances is all for training."""
+HELD_OUT_SHARE = 0.1
+"""Share of the utterances, the last ones, that are ``test``; as many before them are ``val``."""
 
 
 def transcript_beside(video: Path) -> TimedTranscript | None:
@@ -32,10 +194,10 @@ def transcript_beside(video: Path) -> TimedTranscript | None:
 
     Raises InputError: a file of labels cannot be read.
     """
-    transcript = labels_beside(video).transcript
+    transcript = find_labels(video).transcript
     if transcript is None or transcript.has_times:
         return transcript
-    other = labels_beside(video, ignored=frozenset({video.with_suffix(".txt")})).transcript
+    other = find_labels(video, ignored=frozenset({video.with_suffix(".txt")})).transcript
     return other if other is not None and other.has_times else transcript
 
 
@@ -56,33 +218,12 @@ def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
         if len(words) == len(line.words):
             parts += words
         else:
-            following = next((start_s for start_s in starts_s[n + 1 :] if start_s is not None), None)
-            parts += _whole_line(line, following)
+            following_s = next((start_s for start_s in starts_s[n + 1 :] if start_s is not None), None)
+            end_s = following_s if line.end_s is None else line.end_s
+            if line.start_s is not None and end_s is not None and end_s > line.start_s and line.words:
+                text = tuple(spoken for word in line.words for spoken in list_readings(word.word)[0])
+                parts.append(SpokenPart(line.start_s, end_s, text))
     return parts
-
-
-def _whole_line(line: TranscriptLine, following_s: float | None) -> list[SpokenPart]:
-    end_s = following_s if line.end_s is None else line.end_s
-    if line.start_s is None or end_s is None or end_s <= line.start_s or not line.words:
-        return []
-    return [SpokenPart(line.start_s, end_s, tuple(said for word in line.words for said in list_readings(word.word)[0]))]
-
-
-LOG = logging.getLogger("lipmotion")
-
-_STAGE = "dividing long videos"
-"""Name of the stage in reports of progress."""
-DIVIDING_SHARE = 0.2
-"""Share of the whole preparation that this takes, for reports of progress."""
-VIDEO = "one video"
-DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO, LRS)
-"""Kinds of recordings of which the long ones are divided; GRID's and others hold a sentence each."""
-LONG_S = 30.0
-"""Videos that state a longer duration are divided; a shorter one is one utterance."""
-LEAST_SPLIT_UTTERANCES = 10
-"""A single video with fewer utterances is all for training."""
-HELD_OUT_SHARE = 0.1
-"""Share of the utterances, the last ones, that are ``test``; as many before them are ``val``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +241,10 @@ class VideoPart:
 
 def single_video(path: Path) -> RecordingFolder:
     """Return the folder of recordings that one video is. Raises InputError: labels beside it cannot be read."""
-    return RecordingFolder(VIDEO, (SourceRecording(path.stem, path, labels_beside(path).words),))
+    return RecordingFolder(VIDEO, (SourceRecording(path.stem, path, find_labels(path).words),))
 
 
-def with_long_videos_divided(
+def divide_long_videos(
     folder: RecordingFolder, place: Path, monitor: Monitor, tracker: str
 ) -> tuple[RecordingFolder, dict[str, VideoPart]]:
     """Return the folder with the parts of long videos in their place, and those parts by name.
@@ -119,23 +260,22 @@ def with_long_videos_divided(
     recordings = [item for item in folder.recordings if item not in videos]
     problems, parts = dict(folder.problems), dict[str, VideoPart]()
     for n, item in enumerate(videos):
-        reached = partial(_report_share, monitor, n, len(videos))
-        reached(0.0)
+
+        def report(share: float, before: int = n) -> None:
+            monitor(Progress(_STAGE, before, len(videos), DIVIDING_SHARE * (before + share) / len(videos)))
+
+        report(0.0)
         try:
-            found = divided(item, reached, tracker, splits_by_time=is_only_one)
+            of_video = divide_video(item, report, tracker, splits_by_time=is_only_one)
         except InputError as error:
             problems[item.name] = str(error)
             continue
-        if not found:
+        if not of_video:
             problems[item.name] = f"{item.file}: no speech in it; give a video in which somebody talks"
-        parts |= {part.recording.name: part for part in found}
+        parts |= {part.recording.name: part for part in of_video}
     recordings += [part.recording for part in parts.values()]
     recordings.sort(key=lambda recording: recording.name)
     return RecordingFolder(f"{folder.kind}, divided into utterances", tuple(recordings), problems), parts
-
-
-def _report_share(monitor: Monitor, before: int, count: int, share: float) -> None:
-    monitor(Progress(_STAGE, before, count, DIVIDING_SHARE * (before + share) / count))
 
 
 def _is_long_video(recording: SourceRecording) -> bool:
@@ -152,7 +292,7 @@ def _is_long_video(recording: SourceRecording) -> bool:
         return False
 
 
-def divided(
+def divide_video(
     recording: SourceRecording, reached: Callable[[float], None], tracker: str, *, splits_by_time: bool
 ) -> list[VideoPart]:
     """Return the utterances of a long video; each is named after its start (``talk-00h01m12.48s``).
@@ -166,29 +306,24 @@ def divided(
     scan = scan_video(recording.file, reached, tracker)
     for note in scan.damage:
         LOG.warning("%s: %s", recording.file, note)
-    audio = _sound_of(recording)
+    audio, separate = read_audio(recording.file), separate_sound(recording)
+    if separate is not None:
+        LOG.info("%s: %s", recording.file, separate.note)
+        audio = align_sound(separate, audio.duration_s)
     levels = levels_db(audio)
-    parts = _lines(recording) or [SpokenPart(*span) for span in spoken_spans(levels)]
+    parts = _read_lines(recording) or [SpokenPart(*span) for span in spoken_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
-    spans = utterance_spans(_within(parts, end_s), scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
-    spans = [span for longer in spans if (span := _on_pictures(longer, scan, end_s)).duration_s > 0]
-    splits = _splits(len(spans), recording.split) if splits_by_time else [recording.split] * len(spans)
-    return [
-        VideoPart(_recording_of(span, recording, split), _sound(audio, span), scan.person)
-        for span, split in zip(spans, splits, strict=True)
-    ]
+    parts = [replace(part, end_s=min(part.end_s, end_s)) for part in parts if part.start_s < end_s]
+    spans = utterance_spans(parts, scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
+    spans = [span for longer in spans if (span := _fit_to_pictures(longer, scan, end_s)).duration_s > 0]
+    held_out = 0
+    if splits_by_time and len(spans) >= LEAST_SPLIT_UTTERANCES:
+        held_out = round(HELD_OUT_SHARE * len(spans))
+    splits = [recording.split] * (len(spans) - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
+    return [_cut_part(span, recording, split, audio, scan) for span, split in zip(spans, splits, strict=True)]
 
 
-def _sound_of(recording: SourceRecording) -> Audio:
-    """Return the sound of a video: its recorder's, brought into step, or its own."""
-    separate = separate_sound(recording)
-    if separate is None:
-        return read_audio(recording.file)
-    LOG.info("%s: %s", recording.file, separate.note)
-    return on_own_time(separate, read_audio(recording.file).duration_s)
-
-
-def _lines(recording: SourceRecording) -> list[SpokenPart]:
+def _read_lines(recording: SourceRecording) -> list[SpokenPart]:
     """Return the lines in time beside a video, with a warning where there are words without times."""
     transcript = transcript_beside(recording.file)
     lines = [] if transcript is None else spoken_lines(transcript)
@@ -201,35 +336,18 @@ def _lines(recording: SourceRecording) -> list[SpokenPart]:
     return lines
 
 
-def _within(stretches: Sequence[SpokenPart], end_s: float) -> list[SpokenPart]:
-    return [replace(part, end_s=min(part.end_s, end_s)) for part in stretches if part.start_s < end_s]
-
-
-def _on_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:
+def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:
     """Return a span that begins and ends at the times of pictures, none later than before; the last at the very end."""
     first, last = np.searchsorted(scan.times_s, [span.start_s + 1e-6, span.end_s + 1e-6], side="right") - 1
     is_last = span.end_s >= end_s - 1e-6
-    return replace(
-        span,
-        start_s=float(scan.times_s[max(first, 0)]),
-        end_s=end_s if is_last else float(scan.times_s[max(last, 0)]),
-    )
+    start_s, before_s = float(scan.times_s[max(first, 0)]), float(scan.times_s[max(last, 0)])
+    return replace(span, start_s=start_s, end_s=end_s if is_last else before_s)
 
 
-def _splits(count: int, split: str) -> list[str]:
-    """Return the splits of utterances in order of time."""
-    held_out = round(HELD_OUT_SHARE * count) if count >= LEAST_SPLIT_UTTERANCES else 0
-    return [split] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
-
-
-def _recording_of(part: SpokenPart, recording: SourceRecording, split: str) -> SourceRecording:
+def _cut_part(part: SpokenPart, recording: SourceRecording, split: str, audio: Audio, scan: VideoScan) -> VideoPart:
     minutes, seconds = divmod(round(part.start_s, 2), 60)
     name = f"{recording.name}-{int(minutes) // 60:02}h{int(minutes) % 60:02}m{seconds:05.2f}s"
-    return replace(
-        recording, name=name, words=part.words, split=split, phones=None, start_s=part.start_s, end_s=part.end_s
-    )
-
-
-def _sound(audio: Audio, part: SpokenPart) -> Audio:
-    first, last = (round(time_s * audio.rate_hz) for time_s in (part.start_s, part.end_s))
-    return Audio(audio.samples[first:last], audio.rate_hz)
+    described = replace(recording, name=name, words=part.words, split=split, phones=None)
+    described = replace(described, start_s=part.start_s, end_s=part.end_s)
+    first, last = round(part.start_s * audio.rate_hz), round(part.end_s * audio.rate_hz)
+    return VideoPart(described, Audio(audio.samples[first:last], audio.rate_hz), scan.person)

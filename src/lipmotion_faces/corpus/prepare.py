@@ -15,7 +15,7 @@ from typing import Any
 
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantise, read_entry, write_utterance
-from lipmotion.corpora.separate_sounds import with_separate_sounds
+from lipmotion.corpora.separate_sounds import add_separate_sounds
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
@@ -27,9 +27,16 @@ from lipmotion.storage.files import confined, locked, portable_name, remove_unfi
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
-from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
-from lipmotion_faces.corpus.separate_sound import earlier_phones, in_step, separate_sound
-from lipmotion_faces.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
+from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, divide_long_videos, single_video
+from lipmotion_faces.corpus.supplied import (
+    DIGESTS,
+    separate_sound,
+    shift_phones,
+    source_digests,
+    supplied_phones,
+    supplied_track,
+    trim_to_shared,
+)
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.trackers import MEDIAPIPE, tracker_named
@@ -140,43 +147,38 @@ def prepare(
     start_s = time.monotonic()
     processes = process_count(workers)
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
-    folder, place = _found(directory)
+    if directory.is_file() and directory.suffix.lower() in VIDEO_SUFFIXES:
+        folder, place = single_video(directory), directory.parent
+    else:
+        folder, place = discover(directory), directory
     offset_s = None if offset_ms is None else offset_ms / 1000
-    folder = with_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
+    folder = add_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
     chosen = tracker_named(tracker)
     packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
-        folder, parts = with_long_videos_divided(folder, place, monitor, tracker)
+        folder, parts = divide_long_videos(folder, place, monitor, tracker)
+        collection = "/".join(place.resolve().parts[-2:]).strip("/")
         jobs = [
-            _job(item, place.resolve(), corpus, tracker, packages, crops, parts.get(item.name))
+            _make_job(item, collection, corpus, tracker, packages, crops, parts.get(item.name))
             for item in folder.recordings
         ]
-        with _refreshed(corpus), worker_pool(min(processes, len(jobs))) as team:
-            outcomes = _collected(
-                folder, team.unordered_map(_process, jobs), len(jobs), monitor, DIVIDING_SHARE if parts else 0.0
-            )
-        _warn_of_older(corpus, _collection(place.resolve()), outcomes)
-    report = _report(corpus, folder, outcomes, time.monotonic() - start_s)
+        with _refresh_at_end(corpus), worker_pool(min(processes, len(jobs))) as team:
+            results = team.unordered_map(_process, jobs)
+            outcomes = _collect(folder, results, len(jobs), monitor, DIVIDING_SHARE if parts else 0.0)
+        _warn_of_older(corpus, collection, outcomes)
+    report = _make_report(corpus, folder, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
             shutil.rmtree(output)
         name, reason = next(iter(report.failed.items()))
-        raise CorpusError(
-            f"{directory}: none of {len(report.failed)} recordings is usable; the first, {name}: {reason}"
-        )
+        failed = f"none of {len(report.failed)} recordings is usable"
+        raise CorpusError(f"{directory}: {failed}; the first, {name}: {reason}")
     return report
 
 
-def _found(path: Path) -> tuple[RecordingFolder, Path]:
-    """Return the recordings in a folder, or the one video that is given; and the folder that they are in."""
-    if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES:
-        return single_video(path), path.parent
-    return discover(path), path
-
-
-def _report(corpus: Corpus, folder: RecordingFolder, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
+def _make_report(corpus: Corpus, folder: RecordingFolder, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
     outcomes = sorted(outcomes, key=lambda outcome: outcome.name)
     good = [outcome for outcome in outcomes if not outcome.problem]
     problems = folder.problems | {outcome.name: outcome.problem for outcome in outcomes if outcome.problem}
@@ -192,18 +194,22 @@ def _report(corpus: Corpus, folder: RecordingFolder, outcomes: list[_Outcome], s
     )
 
 
-def _job(
+def _make_job(
     recording: SourceRecording,
-    directory: Path,
+    collection: str,
     corpus: Corpus,
     tracker: str,
     packages: dict[str, str],
     crops: bool,
     part: VideoPart | None,
 ) -> _Job:
-    collection = _collection(directory)
     name = portable_name(recording.name)
-    if _is_taken(corpus.folder(name), recording.file, collection):
+    stored = _stored_source(corpus.folder(name))
+    if (  # speakers of GRID share file names
+        stored is not None
+        and stored.get("collection") != collection
+        and stored.get("sha256") != _digest(recording.file)
+    ):
         name = f"{collection.replace('/', '-')}-{name}"
     if recording.motion_file is None:
         settings = {"tracker": f"{tracker} {packages[tracker]}", "crops": "yes" if crops else "no"}
@@ -225,15 +231,11 @@ def _job(
     return _Job(replace(recording, name=name), corpus.folder(name), source, settings, tracker, part)
 
 
-def _collection(directory: Path) -> str:
-    """Return the name of a folder of recordings in the sources of their utterances: its last two names."""
-    return "/".join(directory.parts[-2:]).strip("/")
-
-
 def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) -> None:
     """Log a warning if the corpus holds utterances of recordings that are gone, or that cannot be used any longer."""
     good = {outcome.name for outcome in outcomes if not outcome.problem}
-    older = [name for name in corpus.names() if name not in good and _is_of(corpus.folder(name), collection)]
+    others = [name for name in corpus.names() if name not in good]
+    older = [name for name in others if (_stored_source(corpus.folder(name)) or {}).get("collection") == collection]
     if older:
         shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
         LOG.warning(
@@ -245,20 +247,11 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
         )
 
 
-def _is_of(folder: Path, collection: str) -> bool:
-    """Return whether a folder holds an utterance of a collection."""
+def _stored_source(folder: Path) -> dict[str, Any] | None:
+    """Return the source of the utterance in a folder; None if there is none."""
     with suppress(CorpusError):
-        return bool(read_entry(folder).get("source", {}).get("collection") == collection)
-    return False
-
-
-def _is_taken(folder: Path, video: Path, collection: str) -> bool:
-    """Return whether a folder holds an utterance of another recording (speakers of GRID share file names)."""
-    try:
-        source = read_entry(folder).get("source", {})
-    except CorpusError:
-        return False
-    return source.get("collection") != collection and source.get("sha256") != _digest(video)
+        return dict(read_entry(folder).get("source", {}))
+    return None
 
 
 def _process(job: _Job) -> _Outcome:
@@ -266,13 +259,12 @@ def _process(job: _Job) -> _Outcome:
     name = job.recording.name
     try:
         sound = job.recording.file
-        source = (
-            job.source | {"sha256": _digest(sound), "bytes": str(sound.stat().st_size)} | source_digests(job.recording)
-        )
-        entry = _up_to_date(job, source)
+        source = job.source | {"sha256": _digest(sound), "bytes": str(sound.stat().st_size)}
+        source |= source_digests(job.recording)
+        entry = _read_if_current(job, source)
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
-        utterance = _utterance(job, source)
+        utterance = _make_utterance(job, source)
         with confined(job.folder.parent.parent):  # the corpus, in this worker
             write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
@@ -295,7 +287,7 @@ def _digest_of_content(path: Path, _size: int, _changed_ns: int) -> str:
     return sha256_of(path)
 
 
-def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
+def _read_if_current(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
     """Return the description of the utterance if it is up to date, or None."""
     try:
         entry = read_entry(job.folder)
@@ -309,17 +301,17 @@ def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
     return entry if stored == required else None
 
 
-def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
+def _make_utterance(job: _Job, source: dict[str, str]) -> Utterance:
     recording = job.recording
     separate = None if job.part else separate_sound(recording)
     if separate is None:
         audio = job.part.sound if job.part else read_audio(recording.file)
-        found = _track(job, audio.duration_s)
+        motion = _track(job, audio.duration_s)
     else:
         own_s = None if recording.recorder is None else read_audio(recording.file, warn=False).duration_s
-        audio, found, begin_s = in_step(separate, _track(job, own_s))
+        audio, motion, begin_s = trim_to_shared(separate, _track(job, own_s))
         labelled_s = begin_s if recording.recorder is not None else begin_s + separate.late_s
-        recording = replace(recording, phones=earlier_phones(recording.phones, labelled_s))
+        recording = replace(recording, phones=shift_phones(recording.phones, labelled_s))
         source = source | {"sound_late_ms": f"{separate.late_s * 1000:.3f}", "sound_found_by": separate.how}
     audio = quantise(audio)
     check_words(recording.words or (), audio.duration_s)
@@ -327,7 +319,7 @@ def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
         name=recording.name,
         audio=audio,
         features=analysed(audio).mfcc(),
-        track=found,
+        track=motion,
         words=recording.words,
         split=recording.split,
         source=source,
@@ -346,13 +338,10 @@ def _track(job: _Job, duration_s: float | None) -> Track:
     return track(recording.file, crops=crops, span=span, person=job.part.person, tracker=job.tracker)
 
 
-def _collected(
+def _collect(
     folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor, done: float
 ) -> list[_Outcome]:
-    """Return all outcomes; each is reported to the monitor as soon as it is known.
-
-    done : the share of the whole work that was done before
-    """
+    """Return all outcomes; each is reported as soon as it is known. ``done``: share of the work done before."""
     for name, problem in folder.problems.items():
         monitor(Item(name, "skipped", problem))
     collected: list[_Outcome] = []
@@ -367,7 +356,7 @@ def _collected(
 
 
 @contextmanager
-def _refreshed(corpus: Corpus) -> Iterator[None]:
+def _refresh_at_end(corpus: Corpus) -> Iterator[None]:
     """At the end of the block, also after an error, list the finished utterances and remove unfinished ones."""
     try:
         yield

@@ -17,7 +17,7 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.lip_speed import measured_opening_speed, predicted_opening_speed
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.storage.files import locked
-from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, Utterance
+from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 
 REACH_S = 0.4
 """Largest offset that is considered, in seconds, in both directions."""
@@ -56,7 +56,8 @@ class CorpusOffsets:
                 "mostly tell), or give corpus prepare --offset-ms"
             )
         interval = f"95 %: {1000 * pooled.low_s:+.0f} to {1000 * pooled.high_s:+.0f} ms"
-        together = f"sound {_late(pooled.late_s)} ({interval}), by {counted} together"
+        late = f"{1000 * abs(pooled.late_s):.0f} ms {'late' if pooled.late_s >= 0 else 'early'}"
+        together = f"sound {late} ({interval}), by {counted} together"
         together += ", which corpus sync removes" if _is_worth_moving(pooled) else ""
         late_ms = {name: 1000 * clip.late_s for name, clip in clips.items() if clip.known}
         if not late_ms:
@@ -94,7 +95,8 @@ def offsets(corpus: Corpus) -> CorpusOffsets:
         utterance = corpus.utterance(name)
         if OPENING in utterance.track.motion.names:
             scores[name] = clip_scores(utterance)
-            members.setdefault(_group(utterance), []).append(name)
+            collection = f"{utterance.source.get('collection', '')} {utterance.speaker}".strip()
+            members.setdefault(collection, []).append(name)  # speakers are recorded separately, as a rule
     return CorpusOffsets(
         clips={name: best_offset(score, FRAME_RATE_HZ) for name, score in scores.items()},
         collections={
@@ -120,7 +122,7 @@ def sync(corpus: Corpus) -> dict[str, float]:
         for collection, late_s in moved.items():
             for name in measured.members[collection]:
                 settings = read_entry(corpus.folder(name))["settings"]
-                corpus.add(_moved(corpus.utterance(name), late_s), settings)
+                corpus.add(move_sound(corpus.utterance(name), late_s), settings)
     return moved
 
 
@@ -129,7 +131,7 @@ def _is_worth_moving(pooled: Offset) -> bool:
     return pooled.known and abs(pooled.late_s) >= LEAST_MOVE_S and (pooled.low_s > 0 or pooled.high_s < 0)
 
 
-def _moved(utterance: Utterance, late_s: float) -> Utterance:
+def move_sound(utterance: Utterance, late_s: float) -> Utterance:
     """Return an utterance whose sound and labels are ``late_s`` seconds earlier."""
     audio = utterance.audio
     shift = min(round(late_s * audio.rate_hz), len(audio.samples) - WINDOW)
@@ -137,21 +139,9 @@ def _moved(utterance: Utterance, late_s: float) -> Utterance:
     moved = Audio(np.ascontiguousarray(samples), audio.rate_hz)
     total_ms = float(utterance.source.get(REMOVED_MS, 0)) + 1000 * shift / audio.rate_hz
     source = utterance.source | {REMOVED_MS: f"{total_ms:.1f}"}
-    phones = utterance.phones and _phones_moved(utterance.phones, shift / audio.rate_hz)
+    phones = utterance.phones
+    if phones:
+        earlier = phones.shifted(-shift / audio.rate_hz)
+        spans = [replace(span, start_s=max(span.start_s, 0.0)) for span in earlier if span.end_s > 0]
+        phones = Timeline((replace(spans[0], start_s=0.0), *spans[1:]))
     return replace(utterance, audio=moved, features=analysed(moved).mfcc(), source=source, phones=phones)
-
-
-def _phones_moved(phones: Timeline[Unit], late_s: float) -> Timeline[Unit]:
-    """Return labels that are ``late_s`` seconds earlier and begin at 0 s."""
-    spans = [replace(span, start_s=max(span.start_s, 0.0)) for span in phones.shifted(-late_s) if span.end_s > 0]
-    return Timeline((replace(spans[0], start_s=0.0), *spans[1:]))
-
-
-def _group(utterance: Utterance) -> str:
-    """Return collection and speaker of an utterance; speakers are recorded separately, as a rule."""
-    collection = utterance.source.get("collection", "")
-    return f"{collection} {utterance.speaker}".strip()
-
-
-def _late(seconds: float) -> str:
-    return f"{1000 * abs(seconds):.0f} ms {'late' if seconds >= 0 else 'early'}"

@@ -16,19 +16,25 @@ from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.coded_video import encode_video
 from lipmotion.storage.frame_groups import FrameGroups
-from lipmotion_faces.appearance.frame_descriptors import FrameDescriptors, describe_frames, row_distances
-from lipmotion_faces.appearance.identity import SAME_PERSON_LIKENESS, face_signature, likeness
-from lipmotion_faces.appearance.looping import JUMP_LIMIT, LoopOrder, fade_frames, loop_order, scenes_of
+from lipmotion_faces.appearance.looping import (
+    JUMP_LIMIT,
+    LoopOrder,
+    describe_frames,
+    fade_frames,
+    loop_order,
+    row_distances,
+    scenes_of,
+)
 from lipmotion_faces.appearance.lower_face import HEIGHT as REGION_HEIGHT
+from lipmotion_faces.appearance.lower_face import SAME_PERSON_LIKENESS, face_signature, likeness, region_map
 from lipmotion_faces.appearance.lower_face import WIDTH as REGION_WIDTH
-from lipmotion_faces.appearance.lower_face import region_map
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.appearance.placing import cut, feather, inverse_map
 from lipmotion_faces.filmed.face import StoredBackground
 from lipmotion_faces.filmed.renderer import Background
 from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, track_footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
-from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
+from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
 
 LOG = logging.getLogger("lipmotion")
 
@@ -90,7 +96,7 @@ class BackgroundSequence:
         least, most = places.min(axis=0), places.max(axis=0)
         return float(least[0]), float(least[1]), float(most[0]), float(most[1])
 
-    def enlarged(self, zoom: float) -> BackgroundSequence:
+    def enlarge(self, zoom: float) -> BackgroundSequence:
         """Return the same background, on which a mouth is ``zoom`` times as large, in the same place."""
         middle = np.array([0.0, CORNER[1] + HEIGHT / 2])
         maps = self.face_to_frame.copy()
@@ -105,7 +111,7 @@ class BackgroundSequence:
         order = self.order(groups, int(shown[-1]) + 1)
         for first, second, weight in zip(order.first[shown], order.second[shown], order.weight[shown], strict=True):
             one, other = (self._frame(groups, int(number)) for number in (first, second))
-            yield one if weight == 0 else _mixed(one, other, float(weight))
+            yield one if weight == 0 else mix_frames(one, other, float(weight))
 
     def order(self, groups: FrameGroups, count: int) -> LoopOrder:
         """Return which frames are shown, at the background's own rate.
@@ -136,12 +142,12 @@ def best_background(footages: Sequence[Footage]) -> StoredBackground:
     first is the one that could best be shown alone for a minute; each next one has a frame that is most like one of
     those before, up to ``MOST_BACKGROUND_S`` and as long as jumps lead there.
     """
-    chosen = _joined(_compared(footages))
+    chosen = _chain_parts(choose_parts(footages))
     height, width = (length // 2 * 2 for length in chosen[0][0].size)
     frames = (frame[:height, :width] for part in chosen for frame in footage_frames(*part))
     video = encode_video(frames, chosen[0][0].rate_hz)
     maps, chins = (
-        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (placed_maps, chin_px)
+        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (steady_face, chin_px)
     )
     return StoredBackground(video, maps, chins, tuple(start for start, _ in _spans(chosen)[1:]))
 
@@ -149,23 +155,18 @@ def best_background(footages: Sequence[Footage]) -> StoredBackground:
 _Part = tuple[Footage, int, int]
 
 
-def _compared(footages: Sequence[Footage]) -> list[_Part]:
-    """Return the parts that are compared."""
-    parts = _of_one_size([part for footage in footages for part in _parts(footage)])
+def choose_parts(footages: Sequence[Footage]) -> list[_Part]:
+    """Return the parts that are compared, those whose pictures have the size and rate of most of the footage."""
+    parts = [part for footage in footages for part in divide_footage(footage)]
+    lengths: dict[tuple[tuple[int, int], float], float] = {}
+    for part in parts:
+        kind = part[0].size, part[0].rate_hz
+        lengths[kind] = lengths.get(kind, 0.0) + _duration_s(part)
+    most_common = max(lengths, key=lambda kind: lengths[kind])
+    parts = [part for part in parts if (part[0].size, part[0].rate_hz) == most_common]
     least_s = COMPARED_SHARE * min(SHORT_S, max(map(_duration_s, parts)))
     parts = [part for part in parts if _duration_s(part) >= least_s]
     return [parts[number] for number in choose_evenly(MOST_PARTS, len(parts))]
-
-
-def _of_one_size(parts: Sequence[_Part]) -> list[_Part]:
-    """Return the parts whose pictures have the size and rate of most of the footage."""
-
-    def kind(part: _Part) -> tuple[tuple[int, int], float]:
-        return part[0].size, part[0].rate_hz
-
-    lengths = {each: sum(_duration_s(part) for part in parts if kind(part) == each) for each in map(kind, parts)}
-    longest = max(lengths, key=lambda each: lengths[each])
-    return [part for part in parts if kind(part) == longest]
 
 
 def _spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:
@@ -173,13 +174,17 @@ def _spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:
     return list(pairwise(np.cumsum([0, *(stop - start for _, start, stop in parts)]).tolist()))
 
 
-def _joined(parts: Sequence[_Part]) -> list[_Part]:
+def _chain_parts(parts: Sequence[_Part]) -> list[_Part]:
     """Return the parts that are shown, the best one first."""
     rate_hz, scenes = parts[0][0].rate_hz, _spans(parts)
     shown = chain.from_iterable(footage_frames(*part) for part in parts)
     maps = np.concatenate([footage.face_to_image[start:stop] for footage, start, stop in parts])
     descriptors = describe_frames(shown, maps)
-    blemishes = [_blemish(descriptors.part(*scene), rate_hz) for scene in scenes]
+    blemishes = []
+    for scene in scenes:  # how visible the worst join is if a part is shown for a minute; short ones are worse
+        order = loop_order(descriptors.part(*scene), round(SHOWN_S * rate_hz), rate_hz)
+        missing = max(0.0, 1 - (scene[1] - scene[0]) / rate_hz / SHORT_S)
+        blemishes.append(max((join.cost for join in order.joins), default=0.0) + SHORT_COST * missing)
     part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
     distances = row_distances(descriptors.standardised(scenes, fade_frames(rate_hz))[::COMPARED_STEP])
     chosen = [int(np.argmin(blemishes))]
@@ -197,7 +202,7 @@ def _joined(parts: Sequence[_Part]) -> list[_Part]:
         chosen.append(best)
 
 
-def _parts(footage: Footage) -> list[_Part]:
+def divide_footage(footage: Footage) -> list[_Part]:
     """Return the parts of some footage that show the face without a cut: first frame, and the one after the last."""
     longest = max(1, round(MOST_PART_S * footage.rate_hz))
     parts = []
@@ -222,13 +227,6 @@ def _usable(footage: Footage) -> NDArray[np.bool_]:
     return usable
 
 
-def _blemish(descriptors: FrameDescriptors, rate_hz: float) -> float:
-    """Return how visible the worst join is if a part is shown for a minute; short ones are worse."""
-    order = loop_order(descriptors, round(SHOWN_S * rate_hz), rate_hz)
-    worst = max((join.cost for join in order.joins), default=0.0)
-    return worst + SHORT_COST * max(0.0, 1 - len(descriptors) / rate_hz / SHORT_S)
-
-
 def stored_sequence(background: StoredBackground) -> BackgroundSequence:
     """Return the background in the file of a face."""
     video = background.video
@@ -246,25 +244,19 @@ def open_background(path: Path, appearance: Appearance | None = None, *, in_time
     """
     footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
     if appearance is not None:
-        _warn_of_somebody_else(footage, appearance)
-    groups, maps = partial(footage_groups, footage), placed_maps(footage)
+        frame = int(np.flatnonzero(footage.track.seen)[0])
+        shown = next(footage_frames(footage, frame, frame + 1))
+        picture = cut(shown, region_map(footage.face_to_image[frame], 1), (REGION_HEIGHT, REGION_WIDTH))
+        recorded = appearance.jaw.mean.T.reshape(REGION_HEIGHT, REGION_WIDTH, 3)
+        likely = likeness(face_signature(picture), face_signature(recorded))
+        if likely < SAME_PERSON_LIKENESS:
+            warning = (
+                "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
+            )
+            warning += "footage of the same person"
+            LOG.warning(warning, footage.path, likely, SAME_PERSON_LIKENESS)
+    groups, maps = partial(footage_groups, footage), steady_face(footage)
     return BackgroundSequence(groups, footage.rate_hz, maps, chin_px(footage), _usable(footage), footage.cuts, in_time)
-
-
-def _warn_of_somebody_else(footage: Footage, appearance: Appearance) -> None:
-    frame = int(np.flatnonzero(footage.track.seen)[0])
-    shown = next(footage_frames(footage, frame, frame + 1))
-    picture = cut(shown, region_map(footage.face_to_image[frame], 1), (REGION_HEIGHT, REGION_WIDTH))
-    recorded = appearance.jaw.mean.T.reshape(REGION_HEIGHT, REGION_WIDTH, 3)
-    found = likeness(face_signature(picture), face_signature(recorded))
-    if found < SAME_PERSON_LIKENESS:
-        LOG.warning(
-            "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
-            "footage of the same person",
-            footage.path,
-            found,
-            SAME_PERSON_LIKENESS,
-        )
 
 
 def chin_px(footage: Footage) -> NDArray[np.float64]:
@@ -274,12 +266,12 @@ def chin_px(footage: Footage) -> NDArray[np.float64]:
     return -EYE_DISTANCE_PX * gaussian_filter1d(np.asarray(footage.track.motion[CHIN], np.float64), SMOOTHING_FRAMES)
 
 
-def placed_maps(footage: Footage) -> NDArray[np.float64]:
+def steady_face(footage: Footage) -> NDArray[np.float64]:
     """Return where the face is in every frame of some footage, without the noise of tracking [shape=(T, 2, 3)]."""
-    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts, noise_px=REGISTERED_NOISE_PX)
+    return steady_maps(register_maps(footage), footage.rate_hz, footage.cuts, noise_px=REGISTERED_NOISE_PX)
 
 
-def _mixed(one: Background, other: Background, weight: float) -> Background:
+def mix_frames(one: Background, other: Background, weight: float) -> Background:
     """Return a frame between two, of which the second has some weight; its head is at a place between theirs."""
     share = round(256 * weight)
     levels = np.uint16(256 - share) * one.frame + np.uint16(share) * other.frame
@@ -287,7 +279,15 @@ def _mixed(one: Background, other: Background, weight: float) -> Background:
     between = (1 - weight) * one.face_to_frame + weight * other.face_to_frame
     has_face = one.has_face and other.has_face
     if has_face:
-        rows, columns, edge = _aligned_part(between, frame.shape)
+        scale = max(1, round(4 * float(np.sqrt(abs(np.linalg.det(between[:, :2])))))) / 4
+        edge = _feather_head(scale)
+        x, y = between[:, 2].tolist()
+        left, top = round(x + scale * ALIGNED_PX[0]), round(y + scale * ALIGNED_PX[1])
+        rows, columns = (
+            slice(min(max(first, 0), length), min(max(first + wide, 0), length))
+            for first, wide, length in ((top, edge.shape[0], frame.shape[0]), (left, edge.shape[1], frame.shape[1]))
+        )
+        edge = edge[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
         corner = np.array([columns.start, rows.start]) + 0.5
         back = inverse_map(between)
         heads = []
@@ -301,22 +301,8 @@ def _mixed(one: Background, other: Background, weight: float) -> Background:
     return Background(frame, between, (1 - weight) * one.chin_px + weight * other.chin_px, has_face)
 
 
-def _aligned_part(
-    face_to_frame: NDArray[np.float64], shape: tuple[int, ...]
-) -> tuple[slice, slice, NDArray[np.float32]]:
-    """Return the rows and columns of ``ALIGNED_PX`` in a frame, and the weights of their pixels [shape=(h, w)]."""
-    scale = max(1, round(4 * float(np.sqrt(abs(np.linalg.det(face_to_frame[:, :2])))))) / 4
-    edge = _aligned_edge(scale)
-    left, top = (round(at + scale * by) for at, by in zip(face_to_frame[:, 2].tolist(), ALIGNED_PX[:2], strict=True))
-    rows, columns = (
-        slice(min(max(first, 0), length), min(max(first + wide, 0), length))
-        for first, wide, length in ((top, edge.shape[0], shape[0]), (left, edge.shape[1], shape[1]))
-    )
-    return rows, columns, edge[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
-
-
 @cache
-def _aligned_edge(scale: float) -> NDArray[np.float32]:
+def _feather_head(scale: float) -> NDArray[np.float32]:
     """Return the weights of ``ALIGNED_PX`` with some samples a px of the face [shape=(h, w)]."""
     left, top, right, bottom = ALIGNED_PX
     height, width = round((bottom - top) * scale), round((right - left) * scale)

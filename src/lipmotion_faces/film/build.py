@@ -1,30 +1,198 @@
-"""Building of a filmed face: ``build_face(footage) → face``."""
+"""Building of a filmed face, ``build_face(footage) → face``: which recordings are used, and what is learned."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.entry import read_entry
+from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
+from lipmotion.corpora.store import MANIFEST, Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
+from lipmotion.stats.pca import choose_evenly
+from lipmotion.storage.files import check_source, sha256_of
+from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
-from lipmotion_faces.appearance.identity import SAME_PERSON_LIKENESS, face_signature
-from lipmotion_faces.appearance.lower_face import HEIGHT, WIDTH, best_scale, face_shape, region_map
+from lipmotion_faces.appearance.lower_face import (
+    HEIGHT,
+    SAME_PERSON_LIKENESS,
+    WIDTH,
+    best_scale,
+    face_shape,
+    face_signature,
+    region_map,
+)
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px
-from lipmotion_faces.film.takes import Take, takes_of
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
+from lipmotion_faces.tracking.frames import VideoSpan
+
+MOST_FOOTAGE_S = 240.0
+"""Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
+LONG_S = 10.0
+"""Recordings are used whole if they are no longer; of longer ones the beginning, at least so much."""
+MOST_MEASURED_RECORDINGS = 240
+"""The durations of at most so many recordings are read."""
+RIGHTS = ("licence", "attribution")
+"""What is kept of the rights of a recording."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """One recording of a person.
+
+    name       : of the recording
+    file       : the video
+    span       : the part of it
+    collection : the folder that it is in, by its last two names
+    speaker    : name of the person; empty where it is not known
+    rights     : licence and attribution, where known
+    """
+
+    name: str
+    file: Path
+    span: VideoSpan
+    collection: str
+    speaker: str
+    rights: tuple[tuple[str, str], ...]
+
+
+def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
+    """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly.
+
+    source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
+                 training list
+    recordings : of a corpus, the folder of the videos that it was prepared from
+    speaker    : whose, where there are several people
+    Raises InputError: no such file, several people, no such person, no videos, or a corpus without ``recordings``.
+    """
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder; give a video of the person, or a folder of videos")
+    if source.is_file():
+        check_source(source, "video")
+        whole = SourceRecording(source.stem, source, None, speaker=speaker)
+        return [_make_take(whole, source.parent, seconds=MOST_FOOTAGE_S)]
+    if (source / MANIFEST).is_file():
+        takes = _list_corpus(Corpus.open(source), recordings, speaker)
+    else:
+        folder = [item for item in discover(source).recordings if item.motion_file is None]
+        items = _select_person(folder, speaker, str(source))
+        takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
+    if not takes:
+        raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
+    return _select_evenly(takes)
+
+
+def _select_evenly(takes: Sequence[Take]) -> list[Take]:
+    """Return takes of about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened before any is left out.
+
+    A take that cannot be read may be among them: where it is tracked, the reason is reported.
+    """
+    durations_s = [_duration_s(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
+    longest_s = left_s = MOST_FOOTAGE_S
+    for number, duration_s in enumerate(sorted(durations_s)):
+        share_s = left_s / (len(durations_s) - number)
+        if duration_s > share_s:  # all of them have MOST_FOOTAGE_S together
+            longest_s = max(share_s, LONG_S)
+            break
+        left_s -= duration_s
+    mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
+    chosen = choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
+    used = [takes[index] for index in chosen]
+    if max(durations_s) <= longest_s:
+        return used
+    spans = [VideoSpan(each.span.start_s, min(each.span.end_s, each.span.start_s + longest_s)) for each in used]
+    return [replace(take, span=span) for take, span in zip(used, spans, strict=True)]
+
+
+def _select_person(items: Sequence[SourceRecording], speaker: str, where: str) -> list[SourceRecording]:
+    """Return the recordings of one person. Raises InputError: there are several people, or no such person."""
+    people = sorted({item.speaker for item in items})
+    if (speaker and speaker not in people) or (not speaker and len(people) > 1):
+        found = f"no speaker {speaker!r}" if speaker else f"{len(people)} speakers"
+        known = ", ".join(name or "one without a name" for name in people)
+        raise InputError(f"{where}: {found}, a face is that of one person; name it (--speaker): {known}")
+    return [item for item in items if not speaker or item.speaker == speaker]
+
+
+def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[Take]:
+    if recordings is None:
+        raise InputError(
+            f"{corpus.path}: a corpus holds the pictures of mouths, but not of faces; name the folder of its videos "
+            "as well: --recordings FOLDER"
+        )
+    if not recordings.is_dir():
+        raise InputError(f"{recordings}: no such folder; give the one of the videos of the corpus")
+    files: dict[str, list[Path]] = {}
+    for path in filter_videos(recordings.rglob("*")):
+        files.setdefault(path.name, []).append(path)
+    items, collections = [], {}
+    for name in corpus.names("train") or corpus.names():
+        entry = read_entry(corpus.folder(name))
+        stated = entry["source"]
+        file = _find_file(files.get(str(stated.get("file", "")), []), stated)
+        if file is None:
+            continue
+        rights = {key: str(stated[key]) for key in RIGHTS if key in stated}
+        start_s, end_s = float(stated.get("start_s", 0.0)), stated.get("end_s")
+        item = SourceRecording(name, file, None, rights=rights, speaker=str(entry.get("speaker", "")))
+        items.append(replace(item, start_s=start_s, end_s=None if end_s is None else float(end_s)))
+        collections[name] = str(stated.get("collection", ""))
+    if not items:
+        raise InputError(f"{recordings}: holds none of the videos of {corpus.path}; give the folder that they are in")
+    chosen = _select_person(items, speaker, str(corpus.path))
+    return [_make_take(item, recordings, collections[item.name]) for item in chosen]
+
+
+def _find_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
+    """Return the file from which an utterance was prepared, of those of its name; None: it is not among them.
+
+    People of a corpus may share names of files: size and, of several files, content tell which one is meant.
+    """
+    size = stated.get("bytes")
+    same = [file for file in files if size is None or str(file.stat().st_size) == str(size)]
+    if len(same) > 1 and "sha256" in stated:
+        same = [file for file in same if sha256_of(file) == stated["sha256"]]
+    return next(iter(same), None)
+
+
+def _make_take(
+    item: SourceRecording, folder: Path, collection: str | None = None, seconds: float = float("inf")
+) -> Take:
+    end_s = float("inf") if item.end_s is None else item.end_s
+    named = "/".join(folder.resolve().parts[-2:]).strip("/") if collection is None else collection
+    rights = tuple(sorted((key, value) for key, value in item.rights.items() if key in RIGHTS))
+    span = VideoSpan(item.start_s, min(end_s, item.start_s + seconds))
+    return Take(item.name, item.file, span, named, item.speaker, rights)
+
+
+def _duration_s(take: Take) -> float:
+    """Return the duration of a take, as the file states it; ``LONG_S`` if it states none, or cannot be read."""
+    import av
+
+    if take.span.end_s < float("inf"):
+        return take.span.end_s - take.span.start_s
+    try:
+        with open_media(take.file) as container:
+            streams = video_streams(container)
+            return (stated_duration_s(container, streams[0]) if streams else 0.0) or LONG_S
+    except (av.FFmpegError, ValueError, OSError):
+        return LONG_S
+
 
 LOG = logging.getLogger("lipmotion")
 
@@ -88,8 +256,8 @@ def build_face(
     >>> lipmotion.save_face(face, "anna.face")  # doctest: +SKIP
     """
     source, processes = Path(source), process_count(workers)
-    takes = takes_of(source, None if recordings is None else Path(recordings), speaker)
-    filmed = _filmed(takes, processes, monitor)
+    takes = choose_takes(source, None if recordings is None else Path(recordings), speaker)
+    filmed = _film_all(takes, processes, monitor)
     seconds = sum(len(take.used) / take.footage.rate_hz * _step(take.footage) for take in filmed)
     if seconds < LEAST_FOOTAGE_S:
         raise InputError(
@@ -104,7 +272,7 @@ def build_face(
             GOOD_FOOTAGE_S,
         )
     monitor(Progress("learning the face", 0, 1, 0.6))
-    appearance = learn_appearance(_pictures(filmed))
+    appearance = learn_appearance(_gather_pictures(filmed))
     monitor(Progress("choosing the background", 0, 1, 0.9))
     background = best_background([take.footage for take in filmed])
     about = {
@@ -118,12 +286,12 @@ def build_face(
         stated = sorted({dict(take.rights)[key] for take in takes if key in dict(take.rights)})
         about |= {key: stated} if stated else {}
     monitor(Progress("choosing the background", 1, 1, 1.0))
-    return FilmedFace(appearance, background, _spoken(filmed), about)
+    return FilmedFace(appearance, background, select_speech(filmed), about)
 
 
-def _filmed(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Filmed]:
-    """Return all takes in which the face is found. Raises InputError: there are none."""
-    found: list[_Filmed] = []
+def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Filmed]:
+    """Return all takes that show the person whom most takes show; others are reported. Raises InputError: none."""
+    filmed: list[_Filmed] = []
     problems: list[str] = []
     with worker_pool(min(workers, len(takes))) as team:
         for number, result in enumerate(team.ordered_map(_film, takes)):
@@ -132,29 +300,23 @@ def _filmed(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Film
                 problems.append(result)
                 monitor(Item(takes[number].name, "skipped", result))
             else:
-                found.append(result)
-    if not found:
+                filmed.append(result)
+    if not filmed:
         raise InputError(f"none of {len(takes)} recordings can be used; the first: {problems[0]}")
-    found = _of_one_person(found, monitor)
-    sizes = sorted({take.footage.size for take in found})
-    if len(sizes) > 1:
-        LOG.warning("the recordings have pictures of %d sizes; the background is one of them", len(sizes))
-    return found
-
-
-def _of_one_person(filmed: Sequence[_Filmed], monitor: Monitor) -> list[_Filmed]:
-    """Return the takes that show the person whom most takes show; the others are reported, and left out."""
     signatures = np.stack([face_signature(take.pictures) for take in filmed])
     alike = signatures @ signatures.T
     person = int((alike >= SAME_PERSON_LIKENESS).sum(axis=1).argmax())
-    kept = []
+    of_person = []
     for take, value in zip(filmed, alike[person].tolist(), strict=True):
         if value >= SAME_PERSON_LIKENESS:
-            kept.append(take)
+            of_person.append(take)
             continue
         reason = f"shows another face than most recordings (likeness {value:.2f}, required {SAME_PERSON_LIKENESS})"
         monitor(Item(take.footage.path.name, "skipped", reason))
-    return kept
+    sizes = sorted({take.footage.size for take in of_person})
+    if len(sizes) > 1:
+        LOG.warning("the recordings have pictures of %d sizes; the background is one of them", len(sizes))
+    return of_person
 
 
 def _film(take: Take) -> _Filmed | str:
@@ -162,23 +324,23 @@ def _film(take: Take) -> _Filmed | str:
     try:
         footage = track_footage(take.file, take.span)
         used = np.flatnonzero(footage.track.seen)[:: _step(footage)]
-        pictures = _lower_faces(footage, used, 1)
-        sound = _sound(take)
+        pictures = _cut_lower_faces(footage, used, 1)
+        sound = read_sound(take)
     except (InputError, CorpusError) as error:
         return str(error)
     return _Filmed(footage, used, pictures, sound)
 
 
-def _sound(take: Take) -> Audio | None:
+def read_sound(take: Take) -> Audio | None:
     """Return the sound of a take; None if the video has none, or only silence."""
     try:
-        whole = read_audio(take.file, warn=False)
+        audio = read_audio(take.file, warn=False)
     except InputError:
         return None
-    first = round(take.span.start_s * whole.rate_hz)
-    last = len(whole.samples) if np.isinf(take.span.end_s) else round(take.span.end_s * whole.rate_hz)
-    part = whole.samples[first:last]
-    return Audio(part, whole.rate_hz) if len(part) and part.any() else None
+    first = round(take.span.start_s * audio.rate_hz)
+    last = len(audio.samples) if np.isinf(take.span.end_s) else round(take.span.end_s * audio.rate_hz)
+    part = audio.samples[first:last]
+    return Audio(part, audio.rate_hz) if len(part) and part.any() else None
 
 
 def _step(footage: Footage) -> int:
@@ -186,7 +348,7 @@ def _step(footage: Footage) -> int:
     return max(1, int(np.ceil(footage.rate_hz / MOST_PICTURES_HZ - 1e-6)))
 
 
-def _lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDArray[np.uint8]:
+def _cut_lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDArray[np.uint8]:
     """Return pictures of the lower face in some frames, rising [shape=(n, 128 · scale, 128 · scale, 3)]."""
     size = HEIGHT * scale, WIDTH * scale
     maps = region_map(footage.face_to_image, scale)
@@ -202,9 +364,8 @@ def _lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDAr
     return result
 
 
-def _pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
-    values = [np.asarray(take.footage.track.motion.values)[take.used] for take in filmed]
-    motion = np.concatenate(values)
+def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
+    motion = np.concatenate([np.asarray(take.footage.track.motion.values)[take.used] for take in filmed])
     channels = filmed[0].footage.track.motion.channels
     used = [n for n, channel in enumerate(channels) if not channel.name.startswith(UNUSED_AXIS)]
     names = [channel.name for channel in channels]
@@ -213,38 +374,34 @@ def _pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
     maps = np.concatenate([take.footage.face_to_image[take.used] for take in filmed])
     scale = best_scale(maps)
     starts = np.cumsum([0, *(len(take.used) for take in filmed)])
+    levels = [
+        np.full(len(take.used), QUIETEST_DB)
+        if take.sound is None
+        else levels_db_at(take.sound, take.used / take.footage.rate_hz)
+        for take in filmed
+    ]
+
+    def read_finer(numbers: NDArray[np.intp]) -> NDArray[np.uint8]:
+        parts = []
+        for take, start in zip(filmed, starts, strict=False):
+            inside = numbers[(numbers >= start) & (numbers < start + len(take.used))] - start
+            if len(inside):
+                parts.append(_cut_lower_faces(take.footage, take.used[inside], scale))
+        return np.concatenate(parts)
+
     return FootagePictures(
         tuple(take.pictures for take in filmed),
         motion[:, used],
         tuple(channels[n] for n in used),
-        np.concatenate([_levels(take) for take in filmed]),
+        np.concatenate(levels),
         chin,
         face_shape(float(np.median(left - right)) / 2, chin),
         scale,
-        partial(_finer, filmed, starts, scale),
+        read_finer,
     )
 
 
-def _finer(
-    filmed: Sequence[_Filmed], starts: NDArray[np.intp], scale: int, numbers: NDArray[np.intp]
-) -> NDArray[np.uint8]:
-    """Return pictures of some of the frames of all takes, rising, with ``scale`` samples a pixel."""
-    parts = []
-    for take, start in zip(filmed, starts, strict=False):
-        inside = numbers[(numbers >= start) & (numbers < start + len(take.used))] - start
-        if len(inside):
-            parts.append(_lower_faces(take.footage, take.used[inside], scale))
-    return np.concatenate(parts)
-
-
-def _levels(take: _Filmed) -> NDArray[np.float64]:
-    """Return the level of the sound at the frames that are used, dB [shape=(n,)]."""
-    if take.sound is None:
-        return np.full(len(take.used), QUIETEST_DB)
-    return levels_db_at(take.sound, take.used / take.footage.rate_hz)
-
-
-def _spoken(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:
+def select_speech(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:
     """Return the first ``SPOKEN_TAKES_S`` of the takes with sound, and their motion; none where no take has sound."""
     takes: list[SpokenTake] = []
     left_s = SPOKEN_TAKES_S

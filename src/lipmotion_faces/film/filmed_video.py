@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import FULL_DEFICIT_GAP, closed_lips, gap_in, in_pictures, opening_of
+from lipmotion.articulation.contact import FULL_DEFICIT_GAP, close_lips, gap_to_opening, read_gap, sample_pictures
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.eigenlips import Eigenlips
@@ -24,10 +24,10 @@ from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent
 from lipmotion.types.progress import with_reports
 from lipmotion_faces.appearance.person import FaceCodes
 from lipmotion_faces.appearance.placing import cut
-from lipmotion_faces.film.background import BackgroundSequence, open_background, stored_sequence
+from lipmotion_faces.film.background import open_background, stored_sequence
 from lipmotion_faces.filmed.face import FilmedFace
-from lipmotion_faces.filmed.renderer import AS_PRINTED, BATCH, STITCHING, Stitcher, StitchingOptions
-from lipmotion_faces.tracking.footage import untracked_frames
+from lipmotion_faces.filmed.renderer import AS_PRINTED, BATCH, STITCHING, Stitcher
+from lipmotion_faces.tracking.footage import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_faces.video.synthetic_mark import mark_frames, mark_metadata
 
@@ -61,7 +61,7 @@ def border_px(frame: tuple[int, int]) -> int:
     return max(1, round(BORDER_SHARE * min(frame)))
 
 
-def with_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Frame]:
+def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Frame]:
     """Yield frames with a picture in the lower right corner; as many as there are of both.
 
     frames   : uint8 RGB [each shape=(H, W, 3)], of one size; they are not changed
@@ -82,7 +82,6 @@ def with_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[F
         yield result
 
 
-Floats = NDArray[np.float32]
 Frames = Iterator[NDArray[np.uint8]]
 RENDERING = "rendering the video"
 """Name of the stage in reports of progress."""
@@ -110,7 +109,7 @@ class Film:
 
 
 @one_thread()
-def film_of(  # noqa: PLR0913
+def make_film(  # noqa: PLR0913
     face: FilmedFace,
     motion: Motion,
     *,
@@ -136,26 +135,36 @@ def film_of(  # noqa: PLR0913
     """
     check_film(options, speech)
     eigenlips = model.eigenlips if model is not None else None
-    said = motion, Timeline(()) if units is None else units
+    timed = motion, Timeline(()) if units is None else units
+    stitching = AS_PRINTED if options.refinement == "paper" else STITCHING
     if options.overlay == "inset" and speech is not None:
-        frames, rate_hz = untracked_frames(speech)
-        codes = _codes(face, said, sound, rate_hz, eigenlips, options)
-        mouths = Stitcher(face.appearance, _stitching(options)).mouths(codes)
-        first, frames = _first_of(_even(frames), speech)
-        covered = inset_box((first.shape[0], first.shape[1]), face.appearance.mouths.shape[1:3])
-        return Film(with_inset(frames, mouths), len(codes), rate_hz, covered)
-    background = _background(face, options, speech)
+        frames, rate_hz = read_video_frames(speech)
+        codes = _make_codes(face, timed, sound, rate_hz, eigenlips, options)
+        mouths = Stitcher(face.appearance, stitching).mouths(codes)
+        first = next(frames, None)
+        if first is None:
+            raise InputError(f"{speech}: holds no pictures; give a video as speech")
+        height, width = (length // 2 * 2 for length in first.shape[:2])  # a last row or column would make sizes odd
+        frames = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame in chain([first], frames))
+        covered = inset_box((height, width), face.appearance.mouths.shape[1:3])
+        return Film(add_inset(frames, mouths), len(codes), rate_hz, covered)
+    if options.overlay is not None and speech is not None:
+        background = open_background(speech, in_time=True).enlarge(ZOOM)
+    elif options.background is None:
+        background = stored_sequence(face.background)
+    else:
+        background = open_background(Path(options.background), face.appearance)
     rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
-    codes = _codes(face, said, sound, rate_hz, eigenlips, options)
+    codes = _make_codes(face, timed, sound, rate_hz, eigenlips, options)
     has_jaw = options.jaw != "none" and options.overlay is None
-    stitcher = Stitcher(face.appearance, replace(_stitching(options), jaw=has_jaw))
+    stitcher = Stitcher(face.appearance, replace(stitching, jaw=has_jaw))
     frames = stitcher.stitch(codes, background.frames(len(codes), rate_hz))
     return Film(frames, len(codes), rate_hz, background.face_box)
 
 
-def _codes(
+def _make_codes(
     face: FilmedFace,
-    said: tuple[Motion, Timeline[Unit]],
+    timed: tuple[Motion, Timeline[Unit]],
     sound: Audio | None,
     rate_hz: float,
     eigenlips: Eigenlips | None,
@@ -164,24 +173,15 @@ def _codes(
     """Return what the lower face is like in every frame of a video."""
     if not 0 < rate_hz < float("inf"):
         raise InputError(f"the frame rate is {rate_hz}, required more than 0")
-    motion, units = said
+    motion, units = timed
     count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
     codes = face_codes(face, motion, units, count, rate_hz, eigenlips)
     if options.jaw == "energy":
-        codes = face.appearance.with_jaw_of_sound(codes, _levels(sound, count, rate_hz))
+        if sound is None:
+            raise InputError("a jaw that follows the energy needs the sound; give the recording")
+        levels = levels_db_at(sound, np.arange(count) / rate_hz)
+        codes = face.appearance.with_jaw_of_sound(codes, levels)
     return codes
-
-
-def _stitching(options: Outputs) -> StitchingOptions:
-    return AS_PRINTED if options.refinement == "paper" else STITCHING
-
-
-def _background(face: FilmedFace, options: Outputs, speech: Path | None) -> BackgroundSequence:
-    if options.overlay is not None and speech is not None:
-        return open_background(speech, in_time=True).enlarged(ZOOM)
-    if options.background is None:
-        return stored_sequence(face.background)
-    return open_background(Path(options.background), face.appearance)
 
 
 def face_codes(
@@ -197,38 +197,25 @@ def face_codes(
     units : the phones in time; in every p, b and m the lips touch (``contact.closed_lips``)
     Raises InputError: motion without the channels that the face needs.
     """
-    shown, contact = _with_contact(motion, units, count, rate_hz)
+    time_s = np.arange(count) / rate_hz
+    values, contact = motion.at(time_s), None
+    if "opening" in motion.names and np.isfinite(motion.values).all():
+        gap = close_lips(read_gap(motion), motion, units)
+        gap = sample_pictures(gap, gap == 0, motion.rate_hz, time_s)
+        column = motion.column("opening")
+        values[:, column] = np.minimum(values[:, column], gap_to_opening(gap))
+        contact = 1 - np.clip(gap / FULL_DEFICIT_GAP, 0, 1)  # how near the lips are to touching
+    shown = Motion(values, rate_hz, motion.channels)
     if eigenlips is None or not all(channel in shown.channels for channel in eigenlips.channels):
         return face.appearance.of_motion(shown, contact)
-    values = shown.values[:, [shown.column(channel.name) for channel in eigenlips.channels]]
+    values = values[:, [shown.column(channel.name) for channel in eigenlips.channels]]
     starts = range(0, count, BATCH)
     parts = [face.appearance.of_mouths(eigenlips.restore(values[start : start + BATCH])) for start in starts]
-    mouth, jaw, chin_px = (np.concatenate(values) for values in zip(*map(_fields, parts), strict=True))
+    mouth = np.concatenate([part.mouth for part in parts])
     if all(channel.unit == GREY for channel in shown.channels):
+        jaw, chin_px = (np.concatenate([getattr(part, name) for part in parts]) for name in ("jaw", "chin_px"))
         return FaceCodes(mouth, jaw, chin_px)
     return replace(face.appearance.of_motion(shown), mouth=mouth)  # points tell the jaw better
-
-
-def _with_contact(
-    motion: Motion, units: Timeline[Unit], count: int, rate_hz: float
-) -> tuple[Motion, NDArray[np.float64] | None]:
-    """Return motion in pictures, closed where the lips touch, and how near they are to that, 0 to 1 [shape=(T,)].
-
-    None where the motion has no ``opening``.
-    """
-    time_s = np.arange(count) / rate_hz
-    values = motion.at(time_s)
-    if "opening" not in motion.names or not np.isfinite(motion.values).all():
-        return Motion(values, rate_hz, motion.channels), None
-    gap = closed_lips(gap_in(motion), motion, units)
-    gap = in_pictures(gap, gap == 0, motion.rate_hz, time_s)
-    column = motion.column("opening")
-    values[:, column] = np.minimum(values[:, column], opening_of(gap))
-    return Motion(values, rate_hz, motion.channels), 1 - np.clip(gap / FULL_DEFICIT_GAP, 0, 1)
-
-
-def _fields(codes: FaceCodes) -> tuple[Floats, Floats, Floats]:
-    return codes.mouth, codes.jaw, codes.chin_px
 
 
 def person_shown(model: Model, face: FilmedFace, speaker: str = "") -> FilmedFace | None:
@@ -261,34 +248,12 @@ def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
     filmed = face.about.get("speaker", "")
     same = same and (speaker == filmed if len(people) > 1 else people[0] == filmed or not (people[0] and filmed))
     if not same and model.visual == "eigenlips":
+        trained_on = "; ".join(map(str, model.about.get("corpus", ["another corpus"])))
         raise InputError(
-            "the model generates mouth pictures of the person of "
-            f"{'; '.join(map(str, model.about.get('corpus', ['another corpus'])))}, the face is that of another; use a "
+            f"the model generates mouth pictures of the person of {trained_on}, the face is that of another; use a "
             "model of tracked points, or train one of eigenlips on this person"
         )
     return same
-
-
-def _levels(sound: Audio | None, count: int, rate_hz: float) -> NDArray[np.float64]:
-    """Return the level of the sound in every frame of a video, dB [shape=(count,)]."""
-    if sound is None:
-        raise InputError("a jaw that follows the energy needs the sound; give the recording")
-    return levels_db_at(sound, np.arange(count) / rate_hz)
-
-
-def _first_of(frames: Frames, speech: Path) -> tuple[NDArray[np.uint8], Frames]:
-    """Return the first frame, and all of them. Raises InputError: there are none."""
-    first = next(frames, None)
-    if first is None:
-        raise InputError(f"{speech}: holds no pictures; give a video as speech")
-    return first, chain([first], frames)
-
-
-def _even(frames: Frames) -> Frames:
-    """Yield frames without a last row or column that makes their sizes odd."""
-    for frame in frames:
-        height, width = (length // 2 * 2 for length in frame.shape[:2])
-        yield frame[:height, :width]
 
 
 @one_thread()
@@ -297,7 +262,7 @@ def write_film(
 ) -> None:
     """Write a video of a filmed face, with sound; whole or not at all.
 
-    film, mark : of ``film_of``, which is read to its end; how the video says that it is synthetic
+    film, mark : of ``make_film``, which is read to its end; how the video says that it is synthetic
     monitor    : receives reports of the progress
     Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
     face leaves no corner for a visible mark.

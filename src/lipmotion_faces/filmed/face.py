@@ -25,8 +25,7 @@ from lipmotion.storage.schema import (
     refuse_undeclared,
 )
 from lipmotion.types import Audio, Channel, Motion
-from lipmotion_faces.appearance.person import Appearance
-from lipmotion_faces.appearance.person_arrays import appearance_arrays, appearance_from_arrays
+from lipmotion_faces.appearance.person import Appearance, appearance_arrays, appearance_from_arrays
 
 Array = NDArray[np.float64]
 

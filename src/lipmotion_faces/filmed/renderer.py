@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion_faces.appearance.camera_noise import NoiseSource
-from lipmotion_faces.appearance.chin import moved_part, with_chin_moved
 from lipmotion_faces.appearance.lower_face import (
     HEIGHT,
     WIDTH,
     cheek_light,
     mouth_ellipse,
     mouth_part,
+    move_chin,
+    moved_part,
     region_map,
-    relit,
+    relight,
     replaced_part,
 )
 from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
@@ -33,7 +34,7 @@ from lipmotion_faces.appearance.refinement import (
     RefinementOptions,
     Refiner,
     moving_average,
-    sharpened,
+    sharpen,
 )
 
 Array = NDArray[np.float64]
@@ -72,7 +73,7 @@ class StitchingOptions:
 
     jaw       : whether the jaw is replaced, too; False: the background's jaw stays, the mouth alone is replaced
     mouth     : how the detail of the mouth is chosen; None: eigenlips alone, blurred
-    sharpening : by how much the mouth is sharpened (``sharpened``); 0: not
+    sharpening : by how much the mouth is sharpened (``sharpen``); 0: not
     average   : number of pictures over which the mouth is averaged before, odd; 1: none
     jaw_detail : how the detail of the jaw is chosen
     noise     : whether the noise of the camera is added
@@ -113,78 +114,63 @@ class Stitcher:
         backgrounds : at least as many; taken a few at a time, so memory does not grow with the length
         Raises InputError: too few backgrounds.
         """
-        codes = self._averaged(codes)
+        codes = self._average(codes)
         mouth_chosen = self._mouths.choose(codes.mouth)
         jaw_chosen = self._jaws.choose(codes.jaw)
         iterator = iter(backgrounds)
-        size = max(1, BATCH // self.appearance.scale)
+        scale = self.appearance.scale
+        size = max(1, BATCH // scale)
         for first in range(0, len(codes), size):
             part = slice(first, first + size)
             batch = list(islice(iterator, len(codes.mouth[part])))
             if len(batch) < len(codes.mouth[part]):
-                raise InputError(
-                    f"{first + len(batch)} frames of background, required {len(codes)}; give longer footage"
-                )
-            mouths = self._pictures_of_mouth(codes.mouth[part], mouth_chosen[part], first)
-            if not self.options.jaw:
-                yield from self._stitched(mouths, self._behind(batch), batch)
-                continue
-            jaws = self._jaws.pictures(codes.jaw[part], jaw_chosen[part])
-            chins = np.array([each.chin_px for each in batch])
-            behind = with_chin_moved(self._behind(batch), chins, codes.chin_px[part] - chins)
-            gains = self._gains(behind)
-            yield from self._stitched(mouths, self._whole.clone(relit(jaws, gains), behind, LARGEST_DIFFERENCE), batch)
+                found = first + len(batch)
+                raise InputError(f"{found} frames of background, required {len(codes)}; give longer footage")
+            mouths = self._draw_mouths(codes.mouth[part], mouth_chosen[part], first)
+            maps = region_map(np.stack([each.face_to_frame for each in batch]), scale)
+            aligned = [
+                cut(each.frame, to, (HEIGHT * scale, WIDTH * scale)) for each, to in zip(batch, maps, strict=True)
+            ]
+            behind = np.clip(np.rint(np.stack(aligned)), 0, 255).astype(np.uint8)
+            if self.options.jaw:
+                jaws = self._jaws.pictures(codes.jaw[part], jaw_chosen[part])
+                chins = np.array([each.chin_px for each in batch])
+                behind = move_chin(behind, chins, codes.chin_px[part] - chins)
+                behind = self._lower_face.clone(relight(jaws, self._gains(behind)), behind, LARGEST_DIFFERENCE)
+            source, mouth = behind.copy(), (slice(None), *mouth_part(scale))
+            source[mouth] = sharpen(relight(mouths, self._gains(behind)), self.options.sharpening, scale)
+            patches = self._mouth_alone.clone(source, behind)
+            for each, patch, to in zip(batch, patches, maps, strict=True):
+                frame = each.frame.copy()
+                if each.has_face:
+                    place(frame, patch, self._weight, to)
+                yield frame
 
     def mouths(self, codes: FaceCodes) -> Iterator[Picture]:
         """Yield pictures of the mouth alone [shape=(56 · scale, 72 · scale, 3)], one for each frame of motion."""
-        codes = self._averaged(codes)
+        codes = self._average(codes)
         chosen = self._mouths.choose(codes.mouth)
         for first in range(0, len(codes), BATCH):
             part = slice(first, first + BATCH)
-            yield from self._pictures_of_mouth(codes.mouth[part], chosen[part], first)
+            yield from self._draw_mouths(codes.mouth[part], chosen[part], first)
 
-    def _averaged(self, codes: FaceCodes) -> FaceCodes:
+    def _average(self, codes: FaceCodes) -> FaceCodes:
         """Return codes whose mouth is the mean of some pictures."""
         if self.options.average == 1:
             return codes
         return replace(codes, mouth=moving_average(codes.mouth, self.options.average).astype(np.float32))
 
-    def _pictures_of_mouth(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
+    def _draw_mouths(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
         if self.options.mouth is None:
             pictures = self._mouths.eigenlips.restore(codes)
         else:
             pictures = self._mouths.pictures(codes, chosen)
         return self._noise.add(pictures, first) if self.options.noise else pictures
 
-    def _behind(self, batch: Sequence[Background]) -> Pictures:
-        """Return the lower face of the footage, aligned [shape=(T, H, W, 3)]."""
-        size = HEIGHT * self.appearance.scale, WIDTH * self.appearance.scale
-        return np.stack(
-            [
-                np.clip(np.rint(cut(each.frame, to, size)), 0, 255).astype(np.uint8)
-                for each, to in zip(batch, self._maps(batch), strict=True)
-            ]
-        )
-
-    def _maps(self, batch: Sequence[Background]) -> Array:
-        return region_map(np.stack([each.face_to_frame for each in batch]), self.appearance.scale)
-
     def _gains(self, behind: Pictures) -> Array:
         """Return how much lighter the footage is than the pictures of the person, in each colour [shape=(T, 3)]."""
         part = (slice(None), *mouth_part(self.appearance.scale))
         return np.maximum(cheek_light(behind[part]), 1.0) / self.appearance.light
-
-    def _stitched(self, mouths: Pictures, behind: Pictures, batch: Sequence[Background]) -> Iterator[Picture]:
-        """Yield the frames of a batch with mouths in lower faces, and these in the frames."""
-        source = behind.copy()
-        sharp = sharpened(relit(mouths, self._gains(behind)), self.options.sharpening, self.appearance.scale)
-        source[(slice(None), *mouth_part(self.appearance.scale))] = sharp
-        patches = self._mouth_alone.clone(source, behind)
-        for each, patch, to in zip(batch, patches, self._maps(batch), strict=True):
-            frame = each.frame.copy()
-            if each.has_face:
-                place(frame, patch, self._weight, to)
-            yield frame
 
     @cached_property
     def _mouths(self) -> Refiner:
@@ -199,7 +185,7 @@ class Stitcher:
         return NoiseSource(self.appearance.noise, self._mouths.eigenlips.size, self.options.seed)
 
     @cached_property
-    def _whole(self) -> CloningSystem:
+    def _lower_face(self) -> CloningSystem:
         return cloning_system(replaced_part(self.appearance.shape, self.appearance.scale))
 
     @cached_property

@@ -1,8 +1,8 @@
 """A three-dimensional head: a friendly character made by this code, drawn without a graphics card.
 
-The spoken mouth and what moves beside it (``articulation``) become poses (``performance``); a pose moves the surfaces
-(``skin`` with ``lips`` and ``eyelids``, ``inside``, ``eyes``), which ``figure`` puts together, lights and gives to the
-rasteriser. The forms are made once: ``forms`` (skin), ``hair``, ``body``.
+The spoken mouth and what moves beside it (``articulation``) become poses (``pose``); a pose moves the surfaces
+(``skin`` with ``lips``, ``inside``, ``eyes``), which ``figure`` puts together, lights and gives to the rasteriser. The
+forms are made once: ``forms`` (skin), ``hair``.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging
-from lipmotion_faces.head.performance import head_poses
-from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.pose import CharacterPose, head_poses
 
 __all__ = ["Head", "render"]
 

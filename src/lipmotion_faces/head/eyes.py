@@ -1,4 +1,4 @@
-"""Eyeballs, lashes and brows."""
+"""Eyes: the skin around them, eyeballs, lashes and brows."""
 
 from __future__ import annotations
 
@@ -6,13 +6,91 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import map_coordinates, spline_filter
 
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.forms import EYE, EYEBALL_RADIUS, head, seen_from_front
-from lipmotion_faces.head.part import Part, grid_triangles, joined_parts, part, tube
+from lipmotion_faces.head.part import Part, grid_triangles, join_parts, part, tube
 from lipmotion_faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]
+
+_UPPER_COLUMNS = 33
+LID_COLUMNS = 2 * _UPPER_COLUMNS - 2
+LID_RINGS = 11
+"""Rings from the edge of the lids (after the first ring, which touches the eyeball) to the skin of the face."""
+HALF_WIDTH = 0.187
+_EDGE_X = 0.268
+_EDGE_UP, _EDGE_DOWN = 0.25, 0.215
+_ACROSS = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER_COLUMNS))
+LID_ACROSS: Real = np.concatenate([_ACROSS, _ACROSS[-2:0:-1]])
+"""Place of every column between the inner corner (-1) and the outer one (1)."""
+LID_SIDE: Real = np.concatenate([np.ones(_UPPER_COLUMNS), -np.ones(_UPPER_COLUMNS - 2)])
+"""1 on the upper lid, -1 on the lower lid."""
+_UPPER_KNOTS = [(-0.75, 0.034), (-0.35, 0.071), (0.1, 0.083), (0.55, 0.073), (0.85, 0.045)]
+_LOWER_KNOTS = [(-0.75, -0.053), (-0.3, -0.072), (0.15, -0.074), (0.6, -0.053), (0.85, -0.018)]
+UPPER_LID, LOWER_LID = (
+    np.asarray(CubicSpline(*np.array([(-1, -0.022), *knots, (1, 0.018)]).T)(LID_ACROSS))
+    for knots in (_UPPER_KNOTS, _LOWER_KNOTS)
+)
+WIDE_RISE, SQUINT_RISE, SQUINT_FALL, SLANT = 0.034, 0.044, 0.018, 0.042
+"""How far a mood raises the upper lid, raises the lower one and lowers the upper one, and how far lowered brows lower
+the inner half of the upper lid, brows raised at their inner ends the outer half."""
+LOWER_LID_RISE = 0.028
+"""How far the middle of the lower lid rises to meet the upper one."""
+
+
+class Eyelids:
+    """The skin around the left eye, rings that slide over the eyeball with the lids; the right eye's is mirrored."""
+
+    def __init__(self) -> None:
+        self._x = np.linspace(EYE[0] - 0.3, EYE[0] + 0.3, 61)
+        self._y = np.linspace(-0.28, 0.3, 59)
+        grid = np.meshgrid(self._x, self._y, indexing="ij")
+        depth = seen_from_front(head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
+        self._depth = spline_filter(depth, order=3)
+
+    def edge(self) -> Real:
+        """Return the outermost ring, which never moves [shape=(LID_COLUMNS, 3)]."""
+        angle = np.where(LID_SIDE > 0, np.arccos(LID_ACROSS), -np.arccos(LID_ACROSS))
+        up = np.where(LID_SIDE > 0, _EDGE_UP, _EDGE_DOWN)
+        return self._lift(EYE[0] + _EDGE_X * np.cos(angle), up * np.sin(angle))
+
+    def opening(self, pose: CharacterPose) -> tuple[Real, Real]:
+        """Return column and height of the edge of the lids [shape=(LID_COLUMNS,), both]."""
+        gaze, bow, mood = 0.10 * pose.gaze[1], 1 - LID_ACROSS**2, pose.mood
+        squint = 0.6 * max(pose.smile, 0.0)
+        upper = UPPER_LID + gaze * bow + 0.15 * pose.brows * bow
+        lower = LOWER_LID + (0.5 * gaze * (1 - pose.shut) + squint + LOWER_LID_RISE * pose.shut) * bow
+        slant = mood.lowered * (1 - mood.inner) * np.clip(0.6 - LID_ACROSS, 0, 1)
+        slant = slant + 0.7 * mood.inner * (1 - mood.outer) * (1 - mood.wide) * np.clip(0.6 + LID_ACROSS, 0, 1)
+        upper = upper + (WIDE_RISE * mood.wide - SQUINT_FALL * mood.squint - SLANT * slant) * bow
+        lower = lower + SQUINT_RISE * max(mood.squint, 0.7 * mood.cheek) * (1 - pose.shut) * bow
+        upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (lower - upper), lower)
+        return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
+
+    def rings(self, pose: CharacterPose) -> Real:
+        """Return all rings but the outermost, from the eyeball outwards [shape=(LID_RINGS, LID_COLUMNS, 3)]."""
+        x, y = self.opening(pose)
+        edge = self.edge()
+        share = (np.arange(LID_RINGS - 1) / (LID_RINGS - 1))[:, None] ** 1.25
+        rings = self._lift((x + share * (edge[:, 0] - x)).ravel(), (y + share * (edge[:, 1] - y)).ravel())
+        rings = rings.reshape(LID_RINGS - 1, LID_COLUMNS, 3)
+        fold = np.exp(-(((share - 0.2) / 0.05) ** 2)) * np.where(LID_SIDE > 0, 1 - LID_ACROSS**2, 0) * (1 - pose.shut)
+        rings[..., 2] -= 0.018 * fold
+        away = rings[0] - EYE
+        inner = EYE + away / np.linalg.norm(away, axis=1, keepdims=True) * (EYEBALL_RADIUS - 0.004)
+        inner[:, 1] = rings[0][:, 1] + 0.1 * (inner[:, 1] - rings[0][:, 1])
+        return np.concatenate([inner[None], rings])
+
+    def _lift(self, x: Real, y: Real) -> Real:
+        """Return the places of the skin at columns and heights [shape=(N, 3)]."""
+        i = (x - self._x[0]) / (self._x[1] - self._x[0])
+        j = (y - self._y[0]) / (self._y[1] - self._y[0])
+        z = map_coordinates(self._depth, np.stack([i, j]), order=3, mode="nearest", prefilter=False)
+        return np.stack([x, y, z], axis=1)
+
 
 IRIS, PUPIL = 0.115, 0.055
 """Radii of iris and pupil, as lengths on the eyeball."""
@@ -25,42 +103,20 @@ LASHES = 33
 
 def eyeball() -> Part:
     """Return the left eyeball, its middle at (0, 0, 0), looking along +z."""
-    radii = np.array(
-        [
-            0,
-            0.022,
-            PUPIL - 0.004,
-            PUPIL,
-            0.068,
-            0.083,
-            0.098,
-            IRIS - 0.006,
-            IRIS,
-            IRIS + 0.006,
-            0.138,
-            0.162,
-            0.19,
-            0.215,
-        ]
-    )
+    inner = [0, 0.022, PUPIL - 0.004, PUPIL, 0.068, 0.083, 0.098, IRIS - 0.006, IRIS, IRIS + 0.006, 0.138]
+    radii = np.array([*inner, 0.162, 0.19, 0.215])
     angle = np.arcsin(np.clip(radii / EYEBALL_RADIUS, 0, 0.999))
     angle = np.concatenate([angle, np.linspace(angle[-1] + 0.15, 2.0, 5)])
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
     dome = EYEBALL_RADIUS + 0.007 * np.maximum(1 - (np.concatenate([radii, np.full(5, 1.0)]) / 0.125) ** 2, 0)
-    ring = np.stack(
-        [
-            np.sin(angle)[:, None] * np.cos(around),
-            np.sin(angle)[:, None] * np.sin(around),
-            np.cos(angle)[:, None] * np.ones(_SIDES),
-        ],
-        axis=-1,
-    )
+    down = angle[:, None]
+    across, up, forward = np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down) * np.ones(_SIDES)
+    ring = np.stack([across, up, forward], axis=-1)
     places = (dome[:, None, None] * ring).reshape(-1, 3)
     colours = np.zeros((len(angle), _SIDES, 3))
     ray = 0.5 + 0.25 * np.sin(7 * around) * np.sin(19 * around + 1) + 0.25 * np.sin(31 * around)
     lower = 0.5 - 0.5 * np.sin(around)
-    for n in range(len(angle)):
-        radius = radii[n] if n < len(radii) else 1.0
+    for n, radius in enumerate([*radii, *[1.0] * 5]):
         if radius <= PUPIL - 0.004:
             colours[n] = palette.PUPIL
         elif radius <= IRIS - 0.006:
@@ -73,9 +129,8 @@ def eyeball() -> Part:
             colours[n] = palette.IRIS_RIM
         else:
             colours[n] = palette.EYE_WHITE
-    return part(
-        "eye", places, grid_triangles(len(angle), _SIDES, closed=True), colours.reshape(-1, 3), palette.EYE_FINISH
-    )
+    triangles = grid_triangles(len(angle), _SIDES, closed=True)
+    return part("eye", places, triangles, colours.reshape(-1, 3), palette.EYE_FINISH)
 
 
 def catchlights() -> Part:
@@ -88,7 +143,7 @@ def catchlights() -> Part:
         z = np.sqrt(away**2 - (flat**2).sum(axis=1))
         fan = np.stack([np.zeros(16, int), 1 + np.arange(16), 1 + (np.arange(16) + 1) % 16], axis=1).astype(np.int32)
         discs.append(part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
-    lights = joined_parts("catchlights", discs)
+    lights = join_parts("catchlights", discs)
     return replace(lights, colours=CATCHLIGHT * lights.colours)
 
 
@@ -105,8 +160,7 @@ def lashes(edge: Real, shut: float) -> Real:
     """
     share = np.linspace(0, 1, LASHES)
     thick = 0.004 + 0.018 * np.sin(np.pi * (0.12 + 0.8 * share)) ** 0.7 * share**0.4
-    length = 0.012 + 0.045 * share**1.5
-    length = length * np.clip((1 - share) / 0.03 + 0.35, 0, 1)
+    length = (0.012 + 0.045 * share**1.5) * np.clip((1 - share) / 0.03 + 0.35, 0, 1)
     out = edge - EYE
     out = out / np.linalg.norm(out, axis=1, keepdims=True)
     sweep = np.stack([0.75 * share, (0.75 - 1.2 * shut) * np.ones(LASHES), 0.55 + 0 * share], axis=1)
@@ -122,8 +176,7 @@ def brow() -> Part:
     share = np.linspace(0, 1, 30)
     x = 0.135 + 0.40 * share
     y = 0.279 + 0.006 * share + 0.026 * np.sin(np.pi * share**1.3)
-    z = seen_from_front(head, x, y)
-    path = np.stack([x, y, z + 0.004], axis=1)
+    path = np.stack([x, y, seen_from_front(head, x, y) + 0.004], axis=1)
     wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.4, 0.02, 1) ** 0.6
     upward = np.broadcast_to([0.25, 0.1, 1.0], path.shape)
     places, triangles, strands = tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)
@@ -135,7 +188,7 @@ INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.12, 0.1, (0.1, 0.03), 0.055
 them together."""
 
 
-def brow_shift(places: Real, pose: CharacterPose) -> Real:
+def shift_brow(places: Real, pose: CharacterPose) -> Real:
     """Return how a mood moves places of a brow at rest [shape=(N, 3)]."""
     outwards = np.clip((np.abs(places[:, 0]) - 0.135) / 0.4, 0, 1)
     inner = (1 - outwards) ** 1.5

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.surface import normals_of
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.surface import compute_normals
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.eyelids import LID_SIDE
-from lipmotion_faces.head.eyes import LASHES, brow, brow_shift, catchlights, eyeball, lash_triangles, lashes
+from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
 from lipmotion_faces.head.forms import EYE
 from lipmotion_faces.head.hair import hair
 from lipmotion_faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
 from lipmotion_faces.head.lips import ACROSS, RINGS, VISIBLE_RINGS, closed_share
 from lipmotion_faces.head.part import Part, grid_triangles, part, tube
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import AT_CORNER, REST, Skin, jaw_moved
-from lipmotion_faces.rendering.lighting import Lighting
-from lipmotion_faces.rendering.occlusion import reaches
+from lipmotion_faces.head.skin import AT_CORNER, REST, Skin, move_jaw
+from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
 from lipmotion_faces.turning import turned
 
 Real = NDArray[np.float64]
@@ -39,8 +37,7 @@ def ear() -> Part:
     u = ring[:, None] * wide * np.cos(around)
     v = ring[:, None] * outline * np.sin(around)
     soft = np.where(np.sin(around) < -0.75, 0.4, 1.0)
-    w = relief[:, None] * np.where(ring[:, None] > 0.6, soft, 1.0) * np.ones(48)
-    w = w + 0.02
+    w = relief[:, None] * np.where(ring[:, None] > 0.6, soft, 1.0) * np.ones(48) + 0.02
     turn = 0.95
     back, out = np.array([np.sin(turn) * 0.9, 0.10, -np.cos(turn)]), np.array([np.cos(turn), 0, np.sin(turn)])
     up = np.array([0.14, 1.0, -0.10])
@@ -60,52 +57,28 @@ def earring() -> Part:
     return part("earring", places, grid_triangles(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
 
 
-def _rings(table: Real) -> Real:
-    """Return rings about the body from rows (height, half width, half depth, middle z, squareness)."""
-    around = 2 * np.pi * np.arange(_SIDES) / _SIDES
-    rows = []
-    for y, wide, deep, z, square in table:
-        power = 2 / square
-        c, s = np.cos(around), np.sin(around)
-        rows.append(
-            np.stack(
-                [
-                    wide * np.sign(c) * np.abs(c) ** power,
-                    np.full(_SIDES, y),
-                    z + deep * np.sign(s) * np.abs(s) ** power,
-                ],
-                axis=1,
-            )
-        )
-    return np.stack(rows)
-
-
-def _between(table: Sequence[tuple[float, ...]], count: int) -> Real:
+def _rings(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
+    """Return a part of rings about the body from rows (height, half width, half depth, middle z, squareness)."""
     from scipy.interpolate import PchipInterpolator
 
-    knots = np.array(table)
     at = np.linspace(0, len(table) - 1, count)
-    return np.asarray(PchipInterpolator(np.arange(len(table)), knots)(at))
+    around = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    c, s = np.cos(around), np.sin(around)
+    rows = []
+    for y, wide, deep, z, square in PchipInterpolator(np.arange(len(table)), np.array(table))(at).tolist():
+        x, forward = np.sign(c) * np.abs(c) ** (2 / square), np.sign(s) * np.abs(s) ** (2 / square)
+        rows.append(np.stack([wide * x, np.full(_SIDES, y), z + deep * forward], axis=1))
+    triangles = grid_triangles(count, _SIDES, closed=True)[:, ::-1]
+    return part(name, np.concatenate(rows), triangles, colour, finish)
 
 
 def neck() -> Part:
     """Return the neck, from under the hair to under the collar."""
-    rings = _rings(
-        _between(
-            [
-                (-0.55, 0.33, 0.30, -0.98, 2),
-                (-1.0, 0.355, 0.34, -0.96, 2),
-                (-1.45, 0.375, 0.36, -0.98, 2),
-                (-1.75, 0.47, 0.40, -1.0, 2),
-                (-1.95, 0.75, 0.45, -1.0, 2),
-            ],
-            26,
-        )
-    )
-    colours = np.broadcast_to(np.array(palette.SKIN), (rings.size // 3, 3)).copy()
-    return part(
-        "neck", rings.reshape(-1, 3), grid_triangles(26, _SIDES, closed=True)[:, ::-1], colours, palette.SKIN_FINISH
-    )
+    table = [
+        (-0.55, 0.33, 0.30, -0.98, 2), (-1.0, 0.355, 0.34, -0.96, 2), (-1.45, 0.375, 0.36, -0.98, 2),
+        (-1.75, 0.47, 0.40, -1.0, 2), (-1.95, 0.75, 0.45, -1.0, 2),
+    ]  # fmt: skip
+    return _rings("neck", table, 26, palette.SKIN, palette.SKIN_FINISH)
 
 
 def clothing() -> Part:
@@ -115,14 +88,7 @@ def clothing() -> Part:
         (-1.92, 1.28, 0.60, -1.02, 2.1), (-2.08, 1.58, 0.62, -1.03, 2.15), (-2.35, 1.74, 0.66, -1.03, 2.2),
         (-2.8, 1.80, 0.72, -1.03, 2.2), (-3.4, 1.80, 0.75, -1.03, 2.2),
     ]  # fmt: skip
-    rings = _rings(_between(table, 28))
-    return part(
-        "clothing",
-        rings.reshape(-1, 3),
-        grid_triangles(28, _SIDES, closed=True)[:, ::-1],
-        palette.CLOTH,
-        palette.CLOTH_FINISH,
-    )
+    return _rings("clothing", table, 28, palette.CLOTH, palette.CLOTH_FINISH)
 
 
 def collar() -> Part:
@@ -140,7 +106,7 @@ CORNER_FADE_SHARE = 0.4
 
 
 def skin_colours(skin: Skin) -> Real:
-    """Return the diffuse reflection of all vertices of the skin, linear [shape=(V, 3)]."""
+    """Return the diffuse reflection of all vertices of the skin, decode_srgb [shape=(V, 3)]."""
     x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
     colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
 
@@ -155,18 +121,6 @@ def skin_colours(skin: Skin) -> Real:
     tint(0.12, (0, -1.05), (0.15, 0.1), palette.BLUSH)
     tint(0.25, (0.33, 0.17), (0.2, 0.06), palette.BLUSH)
     tint(0.8, (0.055, -0.495), (0.028, 0.018), palette.SKIN_DEEP)
-    _lips(skin, colour)
-    for eye in range(2):
-        lids = skin.lid_rows(eye)
-        colour[lids[0]] = palette.EYE_CORNER
-        colour[lids[1]] = 0.5 * np.array(palette.EYE_CORNER) + 0.5 * np.array(palette.SKIN)
-        for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
-            upper = lids[ring, LID_SIDE > 0]
-            colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
-    return linear(colour)
-
-
-def _lips(skin: Skin, colour: Real) -> None:
     lips = skin.lip_rows()
     bare = colour[lips[0]]
     colour[lips[1]] = 0.45 * colour[lips[1]] + 0.55 * np.array(palette.LIP)
@@ -177,6 +131,14 @@ def _lips(skin: Skin, colour: Real) -> None:
     faded = (CORNER_FADE_SHARE * np.clip((np.abs(ACROSS) - 0.8) / 0.2, 0, 1) ** 2)[:, None]
     colour[lips[1:VISIBLE_RINGS]] += faded * (bare - colour[lips[1:VISIBLE_RINGS]])
     colour[lips[VISIBLE_RINGS + 1 :].ravel()] = palette.MOUTH
+    for eye in range(2):
+        lids = skin.lid_rows(eye)
+        colour[lids[0]] = palette.EYE_CORNER
+        colour[lids[1]] = 0.5 * np.array(palette.EYE_CORNER) + 0.5 * np.array(palette.SKIN)
+        for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
+            upper = lids[ring, LID_SIDE > 0]
+            colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
+    return decode_srgb(colour)
 
 
 PIVOT = np.array([0.0, -0.75, -0.9])
@@ -209,7 +171,7 @@ class Figure:
 
     triangles : of all parts [shape=(F, 3)]
     head      : the rows of the vertices that move; those of the body, behind them, never do
-    colours   : diffuse reflection of the vertices, linear [shape=(V, 3)]
+    colours   : diffuse reflection of the vertices, decode_srgb [shape=(V, 3)]
     parts, rows : the parts, and the rows of the vertices of each by its name
     """
 
@@ -222,11 +184,11 @@ class Figure:
             self.skin.as_part(skin_colours(self.skin)),
             part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
             lower_teeth(), upper_teeth(),
-            self._eye, self._eye.mirrored("right eye"), self._light, replace(self._light, name="right catchlights"),
+            self._eye, self._eye.mirror("right eye"), self._light, replace(self._light, name="right catchlights"),
             part("lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
             part("right lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
-            left_brow, left_brow.mirrored("right brow"),
-            hair(), left_ear, left_ear.mirrored("right ear"), ring, ring.mirrored("right earring"),
+            left_brow, left_brow.mirror("right brow"),
+            hair(), left_ear, left_ear.mirror("right ear"), ring, ring.mirror("right earring"),
             neck(), clothing(), collar(),
         ]  # fmt: skip
         self.parts = tuple(parts)
@@ -241,37 +203,46 @@ class Figure:
         self._places = np.concatenate([each.places for each in parts])
         self._normals = np.concatenate([each.normals for each in parts])
         self.colours = np.concatenate([each.colours for each in parts])
-        none = [np.zeros_like(each.places) if each.strands is None else each.strands for each in parts]
-        self._strands = np.concatenate(none)
-        kinds = [np.full(len(each.places), palette.FINISHES.index(each.finish)) for each in parts]
-        self._kinds = np.concatenate(kinds).astype(np.intp)
+        self._strands = np.concatenate(
+            [np.zeros_like(each.places) if each.strands is None else each.strands for each in parts]
+        )
+        self._kinds = np.repeat([palette.FINISHES.index(each.finish) for each in parts], np.diff(stops)).astype(np.intp)
         lips = self.skin.lip_rows()
         self._kinds[lips[1 : VISIBLE_RINGS + 2].ravel()] = palette.FINISHES.index(palette.LIP_FINISH)
         self._wall = lips[VISIBLE_RINGS + 1 : RINGS].ravel()
         self._kinds[lips[VISIBLE_RINGS + 2 :].ravel()] = palette.FINISHES.index(palette.MOUTH_FINISH)
         self._lighting = Lighting(palette.FINISHES)
-        self._reaches = self._baked()
+        self._reaches = self._bake_light()
         self._held = np.zeros((stops[-1], 1))
         share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
         self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
 
-    def placed(self, pose: CharacterPose) -> tuple[Real, Real]:
+    def place(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices in a pose, the head not turned [shape=(V, 3), both]."""
         places, normals = self._places.copy(), self._normals.copy()
-        places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.posed(pose)
-        licked = tongue(pose)
-        places[self.rows["tongue"]], normals[self.rows["tongue"]] = licked, normals_of(licked, tongue_triangles())
-        places[self.rows["teeth"]] = jaw_moved(places[self.rows["teeth"]], lower_drop(pose))
+        places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.pose(pose)
+        places[self.rows["tongue"]] = tongue(pose)
+        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], tongue_triangles())
+        places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], lower_drop(pose))
         for name in ("brow", "right brow"):
-            places[self.rows[name]] += brow_shift(places[self.rows[name]], pose)
+            places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)
             places[self.rows[name], 1] += pose.brows
-        self._look(pose, places, normals)
+        look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
+        lid = places[self.skin.lid_rows(0)[1][:LASHES]]
+        for side, name in _EYES:
+            flip = np.array([side, 1.0, 1.0])
+            eye = self.rows[name + "eye"]
+            places[eye] = places[eye] @ look.T + EYE * flip
+            normals[eye] = normals[eye] @ look.T
+            places[self.rows[name + "catchlights"]] = self._light.places @ half.T + EYE * flip
+            places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
+            normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
         return places, normals
 
     def frame(self, pose: CharacterPose, viewer: Real) -> Drawn:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
-        places, normals = self.placed(pose)
-        colours, arrives = self._shaded(pose, places)
+        places, normals = self.place(pose)
+        colours, arrives = self._shade(pose, places)
         turn, moving, neck = turned(*pose.turn).T, self.head, self.rows["neck"]
         held, still = self._held[neck], (places[neck].copy(), normals[neck].copy())
         strands = self._strands.copy()
@@ -291,26 +262,11 @@ class Figure:
 
     def mouth_rows(self) -> dict[str, NDArray[np.intp]]:
         """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
-        rows = {
-            name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")
-        }
-        lips = self.skin.lip_rows()
-        return {"lips": lips[1 : VISIBLE_RINGS + 1].ravel(), "wall": self._wall, **rows}
+        lips, every = self.skin.lip_rows(), np.arange(len(self._places))
+        inner = {name: every[self.rows[name]] for name in ("tongue", "teeth", "upper teeth")}
+        return {"lips": lips[1 : VISIBLE_RINGS + 1].ravel(), "wall": self._wall, **inner}
 
-    def _look(self, pose: CharacterPose, places: Real, normals: Real) -> None:
-        """Place eyeballs, reflections and lashes."""
-        look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
-        lid = places[self.skin.lid_rows(0)[1][:LASHES]]
-        for side, name in _EYES:
-            flip = np.array([side, 1.0, 1.0])
-            eye = self.rows[name + "eye"]
-            places[eye] = places[eye] @ look.T + EYE * flip
-            normals[eye] = normals[eye] @ look.T
-            places[self.rows[name + "catchlights"]] = self._light.places @ half.T + EYE * flip
-            places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
-            normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
-
-    def _shaded(self, pose: CharacterPose, places: Real) -> tuple[Real, Real]:
+    def _shade(self, pose: CharacterPose, places: Real) -> tuple[Real, Real]:
         """Return colours and arriving light: eyes are darker under their lids, the mouth is darker inside."""
         colours, arrives = self.colours.copy(), self._reaches.copy()
         x, y = self.skin.lids_of_eye.opening(pose)
@@ -319,55 +275,41 @@ class Figure:
             upper = np.interp(side * places[eye, 0], x[:LASHES], y[:LASHES])
             under = np.clip((upper - places[eye, 1] + 0.01) / 0.085, 0, 1)
             colours[eye] *= (0.6 + 0.4 * under)[:, None]
-        inside = self._lit_inside(pose, places[self.rows["skin"]])
+        ring = places[self.rows["skin"]][self.skin.lip_rows()[VISIBLE_RINGS - 1]]
+        top, low = ring[_UPPER_COLUMN, 1], ring[_LOWER_COLUMN, 1]
+        front = 0.5 * (ring[_UPPER_COLUMN, 2] + ring[_LOWER_COLUMN, 2])
+        span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
+        shadow = LIP_SHADOW + 0.4 * pose.tuck  # teeth on the lip are seen
+        shade, deepest = 1 - 0.92 * pose.roundness**1.1, 0.93 - 0.27 * min(span / 0.25, 1.0)
         for rows in (self.rows["tongue"], self.rows["teeth"], self.rows["upper teeth"], self._wall):
-            arrives[rows] = inside(places[rows])[:, None]
-        arrives[self.rows["tongue"]] = np.minimum(
-            1.0, TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
-        )
+            x, y, z = places[rows].T
+            depth = deepest * np.clip((front - z - 0.10) / (0.22 + 0.8 * span), 0, 1)
+            under = np.clip((top - y) / SHADOW_DEPTH, 0, 1)
+            aside = np.clip(1.05 - 1.25 * (x / half) ** 2, 0, 1)
+            lit = shade * (1 - depth) ** 1.5 * (shadow + (1 - shadow) * under) * (0.12 + 0.88 * aside)
+            arrives[rows] = lit[:, None]
+        licked = TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
+        arrives[self.rows["tongue"]] = np.minimum(1.0, licked)
         lips, closed = self.skin.lip_rows(), closed_share(pose)
         for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE_RINGS - len(SEAM_LIGHT)):
-            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(
-                closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER
-            )
+            shaded = np.maximum(closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER)
+            arrives[lips[ring]] *= 1 - (1 - part_of) * shaded
         for ring, part_of in enumerate(RIM_LIGHT, VISIBLE_RINGS - 3):
             arrives[lips[ring]] *= 1 - (1 - part_of) * pose.roundness
         arrives[self.rows["upper teeth"]] *= UPPER_TEETH_LIGHT
         arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
         return colours, arrives
 
-    def _lit_inside(self, pose: CharacterPose, skin: Real) -> Callable[[Real], Real]:
-        """Return the function from places in the mouth to the part of the light that arrives there."""
-        ring = skin[self.skin.lip_rows()[VISIBLE_RINGS - 1]]
-        top, low, front = (
-            ring[_UPPER_COLUMN, 1],
-            ring[_LOWER_COLUMN, 1],
-            0.5 * (ring[_UPPER_COLUMN, 2] + ring[_LOWER_COLUMN, 2]),
-        )
-        span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
-        shadow = LIP_SHADOW + 0.4 * pose.tuck  # teeth on the lip are seen
-        shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)
-
-        def inside(places: Real) -> Real:
-            depth = (0.93 - 0.27 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
-            under = np.clip((top - places[:, 1]) / SHADOW_DEPTH, 0, 1)
-            aside = np.clip(1.05 - 1.25 * (places[:, 0] / half) ** 2, 0, 1)
-            return shade * (1 - depth) ** 1.5 * (shadow + (1 - shadow) * under) * (0.12 + 0.88 * aside)
-
-        return inside
-
-    def _baked(self) -> Real:
+    def _bake_light(self) -> Real:
         """Return the parts of sky and key light that reach the vertices at rest [shape=(V, 2)]."""
-        eyes = ("eye", "right eye")
-        places, normals = self.placed(REST)
-        inner = {"tongue", "teeth", "upper teeth", *eyes, "catchlights", "right catchlights", "lashes", "right lashes"}
+        places, normals = self.place(REST)
+        inner = ("tongue", "teeth", "upper teeth", "catchlights", "right catchlights", "lashes", "right lashes")
+        fully_lit: list[slice | NDArray[np.intp]] = [self._wall, *(self.rows[name] for name in inner)]
         hiding = np.ones(len(places), bool)
-        for name in sorted(inner):
-            hiding[self.rows[name]] = False
-        hiding[self._wall] = False
+        for rows in (*fully_lit, self.rows["eye"], self.rows["right eye"]):
+            hiding[rows] = False
         lit = reaches(places, normals, self.triangles, hiding)
-        for name in sorted(inner - set(eyes)):
-            lit[self.rows[name]] = 1
-        lit[self._wall] = 1
+        for rows in fully_lit:
+            lit[rows] = 1
         lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
         return lit

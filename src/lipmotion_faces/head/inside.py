@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.forms import MOUTH_Y
 from lipmotion_faces.head.lips import ARCH, TEETH_EDGE, TEETH_Z
-from lipmotion_faces.head.part import Part, grid_triangles, joined_parts, part
+from lipmotion_faces.head.part import Part, grid_triangles, join_parts, part
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import jaw_moved
+from lipmotion_faces.head.skin import move_jaw
 
 Real = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def _row(name: str, edges: tuple[float, ...], edge_y: float, height: float, up: 
     grid = np.stack([np.tile(x, 4), np.repeat(y, 41), np.concatenate([front - ARCH * x**2 + d for d in depth])], axis=1)
     triangles = grid_triangles(4, 41)
     gum = part("gum", grid, triangles[:, ::-1] if up > 0 else triangles, palette.GUM, palette.TOOTH_FINISH)
-    return joined_parts(name, [*teeth, gum])
+    return join_parts(name, [*teeth, gum])
 
 
 def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: float, front: float) -> Part:
@@ -95,7 +95,7 @@ def tongue(pose: CharacterPose) -> Real:
     floor = LOWER_EDGE - 0.075
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.060, -0.36])
     blade, tip = np.array([0, floor + 0.03, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
-    points = jaw_moved(np.stack([root, body, blade, tip]), pose.jaw + PARTED_TEETH * (1 - pose.bite))
+    points = move_jaw(np.stack([root, body, blade, tip]), pose.jaw + PARTED_TEETH * (1 - pose.bite))
     on_lip = MOUTH_Y - (pose.gap - pose.upper_rise) + TIP_ON_LIP
     tooth = np.array([0, np.clip(on_lip, *TIP_HEIGHTS), TEETH_Z + 0.115])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])

@@ -55,15 +55,11 @@ VISIBLE_RINGS = 11
 """Rings up to this one can be seen as lips; those behind are the wall of the mouth."""
 
 
-def _columns() -> tuple[Real, Real]:
-    across = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER_COLUMNS))
-    return np.concatenate([across, across[-2:0:-1]]), np.concatenate(
-        [np.ones(_UPPER_COLUMNS), -np.ones(_UPPER_COLUMNS - 2)]
-    )
-
-
-ACROSS, SIDE = _columns()
-"""Place of every column between the right corner (-1) and the left one (1), and 1 on the upper lip, -1 on the lower."""
+_UPPER_ACROSS = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER_COLUMNS))
+ACROSS: Real = np.concatenate([_UPPER_ACROSS, _UPPER_ACROSS[-2:0:-1]])
+"""Place of every column between the right corner (-1) and the left one (1)."""
+SIDE: Real = np.concatenate([np.ones(_UPPER_COLUMNS), -np.ones(_UPPER_COLUMNS - 2)])
+"""1 on the upper lip, -1 on the lower one."""
 
 
 def _smooth(knots: list[tuple[float, float]]) -> Real:
@@ -92,7 +88,10 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     rise = pose.upper_rise
     drop = pose.gap - rise
     middle = _between(pose)
-    squeeze = _squeeze(pose)
+    # how much nearer to the middle than the corners the inner edge of the lips lies
+    hole_share = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
+    as_ring = np.maximum(1 - hole_share, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
+    squeeze = as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
     rounded = _ENVELOPE ** (1 + np.minimum(2 * pose.roundness, 1.0))
     belly = rounded + squeeze * (1 - rounded)
     hole, contour = _opening(pose)
@@ -101,7 +100,8 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     full = full + 0.4 * pose.spread * (_ENVELOPE - full)
     thick = np.where(upper, _UPPER_LIP, _LOWER_LIP) * full
     thick = thick * pose.fullness * (1 - 0.35 * pose.press) * np.where(upper, 1.0, 1 - 0.45 * pose.tuck)
-    outer_y = middle + np.where(upper, rise, -drop) * contour + SIDE * thick * _rounded(pose)
+    fuller = 1 + pose.roundness * 0.35 * ACROSS**2 * _ENVELOPE  # near the corners of a round mouth
+    outer_y = middle + np.where(upper, rise, -drop) * contour + SIDE * thick * fuller
     forward = pose.protrusion * (1 - 0.45 * ACROSS**2)
     arch = -ARCH * (x**2 - (REST_HALF_WIDTH * ACROSS) ** 2)
     back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck) * _ENVELOPE
@@ -111,7 +111,6 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     bulge = (0.056 - 0.006 * SIDE * _ENVELOPE) * belly * pose.fullness * (1 - 0.3 * pose.press)
     inner_x = x * (1 - squeeze)
     teeth = TEETH_Z - ARCH * inner_x**2
-    up = SIDE * 1.0
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
     contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * closed_share(pose)
@@ -121,22 +120,19 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
     crest = _meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
-    y, z = outer_y, outer_z
+    y = outer_y
     broad = inner_y + pose.roundness * (middle + np.where(upper, rise, -drop) * contour - inner_y)
     crest_y = broad + 0.42 * (y - broad)
+    deep = (0.13 - 0.05 * pose.roundness) * _ENVELOPE + 0.012
     rows = [
-        (x, y, z),
+        (x, y, outer_z),
         (x * (1 - 0.2 * squeeze), inner_y + 0.76 * (y - inner_y), outer_z + 0.5 * (crest - outer_z)),
         (x * (1 - 0.5 * squeeze), crest_y, crest),
         (x * (1 - 0.85 * squeeze), inner_y + 0.31 * (crest_y - inner_y), contact_z + 0.66 * (crest - contact_z)),
         (inner_x, inner_y, contact_z),
-        (x * (1 - 0.88 * squeeze), inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
-        (x * (1 - 0.45 * squeeze), inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
-        (
-            (1.12 - 0.2 * pose.roundness) * x,
-            inner_y + up * ((0.13 - 0.05 * pose.roundness) * _ENVELOPE + 0.012),
-            behind - 0.01,
-        ),
+        (x * (1 - 0.88 * squeeze), inner_y + SIDE * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
+        (x * (1 - 0.45 * squeeze), inner_y + SIDE * (0.05 * _ENVELOPE + 0.002), behind),
+        ((1.12 - 0.2 * pose.roundness) * x, inner_y + SIDE * deep, behind - 0.01),
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-3)
 
@@ -144,7 +140,8 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
 def _meeting(pose: CharacterPose, base_z: Real, inwards: Any) -> Real:
     """Return how far forward the lips meet, at places that much nearer to the middle [shape=(..., COLUMNS)]."""
     across = inwards * ACROSS
-    between = np.interp(across, ACROSS[:_UPPER_COLUMNS], 0.5 * (base_z[:_UPPER_COLUMNS] + _opposite(base_z)))
+    lower_z = np.concatenate([base_z[:1], base_z[: _UPPER_COLUMNS - 1 : -1], base_z[_UPPER_COLUMNS - 1 :][:1]])
+    between = np.interp(across, ACROSS[:_UPPER_COLUMNS], 0.5 * (base_z[:_UPPER_COLUMNS] + lower_z))
     curved = ARCH * REST_HALF_WIDTH**2 * (pose.width**2 - 1)
     return np.asarray(between + pose.protrusion - (0.45 * pose.protrusion + curved) * across**2)
 
@@ -165,11 +162,6 @@ def _between(pose: CharacterPose) -> Real:
     return np.asarray(MOUTH_Y + line + raised + bowed * pose.roundness)
 
 
-def _opposite(base_z: Real) -> Real:
-    """Return the values of the lower lip at the columns of the upper one [shape=(41,)]."""
-    return np.concatenate([base_z[:1], base_z[: _UPPER_COLUMNS - 1 : -1], base_z[_UPPER_COLUMNS - 1 : _UPPER_COLUMNS]])
-
-
 def _opening(pose: CharacterPose) -> tuple[Real, Real]:
     """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(..., COLUMNS), both].
 
@@ -182,18 +174,6 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
     hole = inside ** (0.92 - 0.40 * pose.roundness - 0.36 * pose.spread - oval)
     contour = np.maximum(1 - ACROSS**2, 0) ** (0.85 - 0.25 * pose.roundness - 0.33 * pose.spread - 0.7 * oval)
     return hole, contour
-
-
-def _squeeze(pose: CharacterPose) -> Any:
-    """Return how much nearer the inner edge of the lips lies to the middle than the corners [shape of the gap]."""
-    hole = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = np.maximum(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
-    return as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
-
-
-def _rounded(pose: CharacterPose) -> Real:
-    """Return how much fuller the lips are near the corners of a round mouth [shape=(..., COLUMNS)]."""
-    return 1 + pose.roundness * 0.35 * ACROSS**2 * _ENVELOPE
 
 
 def lip_surface(points: Real) -> Real:

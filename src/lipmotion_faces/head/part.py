@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.surface import normals_of
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.surface import compute_normals
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.rendering.lighting import Finish
 
 Real = NDArray[np.float64]
@@ -36,7 +36,7 @@ class Part:
     normals: Real
     strands: Real | None = None
 
-    def mirrored(self, name: str) -> Part:
+    def mirror(self, name: str) -> Part:
         """Return the same part on the other side of the face."""
         flip = np.array([-1.0, 1.0, 1.0])
         strands = None if self.strands is None else self.strands * flip
@@ -50,11 +50,11 @@ def part(
     name: str, places: Real, triangles: Triangles, colour: Triple | Real, finish: Finish, strands: Real | None = None
 ) -> Part:
     """Return a part of one sRGB colour, or of one a vertex [shape=(V, 3)]; normals are those of its triangles."""
-    colours = np.broadcast_to(linear(colour), places.shape).copy()
-    return Part(name, places, triangles, colours, finish, normals_of(places, triangles), strands)
+    colours = np.broadcast_to(decode_srgb(colour), places.shape).copy()
+    return Part(name, places, triangles, colours, finish, compute_normals(places, triangles), strands)
 
 
-def joined_parts(name: str, parts: list[Part]) -> Part:
+def join_parts(name: str, parts: list[Part]) -> Part:
     """Return several parts of one finish as one."""
     offsets = np.cumsum([0, *(len(each.places) for each in parts)])
     triangles = [each.triangles + offset for each, offset in zip(parts, offsets, strict=False)]

@@ -8,13 +8,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
-from lipmotion.meshes.fitting.shape_weights import with_gap
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.head.figure import Figure
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
-from lipmotion_faces.head.pose import CharacterPose, stacked
+from lipmotion_faces.head.pose import CharacterPose, stack_poses
 from lipmotion_faces.head.skin import REST
 
 Real = NDArray[np.float64]
@@ -37,7 +36,7 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     mesh : of this figure, from ``head_mesh``
     The middles of the lips are apart as in the pose.
     """
-    return _mouth_fit(figure, mesh).weights(poses)
+    return _cached_fit(figure, mesh).weights(poses)
 
 
 class _MouthFit:
@@ -48,7 +47,7 @@ class _MouthFit:
         names = [name for name in mesh.shape_names if not name.startswith(_NOT_OF_LIPS)]
         moved = mesh.displacements(np.arange(len(figure.skin.rest)))
         around = np.flatnonzero(figure.skin.lip_weight > 0)[::3]
-        self._around, rings = figure.skin.binding.only(around), figure.skin.lip_rows()
+        self._around, rings = figure.skin.binding.select(around), figure.skin.lip_rows()
         every = _rows(moved[:, rings], moved[:, around])
         rows = {name: every[mesh.shape_names.index(name)] for name in (*names, *FROM_POSE)}
         # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
@@ -66,7 +65,7 @@ class _MouthFit:
         targets, gap = (np.concatenate(column) for column in zip(*parts, strict=True))
         for name, curve in fixed.items():
             targets -= np.outer(curve, self._fixed[name])
-        weights = bounded_curves(self._triangle.T, targets, COSTS)
+        weights = fit_bounded_curves(self._triangle.T, targets, COSTS)
         jaw, close = names.index("jawOpen"), names.index("mouthClose")
         weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
         kept = [name for name in names if not name.startswith(PARTING)]
@@ -77,14 +76,12 @@ class _MouthFit:
         """Return poses as what the shapes span [shape=(T, S)], and by how much they part the lips [shape=(T,)]."""
         lips, around = (
             places - rest
-            for places, rest in zip(self._skin.lips_and_face(stacked(poses), self._around), self._rest, strict=True)
+            for places, rest in zip(self._skin.lips_and_face(stack_poses(poses), self._around), self._rest, strict=True)
         )
         return _rows(lips, around) @ self._spanned, lip_gap(lips)
 
 
-@lru_cache(maxsize=2)
-def _mouth_fit(figure: Figure, mesh: Mesh) -> _MouthFit:
-    return _MouthFit(figure, mesh)
+_cached_fit = lru_cache(maxsize=2)(_MouthFit)
 
 
 def lip_gap(moved: Real) -> Real:

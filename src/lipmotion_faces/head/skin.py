@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
-from lipmotion.meshes.model.surface import normals_of
+from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
+from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion_faces.head.lips import (
     ACROSS,
@@ -25,6 +25,7 @@ from lipmotion_faces.head.lips import (
 )
 from lipmotion_faces.head.part import Part
 from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.rendering.lighting import unit
 
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -71,7 +72,7 @@ class Binding:
     cheeks: Real
     nose: Real
 
-    def only(self, rows: Index) -> Binding:
+    def select(self, rows: Index) -> Binding:
         """Return the binding of some vertices alone, in ascending order, of that of all."""
         of = np.full(len(self.places), -1)
         of[self.bound] = np.arange(len(self.bound))
@@ -79,14 +80,13 @@ class Binding:
         places, jaw, cheeks, nose = (each[rows] for each in (self.places, self.jaw_weight, self.cheeks, self.nose))
         return Binding(places, columns, jaw, bound, self.shares[of[rows][bound]], cheeks, nose)
 
-    def moved(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
+    def move(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
         """Return the places in a pose [shape=(..., N, 3)].
 
         contour : places of the outer contour of the lips [shape=(..., COLUMNS, 3)]; columns : its binding
         """
-        own = contour - columns._by_jaw(pose)
         places = self._by_jaw(pose)
-        places[..., self.bound, :] += self.shares @ own
+        places[..., self.bound, :] += self.shares @ (contour - columns._by_jaw(pose))
         spread, roundness, cheek, sneer = (
             np.asarray(number)[..., None] for number in (pose.spread, pose.roundness, pose.mood.cheek, pose.mood.sneer)
         )
@@ -97,7 +97,7 @@ class Binding:
 
     def _by_jaw(self, pose: CharacterPose) -> Real:
         """Return the places with the jaw of a pose [shape=(..., N, 3)]."""
-        turned = jaw_moved(self.places, pose.jaw)
+        turned = move_jaw(self.places, pose.jaw)
         return np.asarray(self.places + self.jaw_weight[:, None] * (turned - self.places))
 
 
@@ -121,25 +121,18 @@ class Skin:
         self._first_lip = len(self.face)
         self._first_lid = self._first_lip + (RINGS - 1) * COLUMNS
         grids = [_closed_grid(self.lip_rows())]
-        for eye in range(2):
-            rows = self.lid_rows(eye)
-            grids.append(_closed_grid(rows[::-1]) if eye == 0 else _closed_grid(rows))
+        grids += [_closed_grid(self.lid_rows(0)[::-1]), _closed_grid(self.lid_rows(1))]
         self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
         front = 2 * VISIBLE_RINGS * COLUMNS
-        self.pieces = {
-            "skin": len(triangles),
-            "lips": front,
-            "wall": len(grids[0]) - front,
-            "lids": len(grids[1]) + len(grids[2]),
-        }
+        wall, lids = len(grids[0]) - front, len(grids[1]) + len(grids[2])
+        self.pieces = {"skin": len(triangles), "lips": front, "wall": wall, "lids": lids}
         self._contour = contour
-        self.binding = self._bound(fill)
-        self._columns = self.binding.only(np.arange(COLUMNS))
+        self.binding = self._bind(fill)
+        self._columns = self.binding.select(np.arange(COLUMNS))
         self.rest = self.places(REST)
-        meshed = normals_of(self.rest, self.triangles)
-        self.normals = meshed.copy()
+        self._meshed_rest = compute_normals(self.rest, self.triangles)
+        self.normals = self._meshed_rest.copy()
         self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
-        self._meshed_rest = meshed
         self._before_lips = outward(head, contour)
         corners = self.rest[[0, _LEFT_CORNER]]
         beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
@@ -162,10 +155,10 @@ class Skin:
         """Return the skin at rest with the diffuse reflection of its vertices, linear [shape=(V, 3)]."""
         return Part("skin", self.rest, self.triangles, colours, palette.SKIN_FINISH, self.normals)
 
-    def posed(self, pose: CharacterPose) -> tuple[Real, Real]:
+    def pose(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
         places = self.places(pose)
-        change = normals_of(places, self.triangles) - self._meshed_rest
+        change = compute_normals(places, self.triangles) - self._meshed_rest
         normals = self.normals + self._calm * change
         rows, closed = self.lip_rows(), closed_share(pose)
         normals[rows[VISIBLE_RINGS - 1]] += closed * (
@@ -173,14 +166,14 @@ class Skin:
         )
         beside = AT_CORNER * (CORNER_LIGHT_SHARE + (1 - CORNER_LIGHT_SHARE) * pose.roundness)
         for ring in range(1, VISIBLE_RINGS):
-            own = normals[rows[ring]]
+            of_ring = normals[rows[ring]]
             share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)
-            normals[rows[ring]] += 0.5 * share * (own[_OPPOSITE] - own)
+            normals[rows[ring]] += 0.5 * share * (of_ring[_OPPOSITE] - of_ring)
         outer = rows[1:VISIBLE_RINGS]
         normals[outer] += CORNER_SKIN_SHARE * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
         return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
 
-    def _bound(self, fill: Real) -> Binding:
+    def _bind(self, fill: Real) -> Binding:
         """Return how every vertex of the face is bound to the columns of the lips, and to the jaw.
 
         fill : the last of them, between mouth, eyes and the back of the head
@@ -199,17 +192,20 @@ class Skin:
         shares = length * np.exp(-0.5 * ((across[bound] - nearest[bound, None]) / width) ** 2)
         shares *= np.exp(-across[bound] / 0.5)
         shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[bound, None]
-        return Binding(face, np.arange(COLUMNS), jaw_weight(face), bound, shares, _cheeks(fill, len(face)), _nose(face))
+        out = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
+        share = np.exp(-np.sum(out**2, axis=1)) * (fill[:, 2] > -0.75)
+        cheeks, nose = np.zeros_like(face), np.zeros_like(face)
+        cheeks[len(face) - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
+        out = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
+        nose[:, 1] = np.exp(-out) * (face[:, 2] > -0.5)
+        jaw = _step((-0.47 - face[:, 1]) / 0.40) * _step((face[:, 2] + 0.98) / 0.45)
+        return Binding(face, np.arange(COLUMNS), jaw, bound, shares, cheeks, nose)
 
     def places(self, pose: CharacterPose) -> Real:
         """Return the places of all vertices [shape=(V, 3)], the head not turned."""
-        left = self.lids_of_eye.rings(pose).reshape(-1, 3)
-        return np.concatenate([self.places_without_lids(pose), left, left * [-1, 1, 1]])
-
-    def places_without_lids(self, pose: CharacterPose) -> Real:
-        """Return the first of the places of ``places``: all but the lids of the eyes, which come last."""
         lips, face = self.lips_and_face(pose, self.binding)
-        return np.concatenate([face, lips[1:].reshape(-1, 3)])
+        left = self.lids_of_eye.rings(pose).reshape(-1, 3)
+        return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])
 
     def lips_and_face(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
         """Return the places of the rings of the lips [shape=(..., RINGS, COLUMNS, 3)] and of vertices of the face.
@@ -218,34 +214,10 @@ class Skin:
         binding : of the vertices beside the lips [shape of their places=(..., N, 3)]
         """
         lips = lip_surface(section_points(pose, self.base_z))
-        return lips, binding.moved(pose, lips[..., 0, :, :], self._columns)
+        return lips, binding.move(pose, lips[..., 0, :, :], self._columns)
 
 
-def _cheeks(fill: Real, count: int) -> Real:
-    """Return how cheeks move, out and up, for all vertices of the face, of which these are the last [shape=(N, 3)]."""
-    away = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
-    share = np.exp(-np.sum(away**2, axis=1)) * (fill[:, 2] > -0.75)
-    moved = np.zeros((count, 3))
-    moved[count - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
-    return moved
-
-
-def _nose(face: Real) -> Real:
-    """Return how the nose moves when it is wrinkled, for all vertices of the face [shape=(N, 3)]."""
-    away = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
-    moved = np.zeros_like(face)
-    moved[:, 1] = np.exp(-away) * (face[:, 2] > -0.5)
-    return moved
-
-
-def jaw_weight(places: Real) -> Real:
-    """Return how far places at rest belong to the jaw, 0 to 1 [shape=(N,)]."""
-    down = _step((-0.47 - places[:, 1]) / 0.40)
-    front = _step((places[:, 2] + 0.98) / 0.45)
-    return down * front
-
-
-def jaw_moved(places: Real, drop: Any) -> Real:
+def move_jaw(places: Real, drop: Any) -> Real:
     """Return places turned with the jaw about its hinge, so that the chin drops by a length [shape=(..., N, 3)].
 
     drop : a number, or several [shape=(T, 1)]
@@ -275,7 +247,10 @@ def _fill(contour: Real, edges: Real) -> Real:
     u, v = SPACING * (i + 0.5 * (j % 2)).ravel(), SPACING * 0.866 * j.ravel()
     radius = np.hypot(u, v)
     u, v = u[radius < 1.72], v[radius < 1.72]
-    places = seen_from_middle(head, _directions(u, v))
+    radius = np.hypot(u, v)
+    angle = radius + 0.11 * radius**3  # on the map of the head, whose middle is the front; its rim is stretched
+    flat = np.sin(angle) / np.maximum(radius, 1e-9)
+    places = seen_from_middle(head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
     close = cKDTree(near3).query(places)[0] < 0.024
     inside = (np.abs(places[:, 0]) < 0.36) & _within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
     at_eye = cKDTree(edges).query(places)[0] < 0.02
@@ -285,42 +260,23 @@ def _fill(contour: Real, edges: Real) -> Real:
     return np.concatenate([near3, places[~(close | inside | at_eye)]])
 
 
-def _directions(u: Real, v: Real) -> Real:
-    """Return the directions of places of the map of the head, whose middle is the front [shape=(N, 3)]."""
-    radius = np.hypot(u, v)
-    angle = radius + 0.11 * radius**3
-    flat = np.sin(angle) / np.maximum(radius, 1e-9)
-    return np.stack([u * flat, v * flat, np.cos(angle)], axis=1)
-
-
-def _on_map(places: Real) -> Real:
-    """Return the place of places in space on the map of the head [shape=(N, 2)], without the stretching of its rim."""
-    away = places - MIDDLE
-    away = away / np.linalg.norm(away, axis=1, keepdims=True)
-    angle = np.arccos(np.clip(away[:, 2], -1, 1))
-    across = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
-    return away[:, :2] / across[:, None] * angle[:, None]
-
-
 def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
     """Return the triangles between the vertices of the face, none in mouth and eyes [shape=(F, 3)]."""
-    flat = _on_map(face)
-    found = Delaunay(flat).simplices
-    middle = flat[found].mean(axis=1)
-    hole = _within(middle, flat[:contour]) | _under_hair(face[found].mean(axis=1))
+    away = unit(face - MIDDLE)  # on the map of the head, without the stretching of its rim
+    across = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
+    flat = away[:, :2] / across[:, None] * np.arccos(np.clip(away[:, 2], -1, 1))[:, None]
+    triangles = Delaunay(flat).simplices
+    middle = flat[triangles].mean(axis=1)
+    x, y, z = face[triangles].mean(axis=1).T
+    under_hair = (y > 1.0 - 0.6 * np.maximum(np.abs(x) - 0.2, 0)) | ((y > 0.1) & (z < -0.75)) | (z < -1.2)
+    hole = _within(middle, flat[:contour]) | under_hair
     for eye in range(2):
         hole |= _within(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
-    found = found[~hole]
-    a, b, c = (flat[found[:, n]] for n in range(3))
+    triangles = triangles[~hole]
+    a, b, c = (flat[triangles[:, n]] for n in range(3))
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
-    found[turned] = found[turned][:, ::-1]
-    return found.astype(np.int32)
-
-
-def _under_hair(places: Real) -> NDArray[np.bool_]:
-    """Return which places of the head the hair always hides [shape=(N,)]."""
-    x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
-    return (y > 1.0 - 0.6 * np.maximum(x - 0.2, 0)) | ((y > 0.1) & (z < -0.75)) | (z < -1.2)
+    triangles[turned] = triangles[turned][:, ::-1]
+    return triangles.astype(np.int32)
 
 
 def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:
@@ -338,5 +294,4 @@ def _closed_grid(rows: Index) -> NDArray[np.int32]:
     """Return the triangles between successive closed rings of vertices [shape=(rings, columns)]; (F, 3)."""
     a, b = rows[:-1], rows[1:]
     c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
-    quads = np.stack([a, b, c, a, c, d], axis=-1)
-    return quads.reshape(-1, 3).astype(np.int32)
+    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3).astype(np.int32)

@@ -48,12 +48,8 @@ SIDED_MOOD_POSES = {
     "mouthFrown": CharacterPose(smile=-0.05),
 }
 """The poses of the shapes that moods need, instead of those above and beside them; other files do not have these."""
-_GAZES = {
-    "Out": (FULL_LOOK_RAD, 0.0),
-    "In": (-FULL_LOOK_RAD, 0.0),
-    "Up": (0.0, FULL_LOOK_RAD),
-    "Down": (0.0, -FULL_LOOK_RAD),
-}
+_GAZES = {"Out": (FULL_LOOK_RAD, 0.0), "In": (-FULL_LOOK_RAD, 0.0)}
+_GAZES |= {"Up": (0.0, FULL_LOOK_RAD), "Down": (0.0, -FULL_LOOK_RAD)}
 LEAST_DISPLACEMENT = 1e-5
 """Vertices that move less, in eye distances, are left out of a shape."""
 _HALF_WIDTH = 0.12
@@ -67,22 +63,25 @@ def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     moods : whether it has the shapes of moods, too
     ``mouthClose`` brings the lips together while the jaw is open: it is the difference from ``jawOpen``.
     """
-    rest = figure.placed(REST)[0]
-    shapes = []
-    for name, pose in (POSES | MOOD_POSES if moods else POSES).items():
-        start = figure.placed(POSES["jawOpen"])[0] if name == "mouthClose" else rest
-        shapes.append(Blendshape.between(name, start, figure.placed(pose)[0], least=LEAST_DISPLACEMENT))
+    rest = figure.place(REST)[0]
     left = np.clip(0.5 + rest[:, :1] / (2 * _HALF_WIDTH), 0, 1)
+    sides = (("Left", left, 1.0), ("Right", 1 - left, -1.0))
+    shapes: list[Blendshape] = []
+
+    def add(name: str, start: Real, end: Real) -> None:
+        shapes.append(Blendshape.between(name, start, end, least=LEAST_DISPLACEMENT))
+
+    for name, pose in (POSES | MOOD_POSES if moods else POSES).items():
+        start = figure.place(POSES["jawOpen"])[0] if name == "mouthClose" else rest
+        add(name, start, figure.place(pose)[0])
     for name, pose in (SIDED_POSES | SIDED_MOOD_POSES if moods else SIDED_POSES).items():
-        moved = figure.placed(pose)[0] - rest
-        for side, share in (("Left", left), ("Right", 1 - left)):
-            shapes.append(Blendshape.between(name + side, rest, rest + share * moved, least=LEAST_DISPLACEMENT))
+        moved = figure.place(pose)[0] - rest
+        for side, share, _ in sides:
+            add(name + side, rest, rest + share * moved)
     for name, (across, upwards) in _GAZES.items():
-        for side, share, outward in (("Left", left, 1.0), ("Right", 1 - left, -1.0)):
-            moved = figure.placed(CharacterPose(gaze=(outward * across, upwards)))[0] - rest
-            shapes.append(
-                Blendshape.between(f"eyeLook{name}{side}", rest, rest + share * moved, least=LEAST_DISPLACEMENT)
-            )
+        for side, share, outward in sides:
+            moved = figure.place(CharacterPose(gaze=(outward * across, upwards)))[0] - rest
+            add(f"eyeLook{name}{side}", rest, rest + share * moved)
     pieces = [(name, count, figure.parts[0]) for name, count in figure.skin.pieces.items()]
     pieces += [(each.name, len(each.triangles), each) for each in figure.parts[1:]]
     parts, first = [], 0

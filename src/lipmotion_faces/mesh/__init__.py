@@ -17,7 +17,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging, alive
+from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging, stage_liveliness
 from lipmotion_faces.mesh.stage import MeshStage
 
 __all__ = ["MeshFace", "MeshStage", "write_picture"]
@@ -39,7 +39,7 @@ class MeshPose(NamedTuple):
 class MeshFace(Face):
     """A character from a file, head and shoulders from the front.
 
-    character     : from ``driven_character``
+    character     : from ``load_character``
     width, height : of the pictures in pixels, even; a size of the staging counts instead, 16 to 9
     staging       : background, seed, and what moves on its own; None: the defaults
     prosody       : of the speech that will be rendered, for accents of brows and head; None: not known
@@ -75,7 +75,7 @@ class MeshFace(Face):
         if not 0 < fps < np.inf:
             raise InputError(f"the frame rate is {fps}, required more than 0")
         time_s = frame_times(len(motion.values), motion.rate_hz, fps)
-        moved = alive(time_s, with_mouth(motion), units, self.staging, self._prosody)
+        moved = stage_liveliness(time_s, with_mouth(motion), units, self.staging, self._prosody)
         rows = self._character.poses(motion, units, time_s, eye_and_brow_weights(moved))
         gaze = moved.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(moved.gaze)
         turns, looks = moved.turn.tolist(), gaze.tolist()
@@ -92,7 +92,7 @@ class MeshFace(Face):
             width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST_PX), self.staging.size
         stage = MeshStage(self._character, width, height, self.staging.colour)
         draw = stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
-        return lambda pose: draw(self._character.posed(pose.row), pose.turn, pose.look)
+        return lambda pose: draw(self._character.place_vertices(pose.row), pose.turn, pose.look)
 
 
 def write_picture(path: Path, character: DrivenCharacter) -> None:

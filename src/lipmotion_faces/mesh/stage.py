@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
-from lipmotion.meshes.model.single_sided import single_sided
-from lipmotion.meshes.model.surface import mesh_surface, normals_of
+from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat
 from lipmotion_faces.turning import turned
@@ -47,8 +46,8 @@ class MeshStage:
     def __init__(
         self, character: DrivenCharacter, width: int, height: int, colour: tuple[int, int, int] | None = None
     ) -> None:
-        mesh, placement = single_sided(character.mesh), character.placement
-        surface = mesh_surface(mesh)
+        mesh, placement = drop_back_sides(character.mesh), character.placement
+        surface = build_surface(mesh)
         corners = placement.vertices[[placement.row(RIGHT_CORNER), placement.row(LEFT_CORNER)]]
         self._centre = mesh.vertices[corners].mean(axis=0)
         self._turn = placement.axes / placement.scale
@@ -63,7 +62,9 @@ class MeshStage:
         self._canvas = TexturedCanvas(camera, self._drawn.triangles, None if colour is None else flat(camera, colour))
         self._joined, self._moving = surface.places, character.moving
         self._bent, self._bent_triangles, self._inside = self._affected(mesh.triangles)
-        normals = normals_of(self._of_places(self._rest), self._joined[mesh.triangles].astype(np.int32))[self._joined]
+        normals = compute_normals(self._of_places(self._rest), self._joined[mesh.triangles].astype(np.int32))[
+            self._joined
+        ]
         self._normals = normals
         self._share, self._pivot = self._following(character, face)
         self._eyes = [self._eye(bone) for bone in mesh.bones if bone.kind in (LEFT_EYE, RIGHT_EYE)]
@@ -98,7 +99,7 @@ class MeshStage:
         moved = np.zeros(len(places), bool)
         if len(self._moving):
             inside, rows = self._inside
-            normals[rows] = normals_of(self._of_places(places)[self._bent], self._bent_triangles)[inside]
+            normals[rows] = compute_normals(self._of_places(places)[self._bent], self._bent_triangles)[inside]
             moved[rows] = True
         if any(gaze):
             look = turned(*gaze).T

@@ -8,21 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.articulation.contact import in_pictures
-from lipmotion.articulation.delivery import closed_times
+from lipmotion.articulation.contact import sample_pictures
+from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
-from lipmotion.articulation.mouth import SpokenMouth, frame_times, mouth_at_rest, spoken_mouth
-from lipmotion.articulation.rest import beside_rest
-from lipmotion.meshes.files.gltf_animator import write_animated_gltf
-from lipmotion.meshes.files.gltf_writer import write_gltf_scene
-from lipmotion.meshes.files.usd_text import asset
-from lipmotion.meshes.files.usd_writer import write_usda
+from lipmotion.articulation.mouth import SpokenMouth, frame_times, measure_mouth_at_rest, spoken_mouth
+from lipmotion.articulation.rest import add_rest
+from lipmotion.meshes.files.gltf_writer import write_animated_gltf, write_gltf_scene
+from lipmotion.meshes.files.usd_writer import asset, write_usda
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
-from lipmotion.meshes.fitting.living_curves import living_curves
-from lipmotion.meshes.model.head_angles import head_quaternions
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
+from lipmotion.meshes.model.bones import head_quaternions
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
@@ -33,7 +30,7 @@ from lipmotion.pipeline.outputs.prosody import recorded_prosody
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
 from lipmotion.types.motion import WEIGHT
-from lipmotion_faces.base import Staging, alive
+from lipmotion_faces.base import Staging, stage_liveliness
 from lipmotion_faces.outputs.drawn_video import check_drawable
 
 GLTF, USD = ".glb", ".usda"
@@ -72,14 +69,14 @@ def delivered_scene(performance: Performance, frames: slice | None = None) -> Sc
     moved = with_drawn_channels(delivered(performance.generation, delivery))
     part = None if delivery.hold_ms else frames
     scene = settings.face.scene(moved, settings, performance.cached(recorded_prosody), part)
-    thinning = Thinning(delivery.key_tolerance, tuple(closed_times(moved)) if delivery.key_tolerance else ())
+    thinning = Thinning(delivery.key_tolerance, tuple(find_closed_times(moved)) if delivery.key_tolerance else ())
     scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
     weights = scene.weights
     if weights is None or not delivery.hold_ms:
         return scene
     states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
     whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
-    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), closed_times(moved))
+    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
     return replace(scene, weights=steps.motion, stepped=steps.stepped)
 
 
@@ -130,7 +127,7 @@ def head_scene(
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
     from lipmotion_faces.head.figure import PIVOT
-    from lipmotion_faces.head.performance import posed
+    from lipmotion_faces.head.pose import pose_head
     from lipmotion_faces.head.shape_fit import mouth_weights
     from lipmotion_faces.head.stage import figure, mesh_of_figure
 
@@ -138,8 +135,8 @@ def head_scene(
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
     around, kept = _around(frames, MARGIN)
     mouth = spoken_mouth(motion, units, hertz) if frames is None else _mouth_in(motion, units, around)
-    moved = alive(times_s[around], motion, units, staging, prosody)
-    poses = posed(mouth, moved)
+    moved = stage_liveliness(times_s[around], motion, units, staging, prosody)
+    poses = pose_head(mouth, moved)
     character, mesh = (
         figure(),
         mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
@@ -170,7 +167,7 @@ def _mouth_in(motion: Motion, units: Timeline[Unit], frames: slice) -> SpokenMou
     around, kept = _around(frames, MOUTH_MARGIN)
     part, rate_hz = replace(motion, values=motion.values[around]), motion.rate_hz
     there = units.between(around.start / rate_hz, (around.start + len(part.values)) / rate_hz)
-    return spoken_mouth(part, there, at_rest=mouth_at_rest(motion, units)).within(kept)
+    return spoken_mouth(part, there, at_rest=measure_mouth_at_rest(motion, units)).within(kept)
 
 
 def character_scene(
@@ -192,22 +189,24 @@ def character_scene(
     motion, units, rate = generation.motion, generation.units, generation.motion.rate_hz
     around, kept = _around(frames, MOUTH_MARGIN)
     is_part = frames is not None and (around.start > 0 or around.stop < len(motion.values))
-    part, said, there = beside_rest(motion, units, around) if is_part else (motion, units, slice(None))
+    part, said, there = add_rest(motion, units, around) if is_part else (motion, units, slice(None))
     solved, mouth = character.weights(part, said), spoken_mouth(with_mouth(part), said)
     table = np.zeros((len(motion.values), len(solved.names)))
     table[around] = solved.values[there]
     known = known_names(character.mesh)
     weights = edited_weights(replace(solved, values=table), units, generation.curve_edits, known)
-    living = living_curves(with_mouth(motion), units, staging, prosody, around)
+    living = compute_living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
     beside = {
-        name: curve for name, curve in character.beside(others, len(living.values)).items() if name not in weights.names
+        name: curve
+        for name, curve in character.weigh_others(others, len(living.values)).items()
+        if name not in weights.names
     }
     beside |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
     rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in beside.values())], axis=1)
     channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
     hertz = rate if frames is not None else rate_hz or rate
-    shown = in_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
+    shown = sample_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
     return Scene(character.mesh, Motion(shown[kept], hertz, channels), original=character.file)
 
 

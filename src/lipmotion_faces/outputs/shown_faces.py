@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lipmotion.articulation.cue_sheets import shown_shapes
+from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
@@ -25,7 +25,7 @@ from lipmotion_faces.film.filmed_video import (
     RENDERING,
     Film,
     check_film,
-    film_of,
+    make_film,
     person_shown,
     refuse_film,
     write_film,
@@ -133,7 +133,7 @@ class ShownCutOut(_WithHead):
         settings, generation, fps = performance.settings, performance.generation, _frame_rate(performance.settings)
         sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
         count = frame_count(generation, fps)
-        shown = shown_shapes(sheet)[:count]
+        shown = list_frame_shapes(sheet)[:count]
         frames = self.face.frames([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
         sound = performance.cached(sound_track)
         write_frames(path, with_reports(frames, count, RENDERING, performance.monitor), fps, sound)
@@ -169,7 +169,7 @@ class ShownPerson(_WithHead):
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
-        """Log a warning where tags in the words ask for a mood; ``film_of`` names the channels that the face needs."""
+        """Log a warning where tags in the words ask for a mood; ``make_film`` names the channels that are needed."""
         asked = [key.label for key in generation.moods if key.mood in MOODS]
         if asked:
             LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
@@ -182,7 +182,7 @@ class ShownPerson(_WithHead):
     def film(self, performance: Performance) -> Film:
         """Return the video, which is made while it is read. Raises InputError: the motion lacks channels."""
         settings, seen = performance.settings, performance.cached(_seen)
-        return film_of(
+        return make_film(
             self.face,
             seen.motion,
             speech=settings.recording,

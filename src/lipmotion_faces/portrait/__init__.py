@@ -1,9 +1,9 @@
 """Drawn characters: flat portraits whose mouths are drawn from the motion. They need numpy and Pillow only.
 
-The stages of a frame: ``pose`` (motion and phones → numbers) and ``expression`` (voice → blinks, glances, head) →
-``geometry`` (numbers → outlines) → ``mouth`` (outlines → pixels, with ``textures``) → ``rasteriser`` (pixels →
-picture, moved by ``movement``). The still parts are painted once, by ``surroundings``, ``head`` and ``eyes`` on a
-``layer``. ``planar`` draws the same for the encoder of a video.
+The stages of a frame: ``face_poses`` (motion, phones and voice → numbers) → ``geometry`` (numbers → outlines) →
+``mouth_painting`` (outlines → pixels) → ``portrait_rasteriser`` (pixels → picture, moved by ``movement``). The still
+parts are painted once, by ``still_parts`` and ``eyes`` on a ``layer``. ``planar`` draws the same for the encoder of a
+video.
 A character is a ``design``: ``woman``, ``man``, ``cartoon``.
 """
 
@@ -56,32 +56,31 @@ class DrawnFace(Face):
         return iter(self.drawn(motion, units, fps=fps))
 
     def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[FacePose]:  # noqa: D102
-        from lipmotion_faces.portrait.drawn_frames import face_poses
+        from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 
         poses = face_poses(motion, units, fps, self.staging, self.prosody)
         return DrawnMotion(poses, lambda: self._painter)
 
     @cached_property
     def _painter(self) -> Callable[[FacePose], NDArray[np.uint8]]:
-        from lipmotion_faces.portrait.drawn_frames import painter
-        from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser
+        from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser, make_painter
 
         chosen = self.staging
         background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
-        return painter(Rasteriser(self.design, chosen.size or OWN_SIZE, background))
+        return make_painter(Rasteriser(self.design, chosen.size or OWN_SIZE, background))
 
     def render_planes(  # noqa: D102
         self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
     ) -> Iterator[NDArray[np.uint8]] | None:
-        from lipmotion_faces.portrait.drawn_frames import face_poses, painter
         from lipmotion_faces.portrait.planar import PlanarRasteriser
+        from lipmotion_faces.portrait.portrait_rasteriser import face_poses, make_painter
 
         chosen = self.staging
         if chosen.background == TRANSPARENT:
             return None
         poses = face_poses(motion, units, fps, chosen, self.prosody)
         background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE
-        return iter(DrawnMotion(poses, lambda: painter(PlanarRasteriser(self.design, size, background))))
+        return iter(DrawnMotion(poses, lambda: make_painter(PlanarRasteriser(self.design, size, background))))
 
 
 @final

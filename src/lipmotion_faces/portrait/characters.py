@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from lipmotion_faces.portrait.design import Design, EyeDesign, LipDesign, Lock, Palette
-from lipmotion_faces.portrait.outlines import closed_curve, symmetric
+from lipmotion_faces.portrait.design import Design, EyeDesign, LipDesign, Lock, Palette, closed_curve, mirror_curve
 
 MAN = Design(
     palette=Palette(
@@ -59,7 +58,7 @@ MAN = Design(
     ),
     ear="0.72 0.0, 0.82 -0.08, 0.91 -0.01, 0.905 0.2, 0.85 0.4, 0.79 0.5, 0.72 0.42",
     ear_hollow="0.785 0.05, 0.84 0.0, 0.866 0.07, 0.856 0.19, 0.81 0.32, 0.785 0.22",
-    cap=symmetric("0 -1.1, 0.5 -1.02, 0.8 -0.7, 0.845 -0.3, 0.825 0.02, 0.76 0.12, 0.4 0.2, 0 0.2"),
+    cap=mirror_curve("0 -1.1, 0.5 -1.02, 0.8 -0.7, 0.845 -0.3, 0.825 0.02, 0.76 0.12, 0.4 0.2, 0 0.2"),
     hair=(
         Lock(
             closed_curve(
@@ -161,7 +160,7 @@ WOMAN = Design(
         "-0.58 1.66, -0.9 1.74, -1.3 1.86, -1.62 2.1, -1.7 2.6, 1.7 2.6, 1.62 2.1, 1.3 1.86, 0.9 1.74, 0.58 1.66,"
         "0.42 1.85, 0.2 2, 0 2.04, -0.2 2, -0.42 1.85"
     ),
-    hair_behind=symmetric(
+    hair_behind=mirror_curve(
         "0 -1.06, 0.5 -0.98, 0.83 -0.62, 0.92 -0.1, 0.93 0.4, 0.99 0.9, 1.08 1.35, 1 1.7, 0.7 1.9, 0.3 1.85, 0 1.8"
     ),
     hair=(

@@ -6,12 +6,86 @@ smooth curve goes through (``outlines``).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from lipmotion_faces.portrait.outlines import Path, Points, symmetric
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+Path = str | Sequence[tuple[float, float]]
+
+STEPS = 16
+"""Points drawn for each Bézier curve."""
+
+
+def path_points(path: Path) -> Points:
+    """Return the points of a path [shape=(N, 2)]: the corners of a polygon."""
+    pairs = [pair.split() for pair in path.split(",")] if isinstance(path, str) else path
+    return np.array(pairs, dtype=np.float64)
+
+
+def closed_curve(path: Path) -> Points:
+    """Return the smooth closed curve through the points of a path."""
+    start = path_points(path)
+    before, end, beyond = (np.roll(start, shift, axis=0) for shift in (1, -1, -2))
+    return _chain(start, before, end, beyond)
+
+
+def open_curve(path: Path) -> Points:
+    """Return the smooth curve through the points of a path, from the first to the last."""
+    points = path_points(path)
+    before = np.vstack([2 * points[0] - points[1], points[:-2]])
+    beyond = np.vstack([points[2:], 2 * points[-1] - points[-2]])
+    return np.vstack([_chain(points[:-1], before, points[1:], beyond), points[-1:]])
+
+
+def mirror_curve(path: Path) -> Points:
+    """Return the smooth closed curve through a path down the right side and its mirror image.
+
+    The path begins and ends on the axis x = 0.
+    """
+    right = path_points(path)
+    return closed_curve([(x, y) for x, y in np.vstack([right, both_sides(right)[1][-2:0:-1]]).tolist()])
+
+
+def stroke(line: Points, widths: Sequence[float]) -> Points:
+    """Return the outline of a stroke along a line [shape=(N, 2)], with ``widths`` at even distances along it."""
+    along = np.gradient(line, axis=0)
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    share = np.linspace(0, len(widths) - 1, len(line))
+    half = np.interp(share, np.arange(len(widths)), np.asarray(widths) / 2)[:, None]
+    return np.vstack([line + half * normal, (line - half * normal)[::-1]])
+
+
+def ellipse(x: float, y: float, radius_x: float, radius_y: float) -> Points:
+    """Return an ellipse about (x, y)."""
+    angle = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    return np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
+
+
+def both_sides(right: Points) -> tuple[Points, Points]:
+    """Return an outline and its mirror image on the other side of the face."""
+    return right, right * np.array([-1.0, 1.0])
+
+
+def move_down(points: Points, distance: float) -> Points:
+    """Return the outline moved down by a distance."""
+    return points + np.array([0.0, distance])
+
+
+def _chain(start: Points, before: Points, end: Points, beyond: Points) -> Points:
+    """Return Bézier curves from every ``start`` to its ``end``, with the tangents of Catmull and Rom 1974."""
+    t = np.linspace(0, 1, STEPS, endpoint=False)[None, :, None]
+    first, second = start + (end - before) / 6, end - (beyond - start) / 6
+    p0, p1, p2, p3 = (p[:, None, :] for p in (start, first, second, end))
+    curve = (1 - t) ** 3 * p0 + 3 * (1 - t) ** 2 * t * p1 + 3 * (1 - t) * t**2 * p2 + t**3 * p3
+    return np.asarray(curve.reshape(-1, 2))
+
 
 Colour = tuple[int, int, int]
-
+Knots = tuple[tuple[float, float], ...]
+"""Points of the edge of a lid of the right eye, from the inner to the outer corner."""
 WHITE: Colour = (255, 255, 255)
 
 
@@ -94,20 +168,8 @@ class EyeDesign:
     x: float = 0.345
     y: float = -0.014
     iris: float = 0.1
-    upper: tuple[tuple[float, float], ...] = (
-        (0.175, 0.03),
-        (0.245, -0.053),
-        (0.35, -0.093),
-        (0.455, -0.073),
-        (0.51, -0.012),
-    )
-    lower: tuple[tuple[float, float], ...] = (
-        (0.175, 0.03),
-        (0.26, 0.062),
-        (0.37, 0.071),
-        (0.465, 0.04),
-        (0.51, -0.012),
-    )
+    upper: Knots = ((0.175, 0.03), (0.245, -0.053), (0.35, -0.093), (0.455, -0.073), (0.51, -0.012))
+    lower: Knots = ((0.175, 0.03), (0.26, 0.062), (0.37, 0.071), (0.465, 0.04), (0.51, -0.012))
     lashes: float = 1.0
     brow: Path = "0.155 -0.262, 0.28 -0.288, 0.42 -0.296, 0.575 -0.25"
     brow_widths: tuple[float, ...] = (0.014, 0.038, 0.044, 0.034, 0.006)
@@ -170,4 +232,4 @@ class Design:
     @property
     def skull(self) -> Points:
         """The outline of the bald head."""
-        return symmetric(self.head)
+        return mirror_curve(self.head)

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion_faces.kernels.painting import warp
-from lipmotion_faces.portrait.design import WHITE, Design
-from lipmotion_faces.portrait.layer import Glow, Layer, Rim
-from lipmotion_faces.portrait.outlines import Points, ellipse, mirrored, open_curve, stroke
-from lipmotion_faces.portrait.view import Pixels, Window
+from lipmotion_faces.portrait.design import WHITE, Design, Knots, Points, ellipse, open_curve, stroke
+from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, Window
 
 LID_POSITIONS = 16
 MOOD_LIDS = 8
@@ -25,8 +23,6 @@ CHEEK_SQUINT = 0.8
 """Raised cheeks narrow the eyes by this part."""
 GAZE_STEPS = 8
 """Positions of the gaze in a pixel."""
-Knots = tuple[tuple[float, float], ...]
-"""Points of the edge of a lid of the right eye, from the inner to the outer corner."""
 
 
 class LidPose(NamedTuple):
@@ -77,10 +73,10 @@ class EyePainter:
             layer.fill(ellipse(x - 0.3 * r, y - 0.32 * r, 0.22 * r, 0.22 * r), WHITE, opacity=0.95)
             layer.fill(ellipse(x + 0.32 * r, y + 0.34 * r, 0.11 * r, 0.11 * r), WHITE, opacity=0.6)
         self.iris = layer.pixels
-        self.lids = lru_cache(maxsize=2 * LID_POSITIONS)(self._painted_lids)
-        self._cached = lru_cache(maxsize=128)(self._painted)
+        self.lids = lru_cache(maxsize=2 * LID_POSITIONS)(self._paint_lids)
+        self._cached = lru_cache(maxsize=128)(self._paint)
 
-    def painted(self, shut: float, gaze_x: float, gaze_y: float, mood: UpperFace = CALM) -> Pixels:
+    def paint(self, shut: float, gaze_x: float, gaze_y: float, mood: UpperFace = CALM) -> Pixels:
         """Return the eyes, premultiplied colour and cover [shape=(h, w, 4)]; not to be changed.
 
         shut           : how far they are closed, 0..1
@@ -89,45 +85,70 @@ class EyePainter:
         step = self._window.view.scale * GAZE_STEPS
         return self._cached(lid_pose(shut, mood), round(gaze_x * step), round(gaze_y * step))
 
-    def _painted(self, lids: LidPose, gaze_x: int, gaze_y: int) -> Pixels:
+    def _paint(self, lids: LidPose, gaze_x: int, gaze_y: int) -> Pixels:
         under, almond, over = self.lids(lids)
         iris = np.empty_like(self.iris)
         grid = np.ones((2, 2))
-        step = max(iris.shape[:2])
-        warp(self.iris, -gaze_x / GAZE_STEPS * grid, -gaze_y / GAZE_STEPS * grid, step, iris)
+        warp(self.iris, -gaze_x / GAZE_STEPS * grid, -gaze_y / GAZE_STEPS * grid, max(iris.shape[:2]), iris)
         iris *= almond[..., None]
-        picture = iris + (1 - iris[..., 3:]) * under
-        return over + (1 - over[..., 3:]) * picture
+        return over + (1 - over[..., 3:]) * (iris + (1 - iris[..., 3:]) * under)
 
-    def _painted_lids(self, lids: LidPose) -> tuple[Pixels, NDArray[np.float32], Pixels]:
+    def _paint_lids(self, lids: LidPose) -> tuple[Pixels, NDArray[np.float32], Pixels]:
         """Return what is under the irises, the openings between the lids, and what is over the irises."""
-        shut, design, colours = lids.shut / LID_POSITIONS, self._design, self._design.palette
-        upper, lower = _lids(design, lids)
+        shut, design = lids.shut / LID_POSITIONS, self._design
+        colours, eyes, flat = design.palette, design.eyes, design.flat
+        upper, lower = _lid_edges(design, lids)
+        highest = tuple(min(pair, key=lambda knot: knot[1]) for pair in zip(eyes.upper, upper, strict=True))
         under, almond, over = Layer(self._window), Layer(self._window), Layer(self._window)
         for side in (1, -1):
-            whole, opening, bottom = _almonds(design, upper, lower, side)
-            light = Glow(side * design.eyes.x, 0.0, 0.1, 0.05, colours.skin_light, 0.5)
-            soft = () if design.flat else (Rim(0.03, colours.skin_shade, 0.6), light)
+            flip, x = np.array([side, 1.0]), side * eyes.x
+            top, bottom = open_curve(upper) * flip, open_curve(lower) * flip
+            whole = np.vstack([open_curve(highest) * flip, (open_curve(eyes.lower) * flip)[::-1]])
+            opening = np.vstack([top, bottom[::-1]])
+            soft: tuple[Rim | Glow, ...] = ()
+            ball: tuple[Rim | Glow, ...] = ()
+            if not flat:
+                soft = Rim(0.03, colours.skin_shade, 0.6), Glow(x, 0.0, 0.1, 0.05, colours.skin_light, 0.5)
+                ball = Glow(x, -0.13, 0.2, 0.06, colours.eye_shade, 0.75), Rim(0.015, colours.skin_deep, 0.25)
             under.fill(whole, colours.skin, *soft)
             if shut < 0.92:
-                x = side * design.eyes.x
-                lid_shade = Glow(x, -0.13, 0.2, 0.06, colours.eye_shade, 0.75)
-                ball = () if design.flat else (lid_shade, Rim(0.015, colours.skin_deep, 0.25))
                 under.fill(opening, colours.eye_white, *ball)
-                if not design.flat:
+                almond.fill(opening, WHITE)
+                if not flat:
                     corner = ellipse(side * 0.2, 0.028, 0.022, 0.016)
                     under.fill(corner, colours.eye_corner, within=opening, blur=0.004)
                     over.fill(ellipse(x, -0.12, 0.12, 0.05), colours.pupil, opacity=0.3, blur=0.02, within=opening)
-                almond.fill(opening, WHITE)
-            if not design.flat:
+            if not flat:
                 over.fill(stroke(bottom, [0.004, 0.01, 0.014, 0.012]), colours.skin_deep, opacity=0.5, blur=0.004)
-            _crease(over, design, shut, side)
-            _lashes(over, design, upper, lower, side)
-            _furrows(over, design, lids, side)
+                ends = (*eyes.upper[1:-1], (eyes.upper[-1][0] + 0.02, -0.01))
+                fold = open_curve([(x, min(y, -0.02) - 0.045 + 0.03 * shut) for x, y in ends]) * flip
+                over.fill(stroke(fold, [0, 0.014, 0.012, 0]), colours.skin_deep, opacity=0.55, blur=0.006)
+            widths = [eyes.lashes * width for width in (0.012, 0.03, 0.036, 0.034, 0.02)]
+            over.fill(stroke(top, widths), colours.lashes)
+            if flat:
+                over.fill(stroke(bottom, [0.01] * 3), colours.lashes)
+            elif eyes.lashes > 0.5:
+                x, y = upper[-1]
+                root_y = y + 0.35 * (upper[-2][1] - y)
+                wing = open_curve([(x - 0.03, root_y), (x + 0.015, y - 0.012), (x + 0.046, y - 0.04)])
+                over.fill(stroke(wing, [0.03, 0.02, 0]) * flip, colours.lashes)
+            self._paint_furrows(over, lids, flip)
         return under.pixels, almond.pixels[..., 3], over.pixels
 
+    def _paint_furrows(self, layer: Layer, lids: LidPose, flip: Points) -> None:
+        """Paint the furrow beside the middle of lowered brows, and the wrinkles of the nose."""
+        colours, flat = self._design.palette, self._design.flat
+        colour, soft = (colours.line, 0.0) if flat else (colours.skin_deep, 0.006)
+        if lids.furrow:
+            line = stroke(open_curve([(0.05, -0.215), (0.042, -0.15), (0.055, -0.085)]), [0.0, 0.02, 0.0])
+            layer.fill(line * flip, colour, opacity=0.75 * lids.furrow / MOOD_LIDS, blur=soft)
+        if lids.sneer:
+            for y in (-0.02, 0.045, 0.11):
+                line = stroke(open_curve([(0.015, y), (0.06, y + 0.012), (0.105, y + 0.045)]), [0.008, 0.018, 0.0])
+                layer.fill(line * flip, colour, opacity=0.65 * lids.sneer / MOOD_LIDS, blur=soft)
 
-def _lids(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
+
+def _lid_edges(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
     """Return the edges of the upper and the lower lid of the right eye."""
     shut, (wide, squint, slant, *_) = lids.shut / LID_POSITIONS, (steps / MOOD_LIDS for steps in lids[1:])
     upper, lower = design.eyes.upper, design.eyes.lower
@@ -141,48 +162,3 @@ def _lids(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
         upper = tuple((x, y + by) for (x, y), by in zip(upper, moved, strict=True))
         lower = tuple((x, y - SQUINT_RISE * squint * share) for (x, y), share in zip(lower, bow, strict=True))
     return tuple((x, y + shut * (low - y)) for (x, y), (_, low) in zip(upper, lower, strict=True)), lower
-
-
-def _on(side: int, curve: Points) -> Points:
-    return curve if side == 1 else mirrored(curve)
-
-
-def _almonds(design: Design, upper: Knots, lower: Knots, side: int) -> tuple[Points, Points, Points]:
-    """Return the outlines of the whole eye and of its opening, and the lower lid."""
-    top, bottom = _on(side, open_curve(upper)), _on(side, open_curve(lower))
-    highest = tuple(min(pair, key=lambda knot: knot[1]) for pair in zip(design.eyes.upper, upper, strict=True))
-    whole = np.vstack([_on(side, open_curve(highest)), _on(side, open_curve(design.eyes.lower))[::-1]])
-    return whole, np.vstack([top, bottom[::-1]]), bottom
-
-
-def _crease(layer: Layer, design: Design, shut: float, side: int) -> None:
-    if not design.flat:
-        upper = design.eyes.upper
-        fold = [(x, min(y, -0.02) - 0.045 + 0.03 * shut) for x, y in (*upper[1:-1], (upper[-1][0] + 0.02, -0.01))]
-        crease = stroke(_on(side, open_curve(fold)), [0, 0.014, 0.012, 0])
-        layer.fill(crease, design.palette.skin_deep, opacity=0.55, blur=0.006)
-
-
-def _furrows(layer: Layer, design: Design, lids: LidPose, side: int) -> None:
-    """Paint the furrow beside the middle of lowered brows, and the wrinkles of the nose."""
-    colour, soft = (design.palette.line, 0.0) if design.flat else (design.palette.skin_deep, 0.006)
-    if lids.furrow:
-        line = stroke(open_curve([(0.05, -0.215), (0.042, -0.15), (0.055, -0.085)]), [0.0, 0.02, 0.0])
-        layer.fill(_on(side, line), colour, opacity=0.75 * lids.furrow / MOOD_LIDS, blur=soft)
-    if lids.sneer:
-        for y in (-0.02, 0.045, 0.11):
-            line = stroke(open_curve([(0.015, y), (0.06, y + 0.012), (0.105, y + 0.045)]), [0.008, 0.018, 0.0])
-            layer.fill(_on(side, line), colour, opacity=0.65 * lids.sneer / MOOD_LIDS, blur=soft)
-
-
-def _lashes(layer: Layer, design: Design, lid: Knots, lower: Knots, side: int) -> None:
-    strength, colour = design.eyes.lashes, design.palette.lashes
-    widths = [strength * width for width in (0.012, 0.03, 0.036, 0.034, 0.02)]
-    layer.fill(stroke(_on(side, open_curve(lid)), widths), colour)
-    if design.flat:
-        layer.fill(stroke(_on(side, open_curve(lower)), [0.01] * 3), colour)
-    if strength > 0.5 and not design.flat:
-        x, y = lid[-1]
-        root_y = y + 0.35 * (lid[-2][1] - y)
-        wing = open_curve([(x - 0.03, root_y), (x + 0.015, y - 0.012), (x + 0.046, y - 0.04)])
-        layer.fill(_on(side, stroke(wing, [0.03, 0.02, 0])), colour)

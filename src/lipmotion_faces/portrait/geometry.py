@@ -1,4 +1,4 @@
-"""Outlines of the mouth for one pose, as heights over columns.
+"""The pose of a drawn mouth in one frame, and its outlines as heights over columns.
 
 Every outline is a function y(x), constructed outwards from the line where the lips meet, so that outlines
 cannot cross: lips enclose the opening, teeth and tongue stay inside it. Unit: eye distances, y downwards.
@@ -7,14 +7,13 @@ cannot cross: lips enclose the opening, teeth and tongue stay inside it. Unit: e
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.mouth import upper_share
-from lipmotion_faces.portrait.design import LipDesign
-from lipmotion_faces.portrait.outlines import open_curve
-from lipmotion_faces.portrait.pose import MouthPose
+from lipmotion_faces.portrait.design import LipDesign, open_curve
 
 Heights = NDArray[np.float64]
 
@@ -34,6 +33,37 @@ _LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
 _CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
 _LOWER = [(0, 1), (0.25, 0.975), (0.5, 0.855), (0.72, 0.61), (0.89, 0.29), (1, 0)]
 _CURVES = {name: open_curve(knots).T for name, knots in (("line", _LINE), ("upper", _CUPIDS_BOW), ("lower", _LOWER))}
+
+
+class MouthPose(NamedTuple):
+    """The mouth in one frame, as ``articulation.mouth.SpokenMouth`` has it.
+
+    gap      : distance of the inner lips, in eye distances; 0: they touch
+    width    : distance of the lip corners relative to the rest pose
+    fullness : thickness of the lips relative to the rest pose
+    jaw      : drop of the chin, in eye distances
+    tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0..1 (docs/articulation.md)
+    oval     : how far the opening is an oval: corners halfway down, round above and below, 0..1
+    smile, frown, stretched, upper_raise, chin_raise, tight : of a mood, 0..1
+    """
+
+    gap: float
+    width: float = 1.0
+    fullness: float = 1.0
+    jaw: float = 0.0
+    tongue: float = 0.0
+    tuck: float = 0.0
+    protrusion: float = 0.0
+    spread: float = 0.0
+    press: float = 0.0
+    teeth: float = 0.5
+    oval: float = 0.0
+    smile: float = 0.0
+    frown: float = 0.0
+    stretched: float = 0.0
+    upper_raise: float = 0.0
+    chin_raise: float = 0.0
+    tight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +113,17 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     sag += out * (0.5 * (drop - rise) + 0.004 - sag)
     sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
-    smile = lips.smile * (1 - out) * (1 - pose.oval) * (1 - pose.tuck) * calm_share(pose)
+    calm = (1 - 0.6 * min(pose.gap / 0.05, 1)) * (1 - 0.5 * pose.press)  # the smile fades as lips part or press
+    smile = lips.smile * (1 - out) * (1 - pose.oval) * (1 - pose.tuck) * calm
     smile *= 1 - max(pose.frown, pose.stretched, pose.upper_raise, 0.8 * pose.tight)
     smile += (FROWN_FALL * pose.frown + 0.3 * FROWN_FALL * pose.stretched - SMILE_RISE * pose.smile) * (1 - 0.7 * out)
-    line = middle + (1 - 0.7 * out) * _on("line", u) + smile * u * u + bend
-    inner_share = _inner_share(pose, half_width)
+    line = middle + (1 - 0.7 * out) * np.interp(u, *_CURVES["line"]) + smile * u * u + bend
+    # the lips are apart along a share of the width that grows with the gap; the hole of protruded lips is round, that
+    # above a tucked lip is as wide as the teeth that show in it
+    inner_share = min(0.72 + 0.2 * min(pose.gap / 0.12, 1) + 0.1 * wide * min(pose.gap / 0.05, 1), 0.95)
+    inner_share += pose.tuck * (0.64 - inner_share)
+    hole = _round_hole(pose) / half_width
+    inner_share = float(inner_share + min(out / 0.85, 1) * (min(hole, inner_share) - inner_share))
     inner = u / inner_share
     open_share = min(pose.gap / 0.05, 1)
     free = wide * (1 - pose.tuck)
@@ -100,6 +136,9 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.16 * out - 0.16 * wide * (1 - pose.tuck))
     lower = max(lower, TUCKED_LIP * pose.tuck)
     follow = 0.85 * (1 - 0.35 * out)
+    # beside a round hole the line where the lips touch fades towards the corners
+    beyond = np.clip((u - inner_share) / (0.08 * (1 - inner_share)), 0, 1)
+    thick = 1 - min(out / 0.7, 1) * min(pose.gap / 0.03, 1) * (0.6 + 0.4 * beyond**0.5)
     return LipOutlines(
         half_width=half_width,
         inner_half_width=half_width * inner_share,
@@ -110,7 +149,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
         lower_outer=np.maximum(
             line + drop * _arch(u, 0.62 - 0.15 * wide) + lower * _thickness("lower", u, out), lower_inner
         ),
-        seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press) * _seam_beside(pose, u, inner_share),
+        seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press) * thick,
     )
 
 
@@ -151,47 +190,20 @@ def _round_hole(pose: MouthPose) -> float:
     return ROUND_HOLE[0] + ROUND_HOLE[1] * pose.gap
 
 
-def calm_share(pose: MouthPose) -> float:
-    """Return how far the smile of the rest pose is there, 0..1: it fades as lips part or press."""
-    return (1 - 0.6 * min(pose.gap / 0.05, 1)) * (1 - 0.5 * pose.press)
-
-
 def far_open(pose: MouthPose) -> float:
     """Return how far a mouth is open so wide that its upper teeth are seen whatever the sound, 0..1."""
     return min(max((pose.gap - 0.06 - 0.05 * pose.protrusion) / 0.05, 0), 1)
 
 
-def _on(curve: str, u: Heights) -> Heights:
-    return np.interp(u, *_CURVES[curve])
-
-
 def _thickness(lip: str, u: Heights, out: float) -> Heights:
     """Return the thickness of a lip along its half width; rounded lips stay thick towards their corners."""
     round_ = min(1.15 * out, 1)
-    return (1 - round_) * _on(lip, u) + round_ * _arch(u, 0.5)
+    return (1 - round_) * np.interp(u, *_CURVES[lip]) + round_ * _arch(u, 0.5)
 
 
 def _arch(u: Heights, power: float) -> Heights:
     """Return an arch over -1 <= u <= 1: 1 in the middle, 0 at the ends and beyond."""
     return np.maximum(1 - u * u, 0) ** power
-
-
-def _inner_share(pose: MouthPose, half_width: float) -> float:
-    """Return the share of the mouth's width along which the lips are apart; it grows with the gap.
-
-    The hole of protruded lips is round, that above a tucked lip is as wide as the teeth that show in it.
-    """
-    gap, wide = pose.gap, pose.spread
-    share = min(0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1), 0.95)
-    share += pose.tuck * (0.64 - share)
-    hole = _round_hole(pose) / half_width
-    return float(share + min(pose.protrusion / 0.85, 1) * (min(hole, share) - share))
-
-
-def _seam_beside(pose: MouthPose, u: Heights, inner_share: float) -> Heights:
-    """Return how thick the line is where the lips touch beside a round hole, 0..1: it fades towards the corners."""
-    beyond = np.clip((u - inner_share) / (0.08 * (1 - inner_share)), 0, 1)
-    return 1 - min(pose.protrusion / 0.7, 1) * min(pose.gap / 0.03, 1) * (0.6 + 0.4 * beyond**0.5)
 
 
 def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:

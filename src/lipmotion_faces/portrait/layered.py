@@ -15,27 +15,23 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.kernels.painting import warp_bytes
-from lipmotion_faces.portrait.drawn_frames import face_poses
-from lipmotion_faces.portrait.movement import PIVOT_Y, HeadPlacement
-from lipmotion_faces.portrait.portrait_rasteriser import FacePose
-from lipmotion_faces.portrait.pose import MouthPose
+from lipmotion_faces.portrait.geometry import MouthPose
+from lipmotion_faces.portrait.layer import lay_over
+from lipmotion_faces.portrait.movement import PIVOT_Y
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose, face_poses
 from lipmotion_faces.portrait.svg_document import Drawing, Shape, read_drawing
 
 Pixels = NDArray[np.float32]
 """Premultiplied colour 0..255 and cover 0..1 [shape=(H, W, 4)]."""
+Placed = tuple[Shape, tuple[float, float]]
+"""A shape, and how far it is moved to the right and down, in pixels."""
 Lines = Sequence[tuple[NDArray[np.float64], bool]]
 """Points in pixels [shape=(N, 2)], and whether each line returns to its beginning."""
 SUPERSAMPLING = 3
 
 
-def painted(
-    shapes: Sequence[tuple[Shape, tuple[float, float]]], to_pixels: NDArray[np.float64], width: int, height: int
-) -> Pixels:
-    """Return shapes from back to front on nothing.
-
-    shapes    : with how far each is moved to the right and down, in pixels
-    to_pixels : from the units of the drawing [shape=(2, 3)]
-    """
+def paint_shapes(shapes: Sequence[Placed], to_pixels: NDArray[np.float64], width: int, height: int) -> Pixels:
+    """Return shapes from back to front on nothing; ``to_pixels``: from the units of the drawing [shape=(2, 3)]."""
     layer = np.zeros((height, width, 4), np.float32)
     scale = float(np.sqrt(abs(np.linalg.det(to_pixels[:, :2]))))
     for shape, moved in shapes:
@@ -44,28 +40,23 @@ def painted(
             for line in shape.lines
         ]
         if shape.fill is not None and shape.opacities[0] > 0:
-            _lay(layer, lines, partial(_filled, even_odd=shape.even_odd), shape.fill, shape.opacities[0])
+            _lay(layer, lines, partial(_cover_inside, even_odd=shape.even_odd), shape.fill, shape.opacities[0])
         if shape.stroke is not None and shape.opacities[1] > 0 and shape.width > 0:
             thickness = min(shape.width * scale, 2 * height)
-            drawn = partial(_stroked, thickness=thickness)
-            _lay(layer, lines, drawn, shape.stroke, shape.opacities[1], margin=thickness / 2)
+            cover = partial(_cover_lines, thickness=thickness)
+            _lay(layer, lines, cover, shape.stroke, shape.opacities[1], margin=thickness / 2)
     return layer
-
-
-def over(above: Pixels, below: Pixels) -> Pixels:
-    """Return a layer over another one."""
-    return np.asarray(above + (1 - above[..., 3:]) * below, np.float32)
 
 
 def _lay(
     layer: Pixels,
     lines: Lines,
-    drawn: Callable[[Lines, int, int], Pixels],
+    cover: Callable[[Lines, int, int], Pixels],
     colour: tuple[int, int, int],
     opacity: float,
     margin: float = 0.0,
 ) -> None:
-    """Paint lines on a layer, with how ``drawn`` covers a window around them that is ``margin`` pixels wider."""
+    """Paint lines on a layer, with how ``cover`` covers a window around them that is ``margin`` pixels wider."""
     if not lines:
         return
     height, width = layer.shape[:2]
@@ -73,8 +64,8 @@ def _lay(
     if left < right and top < bottom:
         part = layer[top:bottom, left:right]
         inside = [(points - (left, top), closed) for points, closed in lines]
-        cover = opacity * drawn(inside, right - left, bottom - top)[..., None]
-        part += cover * (np.array([*colour, 1], np.float32) - part)
+        share = opacity * cover(inside, right - left, bottom - top)[..., None]
+        part += share * (np.array([*colour, 1], np.float32) - part)
 
 
 def _window(points: NDArray[np.float64], margin: float, width: int, height: int) -> tuple[int, int, int, int]:
@@ -84,7 +75,7 @@ def _window(points: NDArray[np.float64], margin: float, width: int, height: int)
     return max(int(left), 0), max(int(top), 0), min(int(right), width), min(int(bottom), height)
 
 
-def _filled(lines: Lines, width: int, height: int, *, even_odd: bool) -> Pixels:
+def _cover_inside(lines: Lines, width: int, height: int, *, even_odd: bool) -> Pixels:
     """Return the cover of the inside of subpaths, 0..1 [shape=(height, width)]."""
     from PIL import Image, ImageDraw
 
@@ -99,11 +90,10 @@ def _filled(lines: Lines, width: int, height: int, *, even_odd: bool) -> Pixels:
             turns = 1 if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) >= 0 else -1
             rows, columns = (slice(a * SUPERSAMPLING, b * SUPERSAMPLING) for a, b in ((top, bottom), (left, right)))
             winding[rows, columns] += turns * np.asarray(large, np.int16)
-    inside = winding % 2 != 0 if even_odd else winding != 0
-    return _reduced(inside)
+    return _reduce(winding % 2 != 0 if even_odd else winding != 0)
 
 
-def _stroked(lines: Lines, width: int, height: int, *, thickness: float) -> Pixels:
+def _cover_lines(lines: Lines, width: int, height: int, *, thickness: float) -> Pixels:
     """Return the cover of lines with round ends and corners, 0..1 [shape=(height, width)]."""
     from PIL import Image, ImageDraw
 
@@ -116,10 +106,10 @@ def _stroked(lines: Lines, width: int, height: int, *, thickness: float) -> Pixe
         if thick > 2:
             for x, y in at:
                 draw.ellipse([x - thick / 2, y - thick / 2, x + thick / 2, y + thick / 2], fill=1)
-    return _reduced(np.asarray(large, bool))
+    return _reduce(np.asarray(large, bool))
 
 
-def _reduced(mask: NDArray[np.bool_]) -> Pixels:
+def _reduce(mask: NDArray[np.bool_]) -> Pixels:
     height, width = mask.shape[0] // SUPERSAMPLING, mask.shape[1] // SUPERSAMPLING
     parts = mask.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING)
     return np.asarray(parts.mean(axis=(1, 3)), np.float32)
@@ -194,7 +184,7 @@ class LayeredFace(Face):
         self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
     ) -> DrawnMotion[tuple[FacePose, str]]:
         poses = face_poses(motion, units, fps, self.staging, self.prosody)
-        shown = chosen_mouths([pose.mouth for pose in poses], self.mouths, fps)
+        shown = choose_mouths([pose.mouth for pose in poses], self.mouths, fps)
         return DrawnMotion(list(zip(poses, shown, strict=True)), lambda: self._painter)
 
     @cached_property
@@ -203,7 +193,7 @@ class LayeredFace(Face):
         return lambda pose: picture.frame(*pose)
 
 
-def chosen_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:
+def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:
     """Return the mouth to show in every frame: near the poses, and changing no more often than pays.
 
     mouths : names of ``MOUTHS`` that there are
@@ -222,28 +212,28 @@ def chosen_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float)
         best = int(cost.argmin())
         back[n] = np.where(cost <= cost[best] + change, np.arange(len(mouths)), best)
         cost = np.minimum(cost, cost[best] + change) + distance[n]
-    at, found = int(cost.argmin()), []
+    at, path = int(cost.argmin()), []
     for n in range(len(distance) - 1, -1, -1):
-        found.append(mouths[at])
+        path.append(mouths[at])
         at = int(back[n, at])
-    return found[::-1]
+    return path[::-1]
 
 
 class _LayeredPicture:
     def __init__(self, drawing: Drawing, staging: Staging) -> None:
-        self._drawing, self._size = drawing, staging.size or OWN_SIZE
+        self._size = staging.size or OWN_SIZE
         self._opaque, self._scene = staging.background != TRANSPARENT, staging.background == SCENE
         x, y, width, height = drawing.box
         self._width = max(2, 2 * round(self._size * width / height / 2))
         scale = self._size / height
         self._to_pixels = np.array([[scale, 0, -x * scale], [0, scale, -y * scale]])
-        names = {name for layers, _ in drawing.shapes for name in layers}
-        self._head = "head" if "head" in names else ""
-        behind: list[tuple[Shape, tuple[float, float]]] = []
-        front: list[tuple[Shape, tuple[float, float]]] = []
+        has_head = any("head" in layers for layers, _ in drawing.shapes)
+        self._head = [(layers, shape) for layers, shape in drawing.shapes if not has_head or "head" in layers]
+        behind: list[Placed] = []
+        front: list[Placed] = []
         passed = False
-        for layers, shape in self._drawing.shapes:
-            if self._in_head(layers):
+        for layers, shape in drawing.shapes:
+            if not has_head or "head" in layers:
                 passed = True
             elif self._scene or "background" not in layers:
                 (front if passed else behind).append((shape, (0.0, 0.0)))
@@ -251,8 +241,8 @@ class _LayeredPicture:
         colour = staging.colour or ((255, 255, 255) if self._scene else None)
         if colour is not None:
             wall = np.ones_like(self._behind) * np.array([*colour, 1], np.float32)
-            self._behind = over(self._behind, wall)
-        self._heads = lru_cache(maxsize=64)(self._painted_head)
+            self._behind = lay_over(self._behind, wall)
+        self._heads = lru_cache(maxsize=64)(self._paint_head)
 
     def frame(self, pose: FacePose, mouth: str) -> NDArray[np.uint8]:
         """Return one frame [shape=(H, W, 3 or 4)]."""
@@ -263,36 +253,30 @@ class _LayeredPicture:
         look = (round(pose.gaze_x * unit), round(pose.gaze_y * unit), round(brows * unit))
         head = self._heads(mouth, eyes, *look)
         moved = np.empty(head.shape, np.uint8)
-        warp_bytes(head, *self._shifts(pose.head), 16, moved)
+        place = pose.head
+        columns, rows = np.arange(0, self._width + 16, 16.0), np.arange(0, self._size + 16, 16.0)
+        x = np.broadcast_to(columns - self._width / 2, (len(rows), len(columns)))
+        y = np.broadcast_to((rows - 0.4 * self._size - PIVOT_Y * unit)[:, None], x.shape)
+        right, down = (place.x + 0.5 * place.yaw) * unit, (place.y + 0.5 * place.pitch) * unit
+        warp_bytes(head, place.roll * y - right, -place.roll * x - down, 16, moved)
         layer = moved.astype(np.float32) * np.array([1, 1, 1, 1 / 255], np.float32)
-        whole = over(self._front, over(layer, self._behind))
+        whole = lay_over(self._front, lay_over(layer, self._behind))
         if self._opaque:
             return np.asarray(whole[..., :3] + 0.5, np.uint8)
         alpha = whole[..., 3:]
         straight = np.where(alpha > 0, whole[..., :3] / np.maximum(alpha, 1e-6), 0)
         return np.asarray(np.clip(np.dstack([straight, alpha * 255]) + 0.5, 0, 255), np.uint8)
 
-    def _in_head(self, layers: tuple[str, ...]) -> bool:
-        return not self._head or self._head in layers
-
-    def _painted_head(self, mouth: str, eyes: str, gaze_x: int, gaze_y: int, brows: int) -> NDArray[np.uint16]:
-        shown: list[tuple[Shape, tuple[float, float]]] = []
-        for layers, shape in self._drawing.shapes:
+    def _paint_head(self, mouth: str, eyes: str, gaze_x: int, gaze_y: int, brows: int) -> NDArray[np.uint16]:
+        shown: list[Placed] = []
+        for layers, shape in self._head:
             hidden = any(name.startswith(MOUTH) and name != MOUTH + mouth for name in layers)
             hidden |= not self._scene and "background" in layers
             hidden |= ("eyes-open" in layers and eyes == "closed") or ("eyes-closed" in layers and eyes == "open")
-            if self._in_head(layers) and not hidden:
+            if not hidden:
                 moved = (gaze_x, gaze_y) if "pupils" in layers else (0, -brows) if "brows" in layers else (0, 0)
                 shown.append((shape, (float(moved[0]), float(moved[1]))))
         return np.asarray(self._paint(shown) * (1, 1, 1, 255) + 0.5, np.uint16)
 
-    def _paint(self, shapes: Sequence[tuple[Shape, tuple[float, float]]]) -> Pixels:
-        return painted(shapes, self._to_pixels, self._width, self._size)
-
-    def _shifts(self, head: HeadPlacement) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        unit = EYE_DISTANCE * self._size
-        columns, rows = np.arange(0, self._width + 16, 16.0), np.arange(0, self._size + 16, 16.0)
-        x = np.broadcast_to(columns - self._width / 2, (len(rows), len(columns)))
-        y = np.broadcast_to((rows - 0.4 * self._size - PIVOT_Y * unit)[:, None], x.shape)
-        right, down = (head.x + 0.5 * head.yaw) * unit, (head.y + 0.5 * head.pitch) * unit
-        return head.roll * y - right, -head.roll * x - down
+    def _paint(self, shapes: Sequence[Placed]) -> Pixels:
+        return paint_shapes(shapes, self._to_pixels, self._width, self._size)

@@ -1,26 +1,33 @@
-"""Painting of the mouth of one pose. Runs for every frame."""
+"""Painting of the mouth of one pose, which runs for every frame, and its textures.
+
+A texture is a small picture that stretches with lips, teeth or tongue: colour 0..255 and opacity 0..1
+[shape=(D, U, 4)], from the top of a band to its bottom, and across it. Across lips, -1 and 1 are the corners; across
+teeth and tongue, they are ``SPAN`` eye distances from the middle.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.kernels.painting import paint_band
-from lipmotion_faces.portrait.design import Design
+from lipmotion_faces.portrait.design import Colour, Design, Palette
 from lipmotion_faces.portrait.geometry import (
     Heights,
     LipOutlines,
     MouthInterior,
+    MouthPose,
     drawn_half_width,
     far_open,
     lip_outlines,
     mouth_interior,
 )
-from lipmotion_faces.portrait.mouth_textures import SPAN, MouthTextures, Texture, mouth_textures
-from lipmotion_faces.portrait.pose import MouthPose
-from lipmotion_faces.portrait.view import Window
+from lipmotion_faces.portrait.layer import Window
+
+Texture = NDArray[np.float64]
 
 COLUMNS = 4
 """Places in each column of pixels at which heights are computed."""
@@ -29,6 +36,10 @@ FOLD, FOLD_TOP = (0.19, 0.1), -0.235
 far below the line of the lips."""
 CORNER_REACH = 1.28
 """The shadows beside the corners are painted up to this multiple of the mouth's half width."""
+SPAN = 0.26
+UPPER_TOOTH_GAPS = (0.0, 0.047, 0.087, 0.121, 0.15)
+LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.1, 0.13)
+"""Distances from the middle of the face."""
 
 
 class MouthPainter:
@@ -44,30 +55,36 @@ class MouthPainter:
 
     def paint(self, layer: NDArray[np.float32], pose: MouthPose) -> None:
         """Paint the mouth of a pose on the window's pixels [shape=(h, w, 4)], in place."""
-        half_width = drawn_half_width(self._lips, pose)
+        art, half_width = self._textures, drawn_half_width(self._lips, pose)
         columns = np.flatnonzero(np.abs(self._x).max(axis=0) < half_width * CORNER_REACH)
         on = _Columns(layer, columns[0], columns[-1] + 1, self._scale, self._first_row)
         x = self._x[:, on.first : on.last]
-        on_lips = _place(x, half_width)
+        on_lips, across = _place(x, half_width), _place(x, SPAN)
         shape = lip_outlines(self._lips, pose, x)
-        self._skin_shadows(on, shape, pose, x, on_lips)
-        within = mouth_interior(self._lips, pose, x, shape) if pose.gap > 0 else None
-        if within is not None:
-            self._inside(on, shape, within, pose, x, on_lips)
-        self._lips_around(on, shape, pose, on_lips)
-        if within is not None:
-            self._in_front(on, shape, within, pose, x)
-
-    def _skin_shadows(self, on: _Columns, shape: LipOutlines, pose: MouthPose, x: Heights, on_lips: Heights) -> None:
-        art = self._textures
         depth = 0.085 + 0.03 * pose.protrusion
         on.paint(shape.lower_outer, shape.lower_outer + depth, on_lips, art.under_lip)
         on.paint(shape.lower_outer, shape.lower_outer + 0.7 * depth, on_lips, art.under_lip, pose.tuck)
-        self._folds(on, shape, pose)
+        self._paint_folds(on, shape, pose)
         corner = np.full_like(x, shape.corner_y)
         on.paint(corner - 0.06, corner + 0.06, _place(x, shape.half_width * CORNER_REACH), art.corners)
+        within = mouth_interior(self._lips, pose, x, shape) if pose.gap > 0 else None
+        if within is not None:
+            bottom = shape.lower_inner
+            on.paint(shape.upper_inner, bottom, on_lips, art.cavity)
+            on.paint(within.tongue_top, np.minimum(within.tongue_bottom, bottom), across, art.tongue)
+            on.paint(within.teeth_lower, bottom, across, art.lower_teeth, min(2.5 * pose.teeth, 1))
+        on.paint(shape.upper_outer, shape.upper_inner, on_lips, art.upper_lip)
+        on.paint(shape.lower_inner, shape.lower_outer, on_lips, art.lower_lip)
+        on.paint(shape.upper_outer, shape.upper_inner, on_lips, art.pucker, pose.protrusion**2)
+        on.paint(shape.lower_inner, shape.lower_outer, on_lips, art.pucker[::-1], pose.protrusion**2)
+        closed = shape.lower_inner - shape.upper_inner < 2 * shape.seam
+        middle = (shape.upper_inner + shape.lower_inner) / 2
+        thick = np.where(closed, shape.seam, 0)
+        on.paint(middle - thick, middle + thick, on_lips, art.seam)
+        if within is not None:
+            self._paint_front(on, shape, within, pose, across)
 
-    def _folds(self, on: _Columns, shape: LipOutlines, pose: MouthPose) -> None:
+    def _paint_folds(self, on: _Columns, shape: LipOutlines, pose: MouthPose) -> None:
         """Paint the folds between nose and corners that a raised upper lip draws."""
         if pose.upper_raise <= 0:
             return
@@ -79,47 +96,28 @@ class MouthPainter:
         middle = top + (shape.corner_y - 0.01 - top) * share**1.25
         wide.paint(middle - 0.03, middle + 0.03, share.mean(axis=0), self._textures.fold, pose.upper_raise)
 
-    def _lips_around(self, on: _Columns, shape: LipOutlines, pose: MouthPose, on_lips: Heights) -> None:
-        art = self._textures
-        on.paint(shape.upper_outer, shape.upper_inner, on_lips, art.upper_lip)
-        on.paint(shape.lower_inner, shape.lower_outer, on_lips, art.lower_lip)
-        on.paint(shape.upper_outer, shape.upper_inner, on_lips, art.pucker, pose.protrusion**2)
-        on.paint(shape.lower_inner, shape.lower_outer, on_lips, art.pucker[::-1], pose.protrusion**2)
-        closed = shape.lower_inner - shape.upper_inner < 2 * shape.seam
-        middle = (shape.upper_inner + shape.lower_inner) / 2
-        thick = np.where(closed, shape.seam, 0)
-        on.paint(middle - thick, middle + thick, on_lips, art.seam)
-
-    def _inside(
-        self, on: _Columns, shape: LipOutlines, within: MouthInterior, pose: MouthPose, x: Heights, on_lips: Heights
+    def _paint_front(
+        self, on: _Columns, shape: LipOutlines, within: MouthInterior, pose: MouthPose, across: Heights
     ) -> None:
+        """Paint the upper teeth, what of the tongue is in front of the lower lip, and the lines of a drawn mouth."""
         art = self._textures
-        top, bottom = shape.upper_inner, shape.lower_inner
-        across = _place(x, SPAN)
-        on.paint(top, bottom, on_lips, art.cavity)
-        on.paint(within.tongue_top, np.minimum(within.tongue_bottom, bottom), across, art.tongue)
-        on.paint(within.teeth_lower, bottom, across, art.lower_teeth, min(2.5 * pose.teeth, 1))
-
-    def _in_front(self, on: _Columns, shape: LipOutlines, within: MouthInterior, pose: MouthPose, x: Heights) -> None:
-        """Paint the upper teeth, and what of the tongue is in front of the lower lip."""
-        art = self._textures
-        top, bottom = shape.upper_inner, shape.lower_inner
-        across = _place(x, SPAN)
+        top, front = shape.upper_inner, shape.lower_inner
+        on_top = np.minimum(top + 0.028 * (1 - 0.4 * pose.tuck), front)
         if pose.tongue > 0.6:
             tip, out = within.tongue_bottom, (pose.tongue - 0.6) / 0.4
-            on.paint(tip, np.where(tip > bottom, tip + 0.012, tip), across, art.lip_shadow, out)
+            on.paint(tip, np.where(tip > front, tip + 0.012, tip), across, art.lip_shadow, out)
             on.paint(within.tongue_top, tip, across, art.tongue_tip, out)
-        seen = _seen(pose)  # teeth that are hardly seen are covered by the lip, from above; they are never grey
-        low = top + min(1.2 * seen, 1) * (within.teeth_upper - top)
-        on.paint(top, low, across, art.upper_teeth, min(5 * seen, 1))
-        on.paint(top, np.minimum(top + 0.028 * (1 - 0.4 * pose.tuck), bottom), across, art.lip_shadow)
-        if self._lips.outline:
-            front = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
-            self._outlines(on, shape, front, pose, across)
-
-    def _outlines(self, on: _Columns, shape: LipOutlines, front: Heights, pose: MouthPose, across: Heights) -> None:
-        """Paint lines round the hole, below a tucked lip, and round the ring of protruded lips."""
-        line, top = 0.8 * self._lips.outline, shape.upper_inner
+            front = np.maximum(front, tip)
+        # teeth show less behind lips that hardly part, unless the sound asks for them; what is hardly seen of them is
+        # covered by the lip, from above: they are never grey
+        shown = max(min(2.5 * pose.teeth, 1), far_open(pose), pose.tuck)
+        shown = float(shown * max(min(max((pose.gap - 0.015) / 0.04, 0), 1), pose.tuck, 2 * pose.teeth - 1))
+        low = top + min(1.2 * shown, 1) * (within.teeth_upper - top)
+        on.paint(top, low, across, art.upper_teeth, min(5 * shown, 1))
+        on.paint(top, on_top, across, art.lip_shadow)
+        if not self._lips.outline:
+            return
+        line = 0.8 * self._lips.outline
         hole = line * np.minimum((shape.lower_inner - top) / 0.01, 1)
         ring = line * np.minimum((shape.lower_outer - shape.upper_outer) / 0.01, 1)
         tucked, out = (min(max((share - 0.3) / 0.5, 0), 1) for share in (pose.tuck, pose.protrusion))
@@ -129,13 +127,7 @@ class MouthPainter:
             (shape.upper_outer, out * ring),
             (shape.lower_outer, np.maximum(tucked * hole, out * ring)),
         ):
-            on.paint(edge - thick / 2, edge + thick / 2, across, self._textures.outline)
-
-
-def _seen(pose: MouthPose) -> float:
-    """Return how much of the upper teeth is seen, 0..1: less behind lips that hardly part, unless the sound asks it."""
-    asked = max(min(2.5 * pose.teeth, 1), far_open(pose), pose.tuck)
-    return float(asked * max(min(max((pose.gap - 0.015) / 0.04, 0), 1), pose.tuck, 2 * pose.teeth - 1))
+            on.paint(edge - thick / 2, edge + thick / 2, across, art.outline)
 
 
 class _Columns(NamedTuple):
@@ -159,3 +151,159 @@ class _Columns(NamedTuple):
 def _place(x: Heights, half_width: float) -> Heights:
     """Return the place of columns in a texture that spans a width, 0..1 [shape=(W,)]."""
     return np.clip(x.mean(axis=0) / (2 * half_width) + 0.5, 0, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class MouthTextures:
+    """The textures of one character's mouth."""
+
+    upper_lip: Texture
+    lower_lip: Texture
+    seam: Texture
+    cavity: Texture
+    upper_teeth: Texture
+    lower_teeth: Texture
+    tongue: Texture
+    tongue_tip: Texture
+    pucker: Texture
+    lip_shadow: Texture
+    under_lip: Texture
+    corners: Texture
+    fold: Texture
+    outline: Texture
+
+
+def mouth_textures(design: Design) -> MouthTextures:
+    """Return the textures of a character's mouth."""
+    return _flat_textures(design.palette) if design.flat else _shaded_textures(design.palette)
+
+
+def _flat_textures(colours: Palette) -> MouthTextures:
+    """Return textures of one colour each, with lines between the incisors and a patch of light on the tongue's tip."""
+    _, x = _grid(1, 261)
+    away = np.abs(np.abs(x) * SPAN - np.array(UPPER_TOOTH_GAPS[:3])[:, None, None]).min(axis=0)
+    teeth = _mix(colours.tooth, colours.lower_lip_dark, 0.6 * np.exp(-((away / 0.003) ** 2)))
+    depth, x = _grid(24, 65)
+    light = np.array(colours.tongue) + (255 - np.array(colours.tongue)) * 0.45
+    patch = 1 - np.clip((((depth - 0.55) / 0.14) ** 2 + ((x * SPAN + 0.015) / 0.05) ** 2 - 1) / 0.5, 0, 1)
+    depth, x = _grid(15, 65)
+    fold = (np.abs(depth - 0.5) < 0.17 * np.clip((1 - np.abs(x)) / 0.4, 0, 1)).astype(np.float64)
+    clear = _texture(colours.line, 0.0)
+    return MouthTextures(
+        upper_lip=_texture(colours.upper_lip_dark),
+        lower_lip=_texture(colours.lower_lip_light),
+        seam=_texture(colours.line),
+        cavity=_texture(colours.cavity),
+        upper_teeth=_texture(teeth),
+        lower_teeth=_texture(colours.lower_tooth),
+        tongue=_texture(colours.tongue),
+        tongue_tip=_texture(_mix(colours.tongue, light, patch)),
+        pucker=clear,
+        lip_shadow=clear,
+        under_lip=_under_lip(colours.skin_shade, 0.5),
+        corners=clear,
+        fold=_texture(colours.line, 0.8 * fold),
+        outline=_texture(colours.line),
+    )
+
+
+def _shaded_textures(colours: Palette) -> MouthTextures:
+    """Return textures with light and shade."""
+    depth, x = _grid(9, 33)
+    seam = np.sin(np.pi * depth) ** 0.5 * (1 - 0.6 * np.abs(x) ** 3)
+    depth, x = _grid(12, 17)
+    cavity = _mix(colours.cavity, colours.tongue, 0.16 * depth**2 * (1 - x**2))
+    depth, x = _grid(24, 129)
+    folds = np.abs(np.sin(np.pi * 6.5 * (np.abs(x) + 0.035 * np.sin(9 * x)))) ** 5 * (1 - x**4)
+    folded = 0.1 * folds * np.sin(np.pi * np.clip(0.15 + 0.9 * depth, 0, 1)) * np.clip(np.abs(x) / 0.1, 0, 1)
+    pucker = _mix(colours.upper_lip_dark, colours.seam, 0.25 + 0 * depth * x)
+    depth, x = _grid(15, 65)
+    corners = np.exp(-(((depth - 0.5) / 0.2) ** 2) - ((np.abs(x) - 0.78) / 0.055) ** 2)
+    fold = np.exp(-(((depth - 0.5) / 0.2) ** 2)) * np.clip((1 - np.abs(x)) / 0.5, 0, 1)
+    upper_lip, lower_lip = _lips(colours)
+    tongue, tongue_tip = _tongue(colours)
+    return MouthTextures(
+        upper_lip=upper_lip,
+        lower_lip=lower_lip,
+        seam=_texture(colours.seam, seam),
+        cavity=_texture(cavity),
+        upper_teeth=_teeth(colours.tooth, colours.mouth_shadow, UPPER_TOOTH_GAPS, 0.5),
+        lower_teeth=_teeth(colours.lower_tooth, colours.mouth_shadow, LOWER_TOOTH_GAPS, 0.45)[::-1].copy(),
+        tongue=tongue,
+        tongue_tip=tongue_tip,
+        pucker=_texture(pucker, folded),
+        lip_shadow=_texture(colours.cavity, 0.62 * (1 - _grid(12, 1)[0]) ** 1.6),
+        under_lip=_under_lip(colours.mouth_shadow, 0.42),
+        corners=_texture(colours.mouth_shadow, 0.34 * corners),
+        fold=_texture(colours.mouth_shadow, 0.5 * fold),
+        outline=_texture(colours.line, 0.0),
+    )
+
+
+def _lips(colours: Palette) -> tuple[Texture, Texture]:
+    """Return the upper and the lower lip, with fine creases down them and gloss."""
+
+    def creases(depth: Texture) -> Texture:
+        lines = np.sin(31 * x + 2.1 * np.sin(7 * x)) * np.sin(17.3 * x + 1.0)
+        return np.clip(lines, 0, 1) * np.sin(np.pi * np.clip(depth, 0, 1)) * (1 - x**6)
+
+    depth, x = _grid(24, 97)
+    gloss = 0.42 * np.exp(-(((depth - 0.22) / 0.14) ** 2) - ((np.abs(x + 0.03) - 0.2) / 0.17) ** 2)
+    paint = _mix(colours.upper_lip_light, colours.upper_lip_dark, depth**1.3 + 0 * x)
+    paint = _mix(paint, colours.seam, 0.3 * np.abs(x) ** 4 + 0.35 * np.clip(depth - 0.82, 0, 1) / 0.18)
+    paint = _mix(paint, colours.upper_lip_dark, 0.16 * creases(depth))
+    upper = _texture(_mix(paint, colours.gloss, gloss), np.clip(0.25 + depth / 0.12, 0, 1) + 0 * x)
+    depth, _ = _grid(32, 97)
+    gloss = 0.6 * np.exp(-(((depth - 0.36) / 0.17) ** 2) - ((x + 0.08) / 0.33) ** 2)
+    gloss += 0.16 * np.exp(-(((depth - 0.3) / 0.12) ** 2) - ((x - 0.42) / 0.12) ** 2)
+    paint = _mix(colours.lower_lip_light, colours.lower_lip_dark, (1.9 * depth - 0.75) ** 2 + 0.3 * x**4)
+    paint = _mix(paint, colours.lower_lip_dark, 0.16 * creases(depth))
+    paint = _mix(paint, colours.gloss, gloss * (1 - 0.15 * creases(depth)))
+    return upper, _texture(paint, np.clip(0.2 + (1 - depth) / 0.14, 0, 1) + 0 * x)
+
+
+def _teeth(colour: Colour, shadow: Colour, gaps: tuple[float, ...], dark: float) -> Texture:
+    depth, x = _grid(10, 261)
+    away = np.abs(np.abs(x) * SPAN - np.array(gaps)[:, None, None]).min(axis=0)
+    paint = _mix(colour, shadow, 0.2 * np.exp(-((away / 0.0032) ** 2)) * (0.35 + 0.65 * depth))
+    paint = _mix(paint, shadow, dark * (1 - depth) ** 2.2 + 0.0 * x)
+    return _texture(paint, np.exp(-((x * SPAN / 0.21) ** 4)) + 0 * depth)
+
+
+def _tongue(colours: Palette) -> tuple[Texture, Texture]:
+    """Return the tongue, and its tip between the teeth: in the shadow of the upper ones, round, moist at its edge."""
+    colour, dark = np.array(colours.tongue), colours.cavity
+    depth, x = _grid(16, 65)
+    away = x * SPAN
+    paint = _mix(colour, dark, 0.45 * depth**1.5 + 3.0 * np.abs(away) ** 1.3)
+    shine = 0.6 * np.exp(-(((depth - 0.22) / 0.2) ** 2) - ((np.abs(away) - 0.045) / 0.045) ** 2)
+    paint = _mix(paint, colour + (255 - colour) * 0.42, shine)
+    paint = _mix(paint, dark, 0.25 * np.exp(-((away / 0.012) ** 2)) * (0.2 + 0.8 * depth))
+    tongue = _texture(paint, np.exp(-((away / 0.2) ** 6)) + 0 * depth)
+    depth, _ = _grid(24, 65)
+    flesh = 0.6 * colour + 0.4 * np.array(colours.lower_lip_light) + 8
+    tip = _mix(flesh, dark, 0.4 * (1 - depth) ** 2 + 0.3 * (np.abs(away) / 0.1) ** 4)
+    shine = 0.3 * np.exp(-(((depth - 0.7) / 0.16) ** 2) - ((away + 0.012) / 0.045) ** 2)
+    return tongue, _texture(_mix(tip, colour + (255 - colour) * 0.75, shine))
+
+
+def _under_lip(colour: Colour, strength: float) -> Texture:
+    depth, x = _grid(16, 33)
+    soft = np.exp(-(((depth - 0.32) / 0.26) ** 2)) * (1 - depth) ** 0.5 * np.exp(-((x / 0.62) ** 2))
+    return _texture(colour, strength * soft)
+
+
+def _grid(deep: int, wide: int) -> tuple[Texture, Texture]:
+    """Return depth 0..1 [shape=(D, 1)] and place across -1..1 [shape=(1, U)]."""
+    return np.linspace(0, 1, deep)[:, None], np.linspace(-1, 1, wide)[None, :]
+
+
+def _texture(colour: Colour | Texture, opacity: Texture | float = 1.0) -> Texture:
+    paint, cover = np.asarray(colour, dtype=np.float64), np.atleast_2d(opacity)
+    shape = np.broadcast_shapes(paint.shape[:-1], cover.shape)
+    return np.dstack([np.broadcast_to(paint, (*shape, 3)), np.broadcast_to(cover, shape)])
+
+
+def _mix(first: Colour | Texture, second: Colour | Texture, share: Texture) -> Texture:
+    start = np.asarray(first, dtype=np.float64)
+    return start + np.clip(share, 0, 1)[..., None] * (np.asarray(second, dtype=np.float64) - start)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion_faces.portrait.design import LipDesign
-from lipmotion_faces.portrait.pose import MouthPose
-from lipmotion_faces.portrait.view import Window
+from lipmotion_faces.portrait.geometry import MouthPose
+from lipmotion_faces.portrait.layer import Window
 
 Floats = NDArray[np.float64]
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion_faces.base import SCENE
 from lipmotion_faces.kernels.planes import (
     Box,
     EyeLayers,
@@ -27,19 +28,16 @@ from lipmotion_faces.kernels.planes import (
 )
 from lipmotion_faces.portrait.design import Colour, Design
 from lipmotion_faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter, LidPose, lid_pose
-from lipmotion_faces.portrait.mouth_painting import MouthPainter
-from lipmotion_faces.portrait.mouth_textures import MouthTextures, mouth_textures
+from lipmotion_faces.portrait.layer import View, Window
+from lipmotion_faces.portrait.mouth_painting import MouthPainter, MouthTextures, mouth_textures
 from lipmotion_faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
-from lipmotion_faces.portrait.portrait_rasteriser import SCENE, FacePose, moving_parts, still_layers
-from lipmotion_faces.portrait.view import View, Window
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose, moving_parts, still_layers
 
 Bytes = NDArray[np.uint8]
 Packed = NDArray[np.uint32]
 Singles = NDArray[np.float32]
 
-FROM_RGB = (
-    np.array([[65.481, 128.553, 24.966], [-37.797, -74.203, 112.0], [112.0, -93.786, -18.214]], np.float64) / 255.0
-)
+FROM_RGB = np.array([[65.481, 128.553, 24.966], [-37.797, -74.203, 112.0], [112.0, -93.786, -18.214]]) / 255.0
 """Brightness and two colours of red, green and blue of 0..255; ``OFFSETS`` are added."""
 OFFSETS = np.array([16.0, 128.0, 128.0])
 """Source of both: ITU-R BT.601, limited range, as ``export.video`` marks its files."""
@@ -81,22 +79,16 @@ class PlanarRasteriser:
         self._jaw_layers, self._brow_layers = self._cut(parts.jaw), self._cut(parts.brow)
         self._head = Box(*(edge // 2 * 2 for edge in _box(parts.head)))
         self._eye_painter = EyePainter(design, parts.eyes)
-        self._eyes = lru_cache(maxsize=LID_POSITIONS + 1)(self._eye_layers)
+        self._eyes = lru_cache(maxsize=LID_POSITIONS + 1)(self._paint_eyes)
         self._iris = _yuv(self._eye_painter.iris)
         self._skin_field, self._brow_field = SkinField(parts.jaw, design.lips), BrowField(parts.brow)
         self._head_field = HeadField(Window(view, self._head.x0, self._head.y0, self._head.x1, self._head.y1))
         textures = mouth_textures(design)
-        found = {one.name: getattr(textures, one.name) for one in fields(textures)}
-        self._mouth_painter = MouthPainter(
-            design,
-            parts.mouth,
-            MouthTextures(
-                **{
-                    name: np.concatenate([texture[..., :3] @ FROM_RGB.T + OFFSETS, texture[..., 3:]], axis=-1)
-                    for name, texture in found.items()
-                }
-            ),
-        )
+        in_yuv = {}
+        for each in fields(textures):
+            texture = getattr(textures, each.name)
+            in_yuv[each.name] = np.concatenate([texture[..., :3] @ FROM_RGB.T + OFFSETS, texture[..., 3:]], axis=-1)
+        self._mouth_painter = MouthPainter(design, parts.mouth, MouthTextures(**in_yuv))
         chroma = self._still[1:].reshape(2, size // 2, 2, size // 2, 2).mean(axis=(2, 4))
         self._frame = np.concatenate([self._still[0].ravel(), _bytes(chroma).ravel()]).reshape(-1, size)
 
@@ -131,8 +123,7 @@ class PlanarRasteriser:
         canvas.upper = (lids, x, y, brows)
         brow, eyes, below = self._parts.brow, self._parts.eyes, self._parts.below_brows
         skin, still = self._brow_layers
-        shifts = self._brow_field.shifts(brows)
-        lay_skin(skin, *shifts, *still, brow.y0, brow.x0, canvas.planes)
+        lay_skin(skin, *self._brow_field.shifts(brows), *still, brow.y0, brow.x0, canvas.planes)
         rows, columns = below.area
         canvas.planes[:, rows, columns] = self._still[:, rows, columns]
         x_px, y_px = np.float32(-x / GAZE_STEPS), np.float32(-y / GAZE_STEPS)
@@ -146,7 +137,7 @@ class PlanarRasteriser:
         around = StillLayers(*(part[:, rows, columns].copy() for part in self._around))
         return self._skin[:, rows, columns].copy(), around
 
-    def _eye_layers(self, lids: LidPose) -> EyeLayers:
+    def _paint_eyes(self, lids: LidPose) -> EyeLayers:
         under, opening, over = self._eye_painter.lids(lids)
         return EyeLayers(_yuv(under), np.ascontiguousarray(opening), _yuv(over), self._iris)
 

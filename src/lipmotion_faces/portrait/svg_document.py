@@ -23,14 +23,14 @@ from lipmotion.storage.files import check_regular
 from lipmotion_faces.portrait.svg_paths import (
     LARGEST_NUMBER,
     MOST_POINTS,
-    bounded,
+    check_matrix,
     check_points,
     circle,
-    numbers_of,
-    path_lines,
-    points_of,
+    flatten_path,
+    read_numbers,
+    read_points,
+    read_transform,
     rectangle,
-    transform_of,
 )
 
 Points = NDArray[np.float64]
@@ -97,12 +97,12 @@ def read_drawing(path: Path) -> Drawing:
             raise
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
     try:
-        return drawing_of(data)
+        return parse_drawing(data)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def drawing_of(data: bytes) -> Drawing:
+def parse_drawing(data: bytes) -> Drawing:
     """Return the drawing in the bytes of an ``.svg`` file. Raises InputError: as ``read_drawing``."""
     if len(data) > LARGEST_FILE_BYTES:
         raise InputError(f"more than {LARGEST_FILE_BYTES} bytes; is it a drawing?")
@@ -197,7 +197,21 @@ class _DrawingReader:
         lines = _lines(attributes, tag, MOST_POINTS - self.points)
         self.points += sum(len(points) for points, _ in lines)
         check_points(MOST_POINTS - self.points)
-        shape = _shape(group, lines, filled=tag != "line")
+        style, matrix = group.style, group.matrix
+        opacities = [_number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
+        placed = tuple(Line(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
+        if not all(np.abs(line.points).max(initial=0) <= 1e3 * LARGEST_NUMBER for line in placed):
+            raise InputError(f"a shape is {1e3 * LARGEST_NUMBER:g} units away; check the transforms")
+        fill = _colour(style.get("fill", "black"), "fill")
+        scale = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
+        shape = Shape(
+            placed,
+            None if tag == "line" else fill,
+            _colour(style.get("stroke", "none"), "stroke"),
+            scale * _number(style.get("stroke-width", "1"), "stroke-width"),
+            (float(np.clip(group.opacity * opacities[0], 0, 1)), float(np.clip(group.opacity * opacities[1], 0, 1))),
+            style.get("fill-rule") == "evenodd",
+        )
         self.covered += _covered(shape, self.box or (0, 0, 1, 1))
         if self.covered > MOST_COVERED_PICTURES:
             raise InputError(f"its shapes cover more than {MOST_COVERED_PICTURES:g} times the picture; leave some out")
@@ -225,7 +239,7 @@ def _local(name: str) -> str:
 
 def _box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
     text = root.get("viewBox", "")
-    numbers = numbers_of(text, 4, "viewBox")
+    numbers = read_numbers(text, 4, "viewBox")
     if not numbers:
         numbers = [0, 0, *(_number(root.get(name, "0"), name) for name in ("width", "height"))]
     if len(numbers) != 4 or not (1e-3 <= numbers[2] < 1e6 and 1e-3 <= numbers[3] < 1e6):
@@ -239,8 +253,8 @@ def _box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
 
 
 def _number(text: str, name: str) -> float:
-    found = _UNIT.fullmatch(text.strip())
-    numbers = numbers_of(found[1] if found else text, 1, name)
+    match = _UNIT.fullmatch(text.strip())
+    numbers = read_numbers(match[1] if match else text, 1, name)
     if not numbers:
         raise InputError(f"{name} is {shortened(text)!r}, required a number")
     return numbers[0]
@@ -248,7 +262,14 @@ def _number(text: str, name: str) -> float:
 
 def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     """Return what an element hands down, or for a shape what it has itself."""
-    _check_references(attributes)
+    for key, value in attributes.items():
+        name = _local(key)
+        if name == "href" or "url(" in value:
+            raise InputError(
+                f"{shortened(name)}={shortened(value)!r} is a reference; required plain colours and shapes"
+            )
+        if name.lower().startswith("on"):
+            raise InputError(f"a script, {shortened(name)!r}, is not allowed")
     names = (*_INHERITED, "opacity")
     style = {name: attributes[name] for name in names if name in attributes}
     for part in attributes.get("style", "").split(";"):
@@ -261,37 +282,10 @@ def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     opacity = around.opacity * float(np.clip(_number(style.pop("opacity", "1"), "opacity"), 0, 1))
     matrix = around.matrix
     if "transform" in attributes:
-        matrix = bounded(matrix @ transform_of(attributes["transform"]))
+        matrix = check_matrix(matrix @ read_transform(attributes["transform"]))
     name = next((value for key, value in attributes.items() if key.endswith(":label") and value), "")
     layers = (*around.layers, name or attributes.get("id", ""))
     return _Group(layers, matrix, {**around.style, **style}, opacity)
-
-
-def _check_references(attributes: Mapping[str, str]) -> None:
-    for name, value in attributes.items():
-        if _local(name) == "href" or "url(" in value:
-            raise InputError(
-                f"{shortened(_local(name))}={shortened(value)!r} is a reference; required plain colours and shapes"
-            )
-        if _local(name).lower().startswith("on"):
-            raise InputError(f"a script, {shortened(_local(name))!r}, is not allowed")
-
-
-def _shape(group: _Group, lines: list[tuple[Points, bool]], *, filled: bool) -> Shape:
-    style, matrix = group.style, group.matrix
-    alphas = [group.opacity * _number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
-    placed = tuple(Line(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
-    if not all(np.abs(line.points).max(initial=0) <= 1e3 * LARGEST_NUMBER for line in placed):
-        raise InputError(f"a shape is {1e3 * LARGEST_NUMBER:g} units away; check the transforms")
-    fill = _colour(style.get("fill", "black"), "fill")
-    return Shape(
-        placed,
-        fill if filled else None,
-        _colour(style.get("stroke", "none"), "stroke"),
-        float(np.sqrt(abs(np.linalg.det(matrix[:2, :2])))) * _number(style.get("stroke-width", "1"), "stroke-width"),
-        (float(np.clip(alphas[0], 0, 1)), float(np.clip(alphas[1], 0, 1))),
-        style.get("fill-rule") == "evenodd",
-    )
 
 
 def _covered(shape: Shape, box: tuple[float, float, float, float]) -> float:
@@ -314,9 +308,9 @@ def _lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tuple[Poi
         return _number(attributes.get(name, default), name)
 
     if tag == "path":
-        return path_lines(attributes.get("d", ""), most)
+        return flatten_path(attributes.get("d", ""), most)
     if tag in ("polygon", "polyline"):
-        return [(points_of(attributes.get("points", ""), most), tag == "polygon")]
+        return [(read_points(attributes.get("points", ""), most), tag == "polygon")]
     if tag == "line":
         return [(np.array([[number("x1"), number("y1")], [number("x2"), number("y2")]]), False)]
     if tag == "rect":

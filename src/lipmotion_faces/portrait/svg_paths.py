@@ -28,7 +28,7 @@ _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 
 _POINTS = {"C": STEPS, "S": STEPS, "Q": STEPS, "T": STEPS, "A": 4 * STEPS}
 
 
-def path_lines(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
+def flatten_path(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
     """Return the subpaths of a path's ``d``: points [shape=(N, 2)], and whether each returns to its beginning.
 
     Raises InputError: not a path, or one of more than ``most`` points.
@@ -58,11 +58,8 @@ def path_lines(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
             current.append(at)
         values = np.array(numbers)
         if kind in "HV":
-            values = (
-                np.array([values[0] + (relative and at[0]), at[1]])
-                if kind == "H"
-                else np.array([at[0], values[0] + (relative and at[1])])
-            )
+            axis = "HV".index(kind)
+            values = np.where(np.arange(2) == axis, values[0] + at[axis] * relative, at)
         elif kind == "A":
             values[5:] += at * relative
         else:
@@ -75,9 +72,9 @@ def path_lines(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
             current.extend(_arc(at, end, *numbers[:5]))
         else:
             smooth = 2 * at - control if before in ("CS" if kind == "S" else "QT") else at
-            points = _controls(kind, values.reshape(-1, 2), smooth)
-            control = points[-2] if kind in "CSQT" else end
-            current.extend(_bezier(np.vstack([at, *points])))
+            points = [at, *([smooth] if kind in "ST" else []), *values.reshape(-1, 2)]
+            control = points[-2]
+            current.extend(_bezier(points))
         if kind not in "CSQT":
             control = end
         at, before = end, kind
@@ -95,11 +92,11 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
     """Yield the commands of a path with their numbers; a repeated one has its letter again."""
     letter, place = "", _end_of_blanks(text, 0)
     while place < len(text):
-        found = _LETTER.match(text, place)
-        if found:
-            if not letter and found[1] not in "Mm":
+        match = _LETTER.match(text, place)
+        if match:
+            if not letter and match[1] not in "Mm":
                 raise InputError(f"a path does not begin with M: {shortened(text)!r}")
-            letter, place = found[1], found.end()
+            letter, place = match[1], match.end()
         elif not letter or letter in "Zz":
             what = "a number without a command" if _NUMBER.match(text, place) else "what cannot be read"
             raise InputError(f"a path has {what}: {shortened(text[place:])!r}")
@@ -108,31 +105,23 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
         numbers = []
         for n in range(_COUNTS[letter.upper()]):
             pattern = _FLAG if letter in "Aa" and n in (3, 4) else _NUMBER
-            found = pattern.match(text, place)
-            if not found:
+            match = pattern.match(text, place)
+            if not match:
                 rest = text[_end_of_blanks(text, place) :]
                 wrong = f"cannot be read at {shortened(rest)!r}" if rest and not _LETTER.match(rest) else ""
                 raise InputError(f"a path {wrong or f'ends within a command: {shortened(text)!r}'}")
-            numbers.append(within(float(found[1]), text))
-            place = found.end()
+            numbers.append(check_number(float(match[1]), text))
+            place = match.end()
         yield letter, numbers
         place = _end_of_blanks(text, place)
 
 
 def _end_of_blanks(text: str, place: int) -> int:
-    found = _BLANK.match(text, place)
-    return found.end() if found else place
+    match = _BLANK.match(text, place)
+    return match.end() if match else place
 
 
-def _controls(kind: str, points: Points, smooth: Points) -> list[Points]:
-    if kind == "S":
-        return [smooth, *points]
-    if kind == "T":
-        return [smooth, points[0]]
-    return list(points)
-
-
-def _bezier(points: Points) -> list[Points]:
+def _bezier(points: list[Points]) -> list[Points]:
     """Return points along a quadratic or cubic Bézier curve, without its first one."""
     t = np.linspace(0, 1, STEPS + 1)[1:, None]
     levels = [points[k][None] + 0 * t for k in range(len(points))]
@@ -163,30 +152,30 @@ def _arc(at: Points, end: Points, rx: float, ry: float, turned: float, large: fl
     return list(np.stack([rx * np.cos(angles), ry * np.sin(angles)], axis=1) @ turn + middle)
 
 
-def within(number: float, text: str) -> float:
+def check_number(number: float, text: str) -> float:
     """Return the number. Raises InputError, with ``text``: it is larger than ``LARGEST_NUMBER``, or not finite."""
     if not abs(number) <= LARGEST_NUMBER:
         raise InputError(f"{number:g} in {shortened(text)!r}, required numbers up to {LARGEST_NUMBER:g}")
     return number
 
 
-def numbers_of(text: str, most: int, name: str) -> list[float]:
+def read_numbers(text: str, most: int, name: str) -> list[float]:
     """Return the numbers of a list. Raises InputError, with its name: not numbers, or more than ``most``."""
     numbers: list[float] = []
     place = 0
-    while found := _NUMBER.match(text, place):
+    while match := _NUMBER.match(text, place):
         if len(numbers) == most:
             raise InputError(f"{name} is {shortened(text)!r}, required at most {most} numbers")
-        numbers.append(within(float(found[1]), text))
-        place = found.end()
+        numbers.append(check_number(float(match[1]), text))
+        place = match.end()
     if _end_of_blanks(text, place) < len(text):
         raise InputError(f"{name} is {shortened(text)!r}, required numbers")
     return numbers
 
 
-def points_of(text: str, most: int = MOST_POINTS) -> Points:
+def read_points(text: str, most: int = MOST_POINTS) -> Points:
     """Return the points of a polygon [shape=(N, 2)]. Raises InputError: an odd count, no numbers, or too many."""
-    numbers = numbers_of(text, 2 * most, "points")
+    numbers = read_numbers(text, 2 * most, "points")
     if len(numbers) % 2 or len(numbers) < 4:
         raise InputError(f"points have {len(numbers)} numbers, required pairs, two at least")
     return np.array(numbers).reshape(-1, 2)
@@ -205,15 +194,12 @@ def rectangle(x: float, y: float, width: float, height: float, radius: float) ->
         return np.array([[x + width, y + height], [x, y + height], [x, y], [x + width, y]])
     corners = [(x + width - radius, y + height - radius), (x + radius, y + height - radius), (x + radius, y + radius)]
     corners.append((x + width - radius, y + radius))
-    quarter = np.linspace(0, np.pi / 2, STEPS + 1)
-    parts = []
-    for n, corner in enumerate(corners):
-        angle = quarter + n * np.pi / 2
-        parts.append(np.array(corner) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-    return np.vstack(parts)
+    angles = [np.linspace(0, np.pi / 2, STEPS + 1) + n * np.pi / 2 for n in range(4)]
+    rounds = [radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) for angle in angles]
+    return np.vstack([np.array(corner) + each for corner, each in zip(corners, rounds, strict=True)])
 
 
-def transform_of(text: str) -> Points:
+def read_transform(text: str) -> Points:
     """Return the matrix of a ``transform`` [shape=(3, 3)]. Raises InputError: not a transform, or what enlarges more
     than ``LARGEST_NUMBER`` times."""
     matrix = np.eye(3)
@@ -223,14 +209,14 @@ def transform_of(text: str) -> Points:
     for call in calls:
         name, _, inside = call.strip(", \t\r\n").partition("(")
         try:
-            one = _transform(name.rstrip(), numbers_of(inside, 6, name))
+            one = _transform(name.rstrip(), read_numbers(inside, 6, name))
         except (ValueError, IndexError, KeyError) as error:
             raise InputError(f"the transform {shortened(call + ')')!r} cannot be read") from error
-        matrix = bounded(matrix @ one)
+        matrix = check_matrix(matrix @ one)
     return matrix
 
 
-def bounded(matrix: Points) -> Points:
+def check_matrix(matrix: Points) -> Points:
     """Return a matrix of transforms. Raises InputError: it enlarges or moves beyond ``LARGEST_NUMBER``."""
     if not np.abs(matrix).max() <= LARGEST_NUMBER:
         raise InputError(f"transforms in one another enlarge beyond {LARGEST_NUMBER:g} times")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh
-from lipmotion.meshes.model.textures import Texture, TextureTable, linear, texture_table
+from lipmotion.meshes.model.textures import Texture, TextureTable, decode_srgb, texture_table
 from lipmotion_faces.kernels.textured import (
     CLEAR,
     CUT,
@@ -191,10 +191,10 @@ def _looks(
 
 def _colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> Array:
     """Return the reflection of drawn vertices; those of textures have the colour of the material alone."""
-    own = np.array([linear(material.colour) for material in materials])[kinds]
+    own = np.array([decode_srgb(material.colour) for material in materials])[kinds]
     textured = np.array([material.texture is not None for material in materials])[kinds]
     if mesh.tints is not None:
         own = own * mesh.tints[rows, :3]
     if mesh.colours is None:
         return own
-    return np.where(textured[:, None], own, linear(mesh.colours[rows]))
+    return np.where(textured[:, None], own, decode_srgb(mesh.colours[rows]))

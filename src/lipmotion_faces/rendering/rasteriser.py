@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.textures import linear
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.rendering.lighting import LEVELS, WHITE, tone_table
 
@@ -152,5 +152,5 @@ def gradient(
     columns = (np.arange(camera.width) + 0.5 - camera.width / 2) / (0.75 * camera.height)
     rows = (np.arange(camera.height) + 0.5 - 0.42 * camera.height) / (0.75 * camera.height)
     near = np.exp(-(columns[None] ** 2) - rows[:, None] ** 2)[..., None]
-    light = near * linear(middle) + (1 - near) * linear(edge)
+    light = near * decode_srgb(middle) + (1 - near) * decode_srgb(edge)
     return np.asarray(light / WHITE, dtype=np.float32)

@@ -10,9 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.tracking.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion_faces.tracking.packages import import_opencv
-from lipmotion_faces.tracking.trackers import MEDIAPIPE, BoxFinder, FaceBox, LandmarkTracker, PointFinder, tracker_named
+from lipmotion_faces.tracking.trackers import (
+    EYE_CORNERS,
+    MEDIAPIPE,
+    TRACKED_POINTS,
+    BoxFinder,
+    FaceBox,
+    LandmarkTracker,
+    PointFinder,
+    tracker_named,
+)
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -39,7 +47,7 @@ class FaceWindow:
         whole = max(1, round(side))
         return FaceWindow(round(x - whole / 2), round(y - whole / 2), whole)
 
-    def shown(self, image: Image) -> Image:
+    def cut(self, image: Image) -> Image:
         """Return this part of a picture, scaled to ``SIZE_PX``; beyond the picture it is black."""
         cv2 = import_opencv()
         height, width = image.shape[:2]
@@ -51,13 +59,11 @@ class FaceWindow:
         if any(beyond):
             part = cv2.copyMakeBorder(part, *beyond, cv2.BORDER_CONSTANT)
         way = cv2.INTER_AREA if self.side > SIZE_PX else cv2.INTER_CUBIC
-        scaled: Image = cv2.resize(part, (SIZE_PX, SIZE_PX), interpolation=way)
-        return scaled
+        return cv2.resize(part, (SIZE_PX, SIZE_PX), interpolation=way)
 
     def to_picture(self, points: Array) -> Array:
         """Return points of the scaled window [shape=(..., 3)] as points of the picture, px."""
-        moved: Array = points * (self.side / SIZE_PX) + (self.left, self.top, 0)
-        return moved
+        return points * (self.side / SIZE_PX) + (self.left, self.top, 0)
 
 
 class WindowedMesh:
@@ -80,17 +86,14 @@ class WindowedMesh:
 
     def faces(self, image: Image) -> list[Array]:
         """Return the points of the face in the next picture, as ``PointFinder.faces``; none or one."""
-        found = [self._window.to_picture(face) for face in self._mesh.faces(self._window.shown(image))]
-        if found:
-            self._window = self._following(found[0])
-        return found
-
-    def _following(self, face: Array) -> FaceWindow:
-        low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
-        side = REACH * float((high - low).max())
-        is_steady = 1 / STEADY_RATIO < side / self._window.side < STEADY_RATIO
-        x, y = (low + high) / 2
-        return FaceWindow.around(float(x), float(y), self._window.side if is_steady else side)
+        faces = [self._window.to_picture(face) for face in self._mesh.faces(self._window.cut(image))]
+        if faces:
+            low, high = faces[0][:, :2].min(axis=0), faces[0][:, :2].max(axis=0)
+            side = REACH * float((high - low).max())
+            is_steady = 1 / STEADY_RATIO < side / self._window.side < STEADY_RATIO
+            x, y = (low + high) / 2
+            self._window = FaceWindow.around(float(x), float(y), self._window.side if is_steady else side)
+        return faces
 
 
 MOST_FACES = 4
@@ -159,26 +162,29 @@ class FaceFollower:
 
     def person(self) -> NDArray[np.bool_]:
         """Return in which frames the face found is that of the person [shape=(T,)]."""
-        kept = self._scenes_of_person()
-        return np.array([scene in kept for scene in self._scene_of_frame])
+        scenes = self._scenes_of_person()
+        return np.array([scene in scenes for scene in self._scene_of_frame])
 
     def share_of_person(self) -> float:
         """Return in which share of the frames with a face it is that of the person; 1 if there is no face."""
-        found = sum(scene is not None for scene in self._scene_of_frame)
-        return float(self.person().sum()) / found if found else 1.0
+        with_face = sum(scene is not None for scene in self._scene_of_frame)
+        return float(self.person().sum()) / with_face if with_face else 1.0
 
     def thumbnails(self) -> list[Array]:
         """Return thumbnails of the person's face, at most ``MOST_LOOKS`` from all scenes."""
-        kept = [self._scenes[index].thumbnails for index in sorted(self._scenes_of_person())]
-        found = [thumbnail for scene in kept for thumbnail in scene]
-        return found[:: -(-len(found) // MOST_LOOKS)] if found else []
+        scenes = sorted(self._scenes_of_person())
+        looks = [thumbnail for index in scenes for thumbnail in self._scenes[index].thumbnails]
+        return looks[:: -(-len(looks) // MOST_LOOKS)] if looks else []
 
     def cuts(self) -> list[int]:
         """Return the frames at which the camera changes, or the picture changes to or from somebody else."""
-        kept, cuts, last = self._scenes_of_person(), [], None
+        of_person, cuts, last = self._scenes_of_person(), [], None
         for index, scene in enumerate(self._scenes):
             if scene.thumbnails:
-                if last is not None and (index in kept, True) != (last in kept, scene.is_near(self._scenes[last])):
+                if last is not None and (index in of_person, True) != (
+                    last in of_person,
+                    scene.is_near(self._scenes[last]),
+                ):
                     cuts.append(self._scene_of_frame.index(index))
                 last = index
         return cuts
@@ -194,17 +200,17 @@ class FaceFollower:
         If a person is wanted, these are the scenes whose face resembles hers, and all whose face resembles one of them.
         """
         counts = np.bincount([n for n in self._scene_of_frame if n is not None], minlength=len(self._scenes))
-        kept = set() if self._wanted else {int(np.argmax(counts))}
+        of_person = set() if self._wanted else {int(np.argmax(counts))}
         while True:
-            known = self._wanted + [thumbnail for index in kept for thumbnail in self._scenes[index].thumbnails]
+            known = self._wanted + [thumbnail for index in of_person for thumbnail in self._scenes[index].thumbnails]
             more = {
                 index
                 for index, scene in enumerate(self._scenes)
                 if _best_correlation(scene.thumbnails, known) > SAME_PERSON_CORRELATION
-            } - kept
+            } - of_person
             if not more:
-                return kept
-            kept |= more
+                return of_person
+            of_person |= more
 
 
 class _Scene:
@@ -234,12 +240,23 @@ class _Scene:
 
     def next_face(self, image: Image) -> Array | None:
         """Return the points of the followed face in the next frame, None where it is not found."""
-        face = self._first_face(image) if self._last is None else self._same_face(image, self._last)
+        if self._last is None:
+            face = self._first = self._choose_face(image)
+        elif faces := self._faces(image):
+            last = self._last
+            near = [face for face in faces if self._could_be(face, last)]
+            self.is_lost = not near and not self._is_crowd
+            face = min(near, key=lambda face: _distance(face, last), default=None)
+        else:
+            face = self._search(image, self._last)
         if face is None:
             self.missing_frames += self._last is not None
             return None
         if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_LOOKS:
-            self._keep_thumbnail(face_thumbnail(image, face[_EYES, :2]))
+            look = face_thumbnail(image, face[_EYES, :2])
+            is_early = len(self.thumbnails) < MOST_THUMBNAILS
+            if is_early or _best_correlation([look], self.thumbnails) < NEW_LOOK_CORRELATION:
+                self.thumbnails.append(look)
         self._frames += 1
         self._last, self.missing_frames = face, 0
         return face
@@ -253,41 +270,36 @@ class _Scene:
         """Return whether this scene's face begins where the one before ended."""
         return self._first is not None and before._last is not None and before._could_be(self._first, before._last)
 
-    def _first_face(self, image: Image) -> Array | None:
-        if max(image.shape[:2]) > LARGE_PX:
-            self._first = self._searched(image)
-        if self._first is None:
-            faces = self._faces(image)
-            if faces:
-                faces = self._several(image) or faces
-                self._first = max(faces, key=lambda face: self._priority(image, face))
-            elif max(image.shape[:2]) <= LARGE_PX:
-                self._first = self._searched(image)
-        return self._first
-
-    def _same_face(self, image: Image, last: Array) -> Array | None:
+    def _choose_face(self, image: Image) -> Array | None:
+        """Return the face to follow; of several ones all are followed from now on, which takes twice the time."""
+        is_large = max(image.shape[:2]) > LARGE_PX
+        face = self._search(image) if is_large else None
+        if face is not None:
+            return face
         faces = self._faces(image)
         if not faces:
-            return self._searched(image, last)
-        near = [face for face in faces if self._could_be(face, last)]
-        self.is_lost = not near and not self._is_crowd
-        return min(near, key=lambda face: _distance(face, last), default=None)
+            return None if is_large else self._search(image)
+        crowd = self._open.enter_context(self._tracker.points(MOST_FACES))
+        several = crowd.faces(image)
+        if len(several) >= 2:
+            self._mesh, self._is_crowd, faces = crowd, True, several
+        return max(faces, key=lambda face: self._priority(image, face))
 
-    def _searched(self, image: Image, last: Array | None = None) -> Array | None:
+    def _search(self, image: Image, last: Array | None = None) -> Array | None:
         """Return the face that the detector finds, and follow it in a window from now on; None if there is none.
 
         last : the face followed so far, which it must be; None: the one of the highest priority is taken
         """
         boxes = self._finder.boxes(image, thorough=self._searches % THOROUGH_STEP == 0)
         self._searches += 1
-        found: list[tuple[Array, WindowedMesh]] = []
+        faces: list[tuple[Array, WindowedMesh]] = []
         with ExitStack() as tried:
             for box in boxes[:MOST_FACES]:
                 mesh = tried.enter_context(WindowedMesh(box, self._tracker))
-                found += [(face, mesh) for face in mesh.faces(image) if last is None or self._could_be(face, last)]
-            if not found:
+                faces += [(face, mesh) for face in mesh.faces(image) if last is None or self._could_be(face, last)]
+            if not faces:
                 return None
-            face, self._mesh = max(found, key=lambda pair: self._priority(image, pair[0]))
+            face, self._mesh = max(faces, key=lambda pair: self._priority(image, pair[0]))
             self._open.push(tried.pop_all())
         self._is_crowd = False
         return face
@@ -300,15 +312,6 @@ class _Scene:
         if self._mesh is None:
             self._mesh = self._open.enter_context(self._tracker.points())
         return self._mesh.faces(image)
-
-    def _several(self, image: Image) -> list[Array]:
-        """Return all faces if there are several, and follow all of them from now on, which takes twice the time."""
-        crowd = self._open.enter_context(self._tracker.points(MOST_FACES))
-        faces = crowd.faces(image)
-        if len(faces) < 2:
-            return []
-        self._mesh, self._is_crowd = crowd, True
-        return faces
 
     def _priority(self, image: Image, face: Array) -> tuple[bool, float]:
         """Return whether a face was followed before, and its size, which counts half at the edge of the picture."""
@@ -330,8 +333,7 @@ def _distance(face: Array, other: Array) -> float:
 
 def _middle(face: Array) -> Array:
     """Return the point between the outer eye corners, px [shape=(2,)]."""
-    middle: Array = face[_EYES, :2].mean(axis=0)
-    return middle
+    return face[_EYES, :2].mean(axis=0)
 
 
 def _size(face: Array) -> float:

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.storage.frame_groups import MOST_DECODED_BYTES, FrameGroups
 from lipmotion.types import Track
-from lipmotion_faces.tracking.frames import WHOLE, VideoSpan, open_video
-from lipmotion_faces.tracking.mouth_pictures import face_to_image
-from lipmotion_faces.tracking.timing import nearest_indices, resample_to_constant_rate
-from lipmotion_faces.tracking.track import track_of
-from lipmotion_faces.tracking.tracked_frames import TrackedFrames, tracked_frames
+from lipmotion_faces.tracking.frames import WHOLE, VideoSpan, nearest_indices, open_video, resample_to_constant_rate
+from lipmotion_faces.tracking.head_pose import face_to_image
+from lipmotion_faces.tracking.track import TrackedFrames, make_track, track_frames
 
 Array = NDArray[np.float64]
 
@@ -34,8 +32,8 @@ class Footage:
 
     path          : the video
     span          : the part of the video that was tracked
-    track         : motion of the lips and jaw, T frames, and which of them are seen; as ``vision.track.track`` finds it
-    face_to_image : affine maps of ``vision.mouth_pictures.face_to_image``, from px of the face that looks ahead to
+    track         : motion of the lips and jaw, T frames, and which of them are seen; as ``track.track`` finds it
+    face_to_image : affine maps of ``head_pose.face_to_image``, from px of the face that looks ahead to
                     px of the frame [shape=(T, 2, 3)]; in frames that are not seen, interpolated within their scene
     pictures_s    : time of the picture that frame n shows, the one nearest to its time, s since the start of ``span``
                     [shape=(T,)]; equal times in a row are a picture shown again
@@ -60,12 +58,12 @@ class Footage:
 def track_footage(path: Path, span: VideoSpan = WHOLE, *, person: Sequence[Array] = (), crops: bool = False) -> Footage:
     """Return a tracked video, and where the face is in every frame of it.
 
-    path, span, person : as of ``vision.track.track``
+    path, span, person : as of ``track.track``
     crops              : whether mouth pictures are wanted, for which the video is decoded once more
-    Raises InputError and MissingDependencyError: as ``vision.track.track``; InputError also if the pictures of the
+    Raises InputError and MissingDependencyError: as ``track.track``; InputError also if the pictures of the
     video have several sizes.
     """
-    frames = tracked_frames(path, span, person)
+    frames = track_frames(path, span, person)
     if len(frames.sizes) > 1:
         several = " and ".join(f"{width} × {height}" for height, width in sorted(frames.sizes)[:3])
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
@@ -73,7 +71,7 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, person: Sequence[Array
     return Footage(
         path,
         span,
-        track_of(path, span, frames, crops=crops),
+        make_track(path, span, frames, crops=crops),
         _maps(frames),
         frames.times_s[nearest_indices(frames.times_s, wanted_s)],
         tuple(_frames_of_cuts(frames)),
@@ -171,7 +169,7 @@ def _maps(frames: TrackedFrames) -> Array:
     return result.reshape(-1, 2, 3)
 
 
-def untracked_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
+def read_video_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
     """Return the frames of a video in constant order, and their rate; no face is looked for.
 
     Each is a uint8 array [shape=(H, W, 3)], RGB: the last picture that begins at or before the time of the frame. The
@@ -182,17 +180,17 @@ def untracked_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
         rates = [rate for rate in video.stated_rates_hz if rate > 0]
     if not rates:
         raise InputError(f"{path}: states no frame rate; convert it to a constant one")
-    return _held_frames(path, rates[0]), rates[0]
 
+    def frames() -> Iterator[NDArray[np.uint8]]:
+        shown: NDArray[np.uint8] | None = None
+        n = 0
+        with open_video(path) as video:
+            for picture in video.frames:
+                while shown is not None and n / rates[0] < picture.time_s - SAME_TIME_S:
+                    yield shown
+                    n += 1
+                shown = picture.image
+        if shown is not None:
+            yield shown
 
-def _held_frames(path: Path, rate_hz: float) -> Iterator[NDArray[np.uint8]]:
-    shown: NDArray[np.uint8] | None = None
-    n = 0
-    with open_video(path) as video:
-        for picture in video.frames:
-            while shown is not None and n / rate_hz < picture.time_s - SAME_TIME_S:
-                yield shown
-                n += 1
-            shown = picture.image
-    if shown is not None:
-        yield shown
+    return frames(), rates[0]

@@ -1,8 +1,8 @@
-"""Decoding of a video into pictures with their times."""
+"""Decoding of a video into pictures with their times, and resampling of what is found in them to a constant rate."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,9 +99,8 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
             stated_s = max(min(stated_s, span.end_s) - span.start_s, 0.0)
         if longest_px is not None:
             stream.thread_type = "AUTO"
-        with closing(
-            _frames(container, stream, path, span, longest_px, damage)
-        ) as frames:  # decoding from a closed container would crash
+        frames = _frames(container, stream, path, span, longest_px, damage)
+        with closing(frames):  # decoding from a closed container would crash
             yield OpenVideo(frames, tuple(rates), stated_s, damage)
 
 
@@ -175,31 +174,23 @@ def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
                     damage.append("a damaged picture")
                 else:
                     yield picture
-        except StopIteration:
-            return
-        except av.EOFError:
+        except (StopIteration, av.EOFError):
             return
         except av.FFmpegError as error:
             damage.append(str(error.strerror))
 
 
 def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:
-    """Raise InputError for pictures that are too small or too large.
-
-    pixel_shape : width of a pixel over its height
-    """
+    """Raise InputError for pictures that are too small or too large; ``pixel_shape``: width of a pixel over height."""
     if not width or not height:  # FFmpeg gives no size for pictures that it refuses
         raise InputError(f"{path}: pictures of no size, or of more than {MOST_PIXELS} pixels; scale the video")
     shown = round(width * pixel_shape)
     if not (LEAST_SIDE_PX <= shown <= LONGEST_SIDE_PX and LEAST_SIDE_PX <= height <= LONGEST_SIDE_PX):
-        raise InputError(
-            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_SIDE_PX} to {LONGEST_SIDE_PX}; scale "
-            "the video"
-        )
+        sides = f"{LEAST_SIDE_PX} to {LONGEST_SIDE_PX}"
+        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {sides}; scale the video")
     if shown * height > MOST_PIXELS:
-        raise InputError(
-            f"{path}: pictures of {shown} × {height} pixels, required at most {MOST_PIXELS} in all; scale the video"
-        )
+        most = f"at most {MOST_PIXELS} in all"
+        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {most}; scale the video")
 
 
 def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
@@ -217,5 +208,76 @@ def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) ->
         return image
     cv2 = import_opencv()
     turn = (cv2.ROTATE_90_COUNTERCLOCKWISE, cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE)[quarter_turns - 1]
-    rotated: NDArray[np.uint8] = cv2.rotate(image, turn)
-    return rotated
+    return cv2.rotate(image, turn)
+
+
+Array = NDArray[np.float64]
+
+RATE_TOLERANCE = 0.05
+"""A frame rate that the container states is used when it differs from that of the time stamps by this share or less."""
+TIME_TOLERANCE = 0.05
+"""A frame this close to its nominal time, in frames, counts as on time: time stamps are often rounded to 1 ms."""
+CUBIC_GAP = 4.0
+"""Gaps of up to this many frames are interpolated by a cubic spline; in longer ones it could overshoot: linearly."""
+RATE_WHEN_UNKNOWN_HZ = 25.0
+LOWEST_HZ, HIGHEST_HZ = 1.0, 1000.0
+"""Lowest and highest frame rate: lip motion needs more than the lowest, no camera is faster than the highest."""
+
+
+def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
+    """Return the constant frame rate of the time stamps, even if frames were dropped.
+
+    times_s         : times of the decoded frames, rising
+    stated_rates_hz : of the container; the first that fits the median interval of the times is returned
+    """
+    if len(times_s) < 2:
+        return stated_rates_hz[0] if stated_rates_hz else RATE_WHEN_UNKNOWN_HZ
+    measured = 1.0 / float(np.median(np.diff(times_s)))
+    fitting = [rate for rate in stated_rates_hz if abs(rate / measured - 1) <= RATE_TOLERANCE]
+    return fitting[0] if fitting else measured
+
+
+def check_rate(rate_hz: float, path: Path) -> None:
+    """Raise InputError for a frame rate that no video of a face has: its time stamps are wrong."""
+    if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
+        raise InputError(
+            f"{path}: {rate_hz:g} pictures a second, required {LOWEST_HZ:g} to {HIGHEST_HZ:g}; export the video again"
+        )
+
+
+def frame_count(times_s: Array, rate_hz: float) -> int:
+    """Return how many frames at a constant rate, the first at 0 s, there are up to the last time."""
+    return round(float(times_s[-1]) * rate_hz) + 1
+
+
+def nearest_indices(times_s: Array, wanted_s: Array) -> NDArray[np.intp]:
+    """Return the index of the time nearest to each wanted time [shape=(len(wanted_s),)]."""
+    after = np.clip(np.searchsorted(times_s, wanted_s), 1, max(len(times_s) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(times_s) - 1)
+    return np.where(wanted_s - times_s[before] <= times_s[after] - wanted_s, before, after)
+
+
+def resample_to_constant_rate(times_s: Array, values: Array, rate_hz: float, count: int) -> Array:
+    """Return the values at the times n / rate_hz.
+
+    times_s : array [shape=(S,)], rising
+    values  : array [shape=(S, P)]
+    count   : of frames returned
+    Returns array [shape=(count, P)]: frames that are on time unchanged, others by a cubic spline through all (linear in
+    long gaps), constant before the first and after the last.
+    """
+    from scipy.interpolate import CubicSpline
+
+    wanted_s = np.clip(np.arange(count) / rate_hz, times_s[0], times_s[-1])
+    index = nearest_indices(times_s, wanted_s)
+    result: Array = values[index].copy()
+    after = np.clip(np.searchsorted(times_s, wanted_s), 1, max(len(times_s) - 1, 1))
+    moved = np.abs(times_s[index] - wanted_s) * rate_hz > TIME_TOLERANCE
+    if not moved.any():
+        return result
+    wide = moved & ((times_s[after] - times_s[after - 1]) * rate_hz > CUBIC_GAP)
+    result[moved] = CubicSpline(times_s, values)(wanted_s[moved])
+    share = ((wanted_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1]))[wide, None]
+    result[wide] = (1 - share) * values[after[wide] - 1] + share * values[after[wide]]
+    return result

@@ -1,4 +1,7 @@
-"""Removal of head motion: every frame is aligned to the mean face of its clip."""
+"""The pose of the head: every frame is aligned to the mean face of its clip, and mouth pictures are cut by it.
+
+In a mouth picture the head is upright, faces the camera and has always the same size.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking.landmarks import EYE_CORNERS, FOREHEAD, FOREHEAD_SLOPE_DEG, NASION, RIGID_POINTS
+from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT, WIDTH
+from lipmotion_faces.tracking.packages import import_opencv
+from lipmotion_faces.tracking.trackers import (
+    EYE_CORNERS,
+    FOREHEAD,
+    FOREHEAD_SLOPE_DEG,
+    LIP_POINTS,
+    NASION,
+    RIGID_POINTS,
+    TRACKED_POINTS,
+)
 
 Array = NDArray[np.float64]
 
 ROUNDS = 3
 """Iterations of aligning to the mean face and averaging again. On GRID the second moves points by up to 4e-6 eye
 distances, the third by less than 1e-9."""
+_LIPS = [TRACKED_POINTS.index(index) for index in LIP_POINTS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +49,7 @@ class HeadPose:
     def to_head_coordinates(self, points: Array) -> Array:
         """Return points [shape=(T, N, 3)] in head coordinates."""
         rotated = self.scale[:, None, None] * (points @ self.rotation.transpose(0, 2, 1))
-        moved: Array = (rotated + self.translation[:, None, :]) / self.unit
-        return moved
+        return (rotated + self.translation[:, None, :]) / self.unit
 
     def plane_to_image(self, depth: float) -> Array:
         """Return the affine maps [shape=(T, 2, 3)] from (x, y) of the head's plane z = depth to the image."""
@@ -45,7 +58,7 @@ class HeadPose:
         return np.concatenate([back[:, :2, :2] * self.unit, origin[:, :2]], axis=2)
 
 
-def head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
+def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
     """Return the pose of a head in every frame.
 
     points : array [shape=(T, N, 3)], any unit, x to the speaker's left, y up, z out of the face
@@ -55,24 +68,29 @@ def head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
     """
     column = {index: n for n, index in enumerate(layout)}
     rigid = points[:, [column[index] for index in RIGID_POINTS]]
-    face = _mean_face(rigid)
-    rotation, scale, translation = similarity_transforms(rigid, face)
+    face = rigid[0] - rigid[0].mean(axis=0)
+    size = np.linalg.norm(face)
+    for _ in range(ROUNDS):  # generalised Procrustes analysis
+        rotation, scale, translation = fit_similarities(rigid, face)
+        face = (scale[:, None, None] * (rigid @ rotation.transpose(0, 2, 1)) + translation[:, None, :]).mean(axis=0)
+        face *= size / np.linalg.norm(face)  # without this the mean shrinks from round to round
+    rotation, scale, translation = fit_similarities(rigid, face)
     axes, origin, unit = _head_axes(face)
     return HeadPose(axes @ rotation, scale, (translation - origin) @ axes.T, unit)
 
 
-def without_head_motion(points: Array, layout: Sequence[int]) -> Array:
+def remove_head_motion(points: Array, layout: Sequence[int]) -> Array:
     """Return the points in head coordinates, without the motion of the head [shape=(T, N, 3)].
 
-    points, layout : as in ``head_pose``
+    points, layout : as in ``estimate_head_pose``
     The origin lies between the outer eye corners of the mean face, the unit is their distance, x points to the
     speaker's left, y up, z out of the face. Every frame is rotated, translated and scaled as a whole, which keeps the
     motion of speech.
     """
-    return head_pose(points, layout).to_head_coordinates(points)
+    return estimate_head_pose(points, layout).to_head_coordinates(points)
 
 
-def similarity_transforms(points: Array, target: Array) -> tuple[Array, Array, Array]:
+def fit_similarities(points: Array, target: Array) -> tuple[Array, Array, Array]:
     """Return the rotations, scales and translations that bring each frame closest to one shape.
 
     points : array [shape=(T, K, 3)]
@@ -91,17 +109,6 @@ def similarity_transforms(points: Array, target: Array) -> tuple[Array, Array, A
     return rotation, scale, translation
 
 
-def _mean_face(rigid: Array) -> Array:
-    """Return the mean of all frames' rigid points [shape=(K, 3)] after alignment (generalised Procrustes analysis)."""
-    face = rigid[0] - rigid[0].mean(axis=0)
-    size = np.linalg.norm(face)
-    for _ in range(ROUNDS):
-        rotation, scale, translation = similarity_transforms(rigid, face)
-        face = (scale[:, None, None] * (rigid @ rotation.transpose(0, 2, 1)) + translation[:, None, :]).mean(axis=0)
-        face *= size / np.linalg.norm(face)  # without this the mean shrinks from round to round
-    return face
-
-
 def _head_axes(face: Array) -> tuple[Array, Array, float]:
     """Return the head's axes as rows [shape=(3, 3)], the origin [shape=(3,)] and the unit, from its rigid points."""
     right_eye, left_eye, forehead, nasion = (
@@ -114,3 +121,63 @@ def _head_axes(face: Array) -> tuple[Array, Array, float]:
     slope = np.deg2rad(FOREHEAD_SLOPE_DEG)
     y = np.cos(slope) * up + np.sin(slope) * np.cross(x, up)
     return np.stack([x, y, np.cross(x, y)]), (left_eye + right_eye) / 2, unit
+
+
+def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
+    """Return the mouth picture of one frame: uint8 array [shape=(56, 72, 3)].
+
+    image    : uint8 array [shape=(H, W, 3)]
+    to_image : affine map [shape=(2, 3)] of ``face_to_image`` or ``eyes_to_image``
+    Pixels outside the image repeat its edge.
+    """
+    cv2 = import_opencv()
+    shrink = max(1, int(np.sqrt(abs(np.linalg.det(to_image[:, :2]))) + 1e-9))
+    crop: NDArray[np.uint8] = cv2.warpAffine(
+        image,
+        region_to_image(to_image, shrink),
+        (WIDTH * shrink, HEIGHT * shrink),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    if shrink > 1:  # a large face is sampled finely and averaged: no pixel of it is skipped
+        crop = cv2.resize(crop, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    return crop
+
+
+def region_to_image(to_image: Array, samples: int = 1) -> Array:
+    """Return the affine map from a pixel of the mouth region to its position in the image [shape=(2, 3)].
+
+    to_image : as in ``crop_mouth``
+    samples  : pixels per pixel of the region, along each side
+    Pixel (0, 0) is a centre, as OpenCV counts; its upper left corner lies at ``CORNER``.
+    """
+    turn = to_image[:, :2]
+    first = np.array(CORNER) + 0.5 / samples
+    return np.concatenate([turn / samples, (to_image[:, 2] - 0.5 + turn @ first)[:, None]], axis=1)
+
+
+def face_to_image(points: Array) -> Array:
+    """Return the affine maps of every frame from the plane of the lips, without head motion, to the image.
+
+    points : array [shape=(T, len(TRACKED_POINTS), 3)] of one person, px, x to the right, y down, z away from the camera
+    Returns affine maps [shape=(T, 2, 3)] from px of the face that looks straight ahead (origin between the outer eye
+    corners, these level and 90 px apart, y down) to px of the image. The plane is as far in front of the eyes as the
+    lips are on average, so a nod neither moves nor shortens the mouth.
+    """
+    upright = points * (1, -1, -1)
+    pose = estimate_head_pose(upright, TRACKED_POINTS)
+    maps = pose.plane_to_image(float(pose.to_head_coordinates(upright)[:, _LIPS, 2].mean()))
+    maps[:, 1] *= -1  # y is down in the image,
+    maps[:, :, 1] *= -1  # and in the region
+    maps[:, :, :2] /= EYE_DISTANCE_PX
+    return maps
+
+
+def eyes_to_image(eyes: Array) -> Array:
+    """Return the affine map of ``face_to_image`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
+
+    eyes : array [shape=(2, 2)], x and y of the right and left outer eye corner in the image, px, y down
+    """
+    across = (eyes[1] - eyes[0]) / EYE_DISTANCE_PX
+    turn = np.array([[across[0], -across[1]], [across[1], across[0]]])
+    return np.concatenate([turn, eyes.mean(axis=0)[:, None]], axis=1)

@@ -70,8 +70,7 @@ def face_thumbnail(image: Image, eyes: Array) -> Array:
 def mouth_thumbnail(crop: Image) -> NDArray[np.uint8]:
     """Return a thumbnail of a mouth picture [shape=(14, 18, 3)]."""
     cv2 = import_opencv()
-    small: NDArray[np.uint8] = cv2.resize(crop, MOUTH_SIZE, interpolation=cv2.INTER_AREA)
-    return small
+    return cv2.resize(crop, MOUTH_SIZE, interpolation=cv2.INTER_AREA)
 
 
 def image_correlation(first: Array, other: Array) -> Array:
@@ -95,15 +94,10 @@ def occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
     unlike = (image_correlation(values, median) < OCCLUDED_CORRELATION) & (
         np.abs(values - median).mean(axis=(1, 2, 3)) > OCCLUDED_DIFFERENCE
     )
-    unlike[unlike] = _shifted_correlation(values[unlike], median) < SHIFTED_CORRELATION
-    return unlike
-
-
-def _shifted_correlation(mouths: Array, median: Array) -> Array:
-    """Return the highest correlation of each mouth region with the median one, at any shift up or down."""
-    best = np.full(len(mouths), -1.0)
+    suspects, best = values[unlike], np.full(unlike.sum(), -1.0)
     for shift in range(1, NOD_ROWS + 1):
-        up = image_correlation(mouths[:, :-shift], median[shift:])
-        down = image_correlation(mouths[:, shift:], median[:-shift])
+        up = image_correlation(suspects[:, :-shift], median[shift:])
+        down = image_correlation(suspects[:, shift:], median[:-shift])
         best = np.maximum(best, np.maximum(up, down))
-    return best
+    unlike[unlike] = best < SHIFTED_CORRELATION
+    return unlike

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import metadata
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking.face_mesh import FaceMesh, quiet_stderr
-from lipmotion_faces.tracking.packages import import_face_detection, import_opencv, missing
-from lipmotion_faces.tracking.trackers import MEDIAPIPE, FaceBox, LandmarkTracker
+from lipmotion_faces.tracking.packages import import_face_detection, import_face_mesh, import_opencv, missing
+from lipmotion_faces.tracking.trackers import MEDIAPIPE, TRACKED_POINTS, FaceBox, LandmarkTracker
 
+GraphT = TypeVar("GraphT", bound="_Graph")
 Image = NDArray[np.uint8]
 
 FULL_RANGE_MODEL = 1
@@ -26,21 +29,64 @@ LEAST_PART_PX = 480
 """Pictures with a shorter side below this are searched as a whole only: parts would show no smaller faces."""
 
 
-class FaceFinder:
-    """Finds the faces in single pictures, in any order; it keeps nothing from one picture to the next.
+class _Graph:
+    """A graph of MediaPipe that starts with its first picture, without its log output. Use it as a context manager."""
 
-    Use it as a context manager. Raises MissingDependencyError when it is first used: MediaPipe is not installed.
-    """
+    def __init__(self, start: Callable[[], Any]) -> None:
+        self._start = start
+        self._running: Any = None
 
-    def __init__(self) -> None:
-        self._detector: Any = None
-
-    def __enter__(self) -> FaceFinder:
+    def __enter__(self: GraphT) -> GraphT:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._detector is not None:
-            self._detector.close()
+        if self._running is not None:
+            self._running.close()
+
+    def _process(self, image: Image) -> Any:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "SymbolDatabase.GetPrototype", UserWarning)
+            if self._running is not None:
+                return self._running.process(image)
+            with quiet_stderr():  # the graph logs while it starts, up to its first result
+                self._running = self._start()
+                return self._running.process(image)
+
+
+class FaceMesh(_Graph):
+    """Finds the faces in the frames of one clip, in order; it follows them from frame to frame.
+
+    most : the largest number of faces to find; with 1, the most probable one is kept
+    Raises MissingDependencyError: MediaPipe is not installed.
+    """
+
+    def __init__(self, most: int = 1) -> None:
+        module = import_face_mesh()
+        super().__init__(lambda: module.FaceMesh(max_num_faces=most, refine_landmarks=True))
+
+    def faces(self, image: Image) -> list[NDArray[np.float64]]:
+        """Return the points of every face in the next frame.
+
+        image : uint8 array [shape=(H, W, 3)], RGB
+        Returns one array a face [shape=(len(TRACKED_POINTS), 3)]: px, x to the right, y down, z away from the camera.
+        """
+        height, width = image.shape[:2]
+        return [
+            np.array([(point.x, point.y, point.z) for point in (face.landmark[index] for index in TRACKED_POINTS)])
+            * (width, height, width)
+            for face in self._process(image).multi_face_landmarks or ()
+        ]
+
+
+class FaceFinder(_Graph):
+    """Finds the faces in single pictures, in any order; it keeps nothing from one picture to the next.
+
+    Raises MissingDependencyError when it is first used: MediaPipe is not installed.
+    """
+
+    def __init__(self) -> None:
+        settings = {"min_detection_confidence": LEAST_SCORE, "model_selection": FULL_RANGE_MODEL}
+        super().__init__(lambda: import_face_detection().FaceDetection(**settings))
 
     def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
         """Return the faces in a picture, those with the highest score first.
@@ -49,35 +95,30 @@ class FaceFinder:
         thorough : where the whole picture shows none, search the parts of ``parts`` too, which takes four times as long
         A face needs an eye distance of a fortieth of the picture's longer side; in a part, of the shorter side.
         """
-        reduced, scale = _reduced(image)
-        found = self._found(reduced)
-        if not found and thorough and min(reduced.shape[:2]) >= LEAST_PART_PX:
-            for left, top, side in parts(*reduced.shape[:2]):
-                part = np.ascontiguousarray(reduced[top : top + side, left : left + side])
-                found += [FaceBox(box.x + left, box.y + top, box.side, box.score) for box in self._found(part)]
-        boxes = [FaceBox(box.x * scale, box.y * scale, box.side * scale, box.score) for box in found]
-        return _distinct(sorted(boxes, key=lambda box: -box.score))
+        scale = max(max(image.shape[:2]) / LONGEST_PX, 1.0)
+        if scale > 1:
+            cv2 = import_opencv()
+            size = round(image.shape[1] / scale), round(image.shape[0] / scale)
+            image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        boxes = self._find(image)
+        if not boxes and thorough and min(image.shape[:2]) >= LEAST_PART_PX:
+            for left, top, side in parts(*image.shape[:2]):
+                part = np.ascontiguousarray(image[top : top + side, left : left + side])
+                boxes += [FaceBox(box.x + left, box.y + top, box.side, box.score) for box in self._find(part)]
+        distinct: list[FaceBox] = []
+        for box in sorted(boxes, key=lambda box: -box.score):  # a face may be in several parts
+            if not any(max(abs(box.x - other.x), abs(box.y - other.y)) < other.side / 2 for other in distinct):
+                distinct.append(box)
+        return [FaceBox(box.x * scale, box.y * scale, box.side * scale, box.score) for box in distinct]
 
-    def _found(self, image: Image) -> list[FaceBox]:
+    def _find(self, image: Image) -> list[FaceBox]:
         height, width = image.shape[:2]
-        found = []
+        boxes = []
         for detection in self._process(image).detections or ():
             box = detection.location_data.relative_bounding_box
             middle = (box.xmin + box.width / 2) * width, (box.ymin + box.height / 2) * height
-            found.append(FaceBox(*middle, max(box.width * width, box.height * height), detection.score[0]))
-        return found
-
-    def _process(self, image: Image) -> Any:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "SymbolDatabase.GetPrototype", UserWarning)
-            if self._detector is not None:
-                return self._detector.process(image)
-            module = import_face_detection()
-            with quiet_stderr():  # the graph logs while it starts, up to its first result
-                self._detector = module.FaceDetection(
-                    min_detection_confidence=LEAST_SCORE, model_selection=FULL_RANGE_MODEL
-                )
-                return self._detector.process(image)
+            boxes.append(FaceBox(*middle, max(box.width * width, box.height * height), detection.score[0]))
+        return boxes
 
 
 def parts(height: int, width: int) -> Iterator[tuple[int, int, int]]:
@@ -87,28 +128,29 @@ def parts(height: int, width: int) -> Iterator[tuple[int, int, int]]:
         yield (width - side) * third // 2, (height - side) * third // 2, side
 
 
-def _reduced(image: Image) -> tuple[Image, float]:
-    """Return a picture of at most ``LONGEST_PX``, and the size of its pixels in those of the picture given."""
-    scale = max(image.shape[:2]) / LONGEST_PX
-    if scale <= 1:
-        return image, 1.0
-    cv2 = import_opencv()
-    size = round(image.shape[1] / scale), round(image.shape[0] / scale)
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA), scale
-
-
-def _distinct(boxes: list[FaceBox]) -> list[FaceBox]:
-    """Return the boxes without those whose middle lies in an earlier one: a face may be in several parts."""
-    kept: list[FaceBox] = []
-    for box in boxes:
-        if not any(max(abs(box.x - other.x), abs(box.y - other.y)) < other.side / 2 for other in kept):
-            kept.append(box)
-    return kept
+@contextmanager
+def quiet_stderr() -> Iterator[None]:
+    """Discard the output of native code to stderr: MediaPipe logs before its log level can be set."""
+    try:
+        saved = os.dup(2)
+    except OSError:  # the process has no stderr
+        yield
+        return
+    try:
+        if sys.stderr is not None:
+            sys.stderr.flush()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 2)
+        os.close(nowhere)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
 
 
 @final
 class MediaPipe(LandmarkTracker):
-    """The face mesh of MediaPipe, whose numbers of points are those of ``vision.landmarks``."""
+    """The face mesh of MediaPipe, whose numbers of points are those of ``landmarks``."""
 
     def versions(self) -> dict[str, str]:  # noqa: D102
         try:

@@ -32,8 +32,7 @@ def import_face_detection() -> Any:
 def tracking_versions() -> str:
     """Return the version of OpenCV; MediaPipe is imported, too. Raises MissingDependencyError: one cannot be."""
     import_face_mesh()
-    version: str = import_opencv().__version__
-    return version
+    return import_opencv().__version__
 
 
 def _import_solution(name: str) -> Any:

@@ -57,10 +57,10 @@ MOUTH = np.array([0.0, CORNER[1] + 28.0])
 def steady_maps(maps: Array, rate_hz: float, cuts: Sequence[int] = (), *, noise_px: float = TRACKED_NOISE_PX) -> Array:
     """Return maps of a face, smoothed over time [shape=(T, 2, 3)].
 
-    maps    : of ``Footage.face_to_image`` or ``registered_maps`` [shape=(T, 2, 3)]
+    maps    : of ``Footage.face_to_image`` or ``register_maps`` [shape=(T, 2, 3)]
     rate_hz : frame rate
     cuts    : frames before which the camera changes; nothing is smoothed over them
-    noise_px : ``TRACKED_NOISE_PX``, or ``REGISTERED_NOISE_PX`` for maps of ``registered_maps``
+    noise_px : ``TRACKED_NOISE_PX``, or ``REGISTERED_NOISE_PX`` for maps of ``register_maps``
     The turn and size of the face, and the position of the mouth, are smoothed by Gaussians. What they take away is
     noise where it is small, and is taken away; where it is large, it is motion of the head, and stays: a part r is
     scaled by u² / (u² + ``noise_px``²), u its root mean square at that time.
@@ -68,11 +68,18 @@ def steady_maps(maps: Array, rate_hz: float, cuts: Sequence[int] = (), *, noise_
     result = np.array(maps, dtype=np.float64)
     for start, stop in pairwise([0, *cuts, len(maps)]):
         if stop - start > 1:
-            result[start:stop] = _steady_scene(result[start:stop], rate_hz, noise_px)
+            scene = result[start:stop]
+            turn, mouth = scene[:, :, :2], scene[:, :, :2] @ MOUTH + scene[:, :, 2]
+            size = float(np.sqrt(np.abs(np.linalg.det(turn))).mean())
+            reach = float(np.linalg.norm(MOUTH)) / 2  # how far an error of the turn moves a pixel of the mouth, about
+            share, envelope = 1 / (size * noise_px), ENVELOPE_S * rate_hz
+            turn = _remove_noise(turn.reshape(-1, 4), SHAPE_S * rate_hz, reach * share, envelope).reshape(-1, 2, 2)
+            mouth = _remove_noise(mouth, POSITION_S * rate_hz, share, envelope)
+            result[start:stop] = np.concatenate([turn, (mouth - turn @ MOUTH)[:, :, None]], axis=2)
     return result
 
 
-def registered_maps(footage: Footage) -> Array:
+def register_maps(footage: Footage) -> Array:
     """Return the maps of the face in tracked footage, corrected by the pictures [shape=(T, 2, 3)].
 
     The tracker lags behind quick motion of the head and trembles. Nose and cheeks of each frame, aligned by
@@ -98,39 +105,27 @@ def registered_maps(footage: Footage) -> Array:
     result = maps.copy()
     for start, stop in pairwise([0, *footage.cuts, len(footage)]):
         moved = np.cumsum(steps[start:stop], axis=0)
-        quick = moved - _smoothed(moved, DRIFT_S * footage.rate_hz, "reflect")
+        quick = moved - _smooth(moved, DRIFT_S * footage.rate_hz, "reflect")
         result[start:stop, :, 2] += (maps[start:stop, :, :2] @ quick[:, :, None])[:, :, 0]
     return result
 
 
-def _steady_scene(maps: Array, rate_hz: float, noise_px: float) -> Array:
-    """Return the steady maps of frames without a cut."""
-    turn, mouth = maps[:, :, :2], maps[:, :, :2] @ MOUTH + maps[:, :, 2]
-    size = float(np.sqrt(np.abs(np.linalg.det(turn))).mean())
-    reach = float(np.linalg.norm(MOUTH)) / 2  # how far an error of the turn moves a pixel of the mouth region, about
-    share, envelope = 1 / (size * noise_px), ENVELOPE_S * rate_hz
-    turn = _without_noise(turn.reshape(-1, 4), SHAPE_S * rate_hz, reach * share, envelope).reshape(-1, 2, 2)
-    mouth = _without_noise(mouth, POSITION_S * rate_hz, share, envelope)
-    return np.concatenate([turn, (mouth - turn @ MOUTH)[:, :, None]], axis=2)
-
-
-def _without_noise(rows: Array, sigma: float, share: float, envelope: float) -> Array:
+def _remove_noise(rows: Array, sigma: float, share: float, envelope: float) -> Array:
     """Return smooth rows, and what smoothing takes away where it is much larger than noise.
 
     sigma, envelope : standard deviations, frames
     share           : 1 / noise
     """
-    smooth = _smoothed(rows, sigma)
+    smooth = _smooth(rows, sigma)
     rest = rows - smooth
-    power = _smoothed(np.square(rest * share).sum(axis=1), envelope)
+    power = _smooth(np.square(rest * share).sum(axis=1), envelope)
     return smooth + (power / (power + 1))[:, None] * rest
 
 
-def _smoothed(rows: Array, sigma: float, mode: str = "nearest") -> Array:
+def _smooth(rows: Array, sigma: float, mode: str = "nearest") -> Array:
     from scipy.ndimage import gaussian_filter1d
 
-    smooth: Array = gaussian_filter1d(rows, sigma, axis=0, mode=mode)
-    return smooth
+    return gaussian_filter1d(rows, sigma, axis=0, mode=mode)
 
 
 def _blurred_region(frame: NDArray[np.uint8], to_image: Array, samples: float) -> list[Floats]:
@@ -158,9 +153,9 @@ def _step(before: Sequence[Floats], after: Sequence[Floats]) -> Array:
         return np.zeros(2)
     step = np.zeros(2)
     for reference, moved in zip(before, after, strict=True):
-        step = _registered(reference, moved, step)
+        step = _register(reference, moved, step)
     reference, moved = before[-1], after[-1]
-    is_better = _correlation(reference, _shifted(moved, step)) >= _correlation(reference, moved)
+    is_better = _correlation(reference, _shift(moved, step)) >= _correlation(reference, moved)
     return step if is_better else np.zeros(2)
 
 
@@ -169,7 +164,7 @@ def _correlation(first: Floats, other: Floats) -> float:
     return float((a * b).mean() / max(a.std() * b.std(), 1e-9))
 
 
-def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
+def _register(reference: Floats, moved: Floats, step: Array) -> Array:
     """Return a step, improved by least squares on the gradients (Lucas & Kanade 1981)."""
     inner = (slice(MARGIN, -MARGIN), slice(MARGIN, -MARGIN))
     slopes: list[Array] = list(np.gradient(reference.astype(np.float64)))
@@ -180,7 +175,7 @@ def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
     if np.linalg.cond(power) > 1e12:  # no texture in one direction
         return step
     for _ in range(ROUNDS):
-        difference = (_shifted(moved, step)[inner] - reference[inner]).ravel().astype(np.float64)
+        difference = (_shift(moved, step)[inner] - reference[inner]).ravel().astype(np.float64)
         change = [float(value) for value in np.linalg.solve(power, terms.T @ difference)[:2]]
         step = step - np.array(change)
         if max(map(abs, change)) < 1e-3:
@@ -188,7 +183,7 @@ def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
     return step
 
 
-def _shifted(image: Floats, step: Array) -> Floats:
+def _shift(image: Floats, step: Array) -> Floats:
     """Return the picture whose pixel x is pixel x + step of the given one."""
     cv2 = import_opencv()
     to_source = np.array([[1, 0, step[0]], [0, 1, step[1]]])

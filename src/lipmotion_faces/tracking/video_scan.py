@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.tracking.face_follower import FaceFollower
-from lipmotion_faces.tracking.frames import damage_notes, open_video
+from lipmotion_faces.tracking.frames import check_rate, damage_notes, nominal_rate_hz, open_video
 from lipmotion_faces.tracking.image_similarity import is_cut, scene_thumbnail
-from lipmotion_faces.tracking.timing import check_rate, nominal_rate_hz
 from lipmotion_faces.tracking.trackers import MEDIAPIPE
 
 LOOK_PX = 640

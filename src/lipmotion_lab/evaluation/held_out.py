@@ -27,7 +27,6 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import (
     GREY,
     Monitor,
-    Motion,
     Speech,
     Timeline,
     Unit,
@@ -83,14 +82,9 @@ class HeldOutRecordings:
 
     def first(self, count: int) -> HeldOutRecordings:
         """Return the first recordings alone."""
-        parts = {name: phones[:count] for name, phones in self.conditions.items()}
-        return replace(
-            self,
-            utterances=self.utterances[:count],
-            reference=self.reference[:count],
-            conditions=parts,
-            recognitions=self.recognitions[:count],
-        )
+        conditions = {name: phones[:count] for name, phones in self.conditions.items()}
+        parts = {name: getattr(self, name)[:count] for name in ("utterances", "reference", "recognitions")}
+        return replace(self, conditions=conditions, **parts)
 
     def person(self, utterance: Utterance) -> SpeakerMap | None:
         """Return the map to the motion of an utterance's speaker; None for a stranger."""
@@ -120,7 +114,7 @@ class ComparedClip:
     spoken: tuple[tuple[float, float, str], ...]
 
 
-def held_out_recordings(  # noqa: PLR0913
+def load_held_out(  # noqa: PLR0913
     corpus: Corpus,
     phones: Recogniser,
     *,
@@ -137,7 +131,7 @@ def held_out_recordings(  # noqa: PLR0913
 
     phones    : the recogniser
     selection : the utterances; by default those of the list ``test``
-    channels  : the channels to compare, whether they move or not; None: from ``compared_channels``
+    channels  : the channels to compare, whether they move or not; None: from ``choose_channels``
     visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
     prior     : the model on which the evaluated one stands, or None
     speakers  : maps of the people whom the evaluated model knows, or None
@@ -146,10 +140,15 @@ def held_out_recordings(  # noqa: PLR0913
     utterances = [
         with_visual_channels(corpus.utterance(name), visual, eigenlips) for name in corpus.selected(selection)
     ]
-    compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
+    compared, still = (tuple(channels), ()) if channels is not None else choose_channels(utterances)
     warn_of_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     aligned = with_progress(utterances, "phones: alignment", sub_monitor(monitor, 0, 0.4))
-    reference = [_reference(utterance, phones, lexicon) for utterance in aligned]
+    reference = []
+    for utterance in aligned:
+        try:
+            reference.append(phones_of(utterance, phones, lexicon))
+        except AlignmentError as error:
+            raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
     threshold = None
     if OPENING in compared:
         training = [corpus.utterance(name) for name in corpus.names("train", selection.speakers)]
@@ -167,7 +166,7 @@ def held_out_recordings(  # noqa: PLR0913
     )
 
 
-def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def choose_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names of the channels to compare, and of those that are left out because they do not move.
 
     All eigenlips are compared, whether they move or not: their figures are means over a known number.
@@ -181,7 +180,7 @@ def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...],
     if set(names) >= set(DISTANCES):
         return (*DISTANCES, *eigenlips), ()
     originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
-    moves = curves.moving(originals, [channel.unit for channel in channels])
+    moves = curves.select_moving(originals, [channel.unit for channel in channels])
     moves |= np.array([channel.unit == GREY for channel in channels])
     if not moves.any():
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
@@ -189,23 +188,7 @@ def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...],
     return moving, tuple(name for name in names if name not in moving)
 
 
-def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
-    """Raise CorpusError if generated motion lacks a channel that is compared."""
-    missing = [name for name in compared if name not in motion.names]
-    if missing:
-        raise CorpusError(
-            f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it was trained on other motion"
-        )
-
-
-def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
-    try:
-        return phones_of(utterance, phones, lexicon)
-    except AlignmentError as error:
-        raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
-
-
-def compared_clips(
+def generate_clips(
     recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
     """Return recorded and generated motion of all utterances under a condition.
@@ -213,74 +196,57 @@ def compared_clips(
     learned : the engine's model of motion
     Raises CorpusError: the model has other channels.
     """
-    speech = speech_of_condition(recordings, condition, engine, learned)
-    return compare_with_recorded(recordings, speech, engine, learned)
+    speech = make_speech(recordings, condition, engine, learned)
+    return generate_compared(recordings, speech, engine, learned)
 
 
-def speech_of_condition(
+def make_speech(
     recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[Speech]:
     """Return the speech of all utterances under a condition, as ``animate`` gives it to the engine."""
-    phones, prior = recordings.phones, recordings.prior
-    if condition == AUDIO_ONLY:
-        pairs = [
-            _recognised(engine, learned, utterance, phones, found)
-            for utterance, found in zip(recordings.utterances, recordings.recognitions, strict=True)
-        ]
-    else:
-        pairs = [
-            (speech_of(engine, u.audio, u.features, units, phones.kind), None)
-            for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
-        ]
-    return [
-        with_prior(prior, with_voice(phones.own, utterance.audio, speech, found))
-        for utterance, (speech, found) in zip(recordings.utterances, pairs, strict=True)
-    ]
+    phones, speech = recordings.phones, []
+    spoken = zip(recordings.utterances, recordings.conditions[condition], recordings.recognitions, strict=True)
+    for utterance, units, recognition in spoken:
+        used: list[Recognition] = []  # what was recognised, if the engine needs it
+        if condition == AUDIO_ONLY:
+
+            def recognise(found: Recognition = recognition, used: list[Recognition] = used) -> Recognition:
+                used.append(found)
+                return found
+
+            plain = recognised_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
+        else:
+            plain = speech_of(engine, utterance.audio, utterance.features, units, phones.kind)
+        voiced = with_voice(phones.own, utterance.audio, plain, used[-1] if used else None)
+        speech.append(with_prior(recordings.prior, voiced))
+    return speech
 
 
-def _recognised(
-    engine: Animator[ModelT], learned: ModelT, utterance: Utterance, phones: Recogniser, found: Recognition
-) -> tuple[Speech, Recognition | None]:
-    """Return the speech of an utterance whose words are not known, and what was found in it if that was needed."""
-    asked: list[Recognition] = []
-
-    def recognise() -> Recognition:
-        asked.append(found)
-        return found
-
-    speech = recognised_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
-    return speech, found if asked else None
-
-
-def compare_with_recorded(
+def generate_compared(
     recordings: HeldOutRecordings, speech: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
     """Return recorded and generated motion of all utterances.
 
-    speech  : from ``speech_of_condition``, one for each utterance
+    speech  : from ``make_speech``, one for each utterance
     learned : the engine's model of motion
     Raises CorpusError: the model has other channels.
     """
-    return [
-        _clip(
-            recordings, generate_for(recordings.person(utterance), engine, learned, spoken).motion, utterance, reference
+    clips, channels = [], recordings.channels
+    for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True):
+        generated = generate_for(recordings.person(utterance), engine, learned, spoken).motion
+        missing = [name for name in channels if name not in generated.names]
+        if missing:
+            raise CorpusError(
+                f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it was trained on other "
+                "motion"
+            )
+        motion, seen = utterance.track.motion, np.asarray(utterance.track.seen)
+        time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
+        clip = ComparedClip(
+            original=np.stack([motion[name][seen] for name in channels], axis=1).astype(float),
+            generated=np.stack([np.interp(time_s, generated.time_s, generated[name]) for name in channels], axis=1),
+            time_s=time_s,
+            spoken=tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone)),
         )
-        for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True)
-    ]
-
-
-def _clip(
-    recordings: HeldOutRecordings, generated: Motion, utterance: Utterance, reference: Timeline[Unit]
-) -> ComparedClip:
-    """Return recorded and generated motion of one utterance."""
-    motion, channels = utterance.track.motion, recordings.channels
-    seen = np.asarray(utterance.track.seen)
-    time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
-    _check_channels(generated, channels)
-    spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
-    return ComparedClip(
-        original=np.stack([motion[name][seen] for name in channels], axis=1).astype(float),
-        generated=np.stack([np.interp(time_s, generated.time_s, generated[name]) for name in channels], axis=1),
-        time_s=time_s,
-        spoken=spoken,
-    )
+        clips.append(clip)
+    return clips

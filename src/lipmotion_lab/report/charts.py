@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.formats.web_page import Html, element, joined
+from lipmotion.formats.web_page import Html, element
 
 WIDTH, LEFT, RIGHT = 360, 8, 12
 """Width of a drawing, and its margins: on a telephone a unit is about a pixel."""
@@ -50,23 +50,26 @@ class _Scale:
     def __call__(self, value: float) -> float:
         return self.start + (value - self.low) / (self.high - self.low) * (self.stop - self.start)
 
-    def ticks(self, most: int = 5) -> list[float]:
+    def ticks(self, count: int = 5) -> list[float]:
         """Return round values on the axis, at most so many."""
-        least = (self.high - self.low) / most
-        power = 10.0 ** np.floor(np.log10(least))
-        step = next(power * step for step in (*STEPS, 10.0) if power * step >= least)
+        smallest = (self.high - self.low) / count
+        power = 10.0 ** np.floor(np.log10(smallest))
+        step = next(power * step for step in (*STEPS, 10.0) if power * step >= smallest)
         first = int(np.ceil(self.low / step))
         return [float(step * n) for n in range(first, int(np.floor(self.high / step)) + 1)]
 
 
-def dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
+def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
     """Return a chart with a line for each row: the figure, its interval, and the paper's own as a diamond.
 
     unit : below the axis
     """
     values = [v for row in rows for v in (row.value, row.paper, *(row.interval or ())) if v is not None]
     scale, height = _Scale.of(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
-    parts = [_vertical(scale(tick), f"{tick:g}", height - AXIS - 2) for tick in scale.ticks()]
+    parts, bottom = [], height - AXIS - 2
+    for tick in scale.ticks():
+        parts.append(_line(scale(tick), 0, scale(tick), bottom, "level"))
+        parts.append(_text(scale(tick), bottom + 13, f"{tick:g}", "middle"))
     parts.append(_text(WIDTH - RIGHT, height - 4, unit, "end"))
     for number, row in enumerate(rows):
         y = ROW * number + 26
@@ -80,14 +83,14 @@ def dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
             x = scale(row.paper)
             diamond = f"M{x:.1f} {y - 6}l6 6l-6 6l-6 -6z"
             parts.append(element("path", d=diamond, class_="paper"))
-    said = "; ".join(f"{row.name} {_said(row.value)}" for row in rows)
+    spoken = "; ".join(f"{row.name} {_spell(row.value)}" for row in rows)
     legend = "Dot and line: here, with its 95 % interval."
     if any(row.paper is not None for row in rows):
         legend += " Diamond: the paper's own figure, of another speaker and other recordings."
-    return _figure(title, f"{title}: {said}", height, parts, legend)
+    return _figure(title, f"{title}: {spoken}", height, parts, legend)
 
 
-def curve(
+def draw_curve(
     title: str, time_s: Array, recorded: Array, generated: Array, marked: Sequence[tuple[float, float, str]]
 ) -> Html:
     """Return recorded (dashed) and generated motion over time, of one clip.
@@ -111,11 +114,11 @@ def curve(
     for values, kind in ((recorded, "recorded"), (generated, "generated")):
         points = " ".join(f"{across(t):.1f},{up(v):.1f}" for t, v in zip(time_s, values, strict=True))
         parts.append(element("polyline", points=points, class_=kind))
-    said = f"{title}: recorded and generated opening of the mouth over {time_s[-1] - time_s[0]:.1f} s"
-    return _figure(title, said, CURVE_HEIGHT, parts, title)
+    spoken = f"{title}: recorded and generated opening of the mouth over {time_s[-1] - time_s[0]:.1f} s"
+    return _figure(title, spoken, CURVE_HEIGHT, parts, title)
 
 
-def rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:
+def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:
     """Return figures with intervals over a number, on a logarithmic axis: a line for each name.
 
     lines : numbers, and their figures
@@ -143,27 +146,23 @@ def rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]
             parts.append(element("circle", cx=f"{x:.1f}", cy=f"{up(dot.value or 0):.1f}", r="3", class_=kind))
     looks = ("line", "dashed line")
     legend = "; ".join(f"{looks[order % 2]}: {name}" for order, name in enumerate(lines))
-    said = "; ".join(
-        f"{name}: {', '.join(f'{n:g} {_said(dot.value)}' for n, dot in line)}" for name, line in lines.items()
+    spoken = "; ".join(
+        f"{name}: {', '.join(f'{n:g} {_spell(dot.value)}' for n, dot in line)}" for name, line in lines.items()
     )
-    return _figure(title, f"{title}: {said}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
+    return _figure(title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
 
 
-def _figure(title: str, said: str, height: int, parts: Sequence[Html], caption: str) -> Html:
+def _figure(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:
     drawing = element(
         "svg",
         element("title", title),
         *parts,
         viewBox=f"0 0 {WIDTH} {height}",
         role="img",
-        aria_label=said,
+        aria_label=spoken,
         class_="chart",
     )
     return element("figure", drawing, element("figcaption", caption))
-
-
-def _vertical(x: float, name: str, bottom: float) -> Html:
-    return joined(_line(x, 0, x, bottom, "level"), _text(x, bottom + 13, name, "middle"))
 
 
 def _line(x1: float, y1: float, x2: float, y2: float, kind: str) -> Html:
@@ -175,5 +174,5 @@ def _text(x: float, y: float, text: str, anchor: str = "start", class_: str | No
     return element("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor, class_=class_)
 
 
-def _said(value: float | None) -> str:
+def _spell(value: float | None) -> str:
     return "not defined" if value is None else f"{value:.3g}"

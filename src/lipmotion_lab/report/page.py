@@ -9,7 +9,7 @@ from typing import Any
 
 from lipmotion.formats.web_page import Html, element, joined, whole_page
 from lipmotion_lab.report.section import Section
-from lipmotion_lab.report.shown_clip import curves
+from lipmotion_lab.report.shown_clip import draw_curves
 
 SCRIPT = """"use strict";
 for (const button of document.querySelectorAll("button.together")) {
@@ -27,6 +27,12 @@ FOLDED = 3
 QUICK_WARNING = (
     "A quick run: few recordings, small models. It shows that everything runs; what it finds about the papers is worth "
     "little. Run it without --quick for figures."
+)
+HOW_TO_READ = (
+    "How to read it: intervals are 95 % bootstrap intervals over the compared recordings; two systems are compared by "
+    "the interval of their difference on the same draws of recordings. A pair of the paper holds where that interval "
+    "is on the paper's side of 0, is reversed on the other side, open where 0 is in it. The papers used other speakers "
+    "and other measures: orders compare, values do not. Every sentence here follows from the figures below it."
 )
 
 
@@ -71,30 +77,20 @@ class ReportPage:
             element("h1", self.title),
             element("p", "How the systems of three papers, and those of this project, do on a corpus.", class_="quiet"),
         )
-        main = element("main", *self._overview(), *map(_section, self.finished))
-        footer = element("footer", element("h2", "The corpus and the run"), _listed(self.about))
-        return whole_page(self.title, style, header, main, footer, script=SCRIPT)
-
-    def _overview(self) -> list[Html]:
-        found = [
+        entries = [
             element(
-                "li", element("strong", element("a", part.section.title, href=f"#{part.name}")), part.section.verdict
+                "li", element("strong", element("a", each.section.title, href=f"#{each.name}")), each.section.verdict
             )
-            for part in self.finished
+            for each in self.finished
         ]
         for reasons, look in ((self.failed, "failed"), (self.open, None)):
-            found += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
+            entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
         warning = [element("p", QUICK_WARNING, class_="warning")] if self.quick else []
-        reading = element(
-            "p",
-            "How to read it: intervals are 95 % bootstrap intervals over the compared recordings; two systems are "
-            "compared by the interval of their difference on the same draws of recordings. A pair of the paper holds "
-            "where that interval is on the paper's side of 0, is reversed on the other side, open where 0 is in it. "
-            "The papers used other speakers and other measures: orders compare, values do not. Every sentence here "
-            "follows from the figures below it.",
-            class_="quiet",
-        )
-        return [*warning, element("ul", *found, class_="overview"), reading]
+        overview = element("ul", *entries, class_="overview")
+        how_to_read = element("p", HOW_TO_READ, class_="quiet")
+        main = element("main", *warning, overview, how_to_read, *map(_section, self.finished))
+        footer = element("footer", element("h2", "The corpus and the run"), _listed(self.about))
+        return whole_page(self.title, style, header, main, footer, script=SCRIPT)
 
 
 def _section(part: FinishedPart) -> Html:
@@ -109,6 +105,21 @@ def _section(part: FinishedPart) -> Html:
     ]
     if len(more) > FOLDED:
         more = [element("details", element("summary", f"{len(more)} more tables"), *more)]
+    pictures = [
+        element(
+            "figure",
+            element("img", src=f"{part.name}/{picture['file']}", alt=picture["caption"], loading="lazy"),
+            element("figcaption", picture["caption"]),
+        )
+        for picture in part.record["pictures"]
+    ]
+    made_with = {
+        key: ", ".join(f"{name} {value}" for name, value in content.items() if value is not None)
+        if isinstance(content, Mapping)
+        else str(content)
+        for key, content in part.record["stamp"].items()
+        if content is not None
+    }
     return element(
         "section",
         element("h2", section.title, id=heading),
@@ -118,8 +129,19 @@ def _section(part: FinishedPart) -> Html:
         section.table.as_html(part.name),
         *more,
         *_clip(part),
-        *_pictures(part),
-        _made(part),
+        *(
+            [element("h3", "Pictures like the paper's"), element("div", *pictures, class_="pictures")]
+            if pictures
+            else []
+        ),
+        element(
+            "details",
+            element("summary", "How this was made"),
+            _listed(made_with),
+            element(
+                "p", "Beside this page: ", element("a", "all figures as JSON", href=f"{part.name}/figures.json"), "."
+            ),
+        ),
         id=part.name,
         aria_labelledby=heading,
     )
@@ -158,41 +180,8 @@ def _clip(part: FinishedPart) -> list[Html]:
         element("div", together, element("div", *videos, class_="videos"), class_="clip"),
         element("h3", "Its opening of the mouth"),
         element("p", "Dashed: recorded, in eye distances; line: generated; shaded: p, b and m.", class_="quiet"),
-        element("div", *curves(part.motion, part.section.shown), class_="grid"),
+        element("div", *draw_curves(part.motion, part.section.shown), class_="grid"),
     ]
-
-
-def _pictures(part: FinishedPart) -> list[Html]:
-    pictures = [
-        element(
-            "figure",
-            element("img", src=f"{part.name}/{picture['file']}", alt=picture["caption"], loading="lazy"),
-            element("figcaption", picture["caption"]),
-        )
-        for picture in part.record["pictures"]
-    ]
-    return (
-        [element("h3", "Pictures like the paper's"), element("div", *pictures, class_="pictures")] if pictures else []
-    )
-
-
-def _made(part: FinishedPart) -> Html:
-    """Return how an experiment was made, folded."""
-    stamp = part.record["stamp"]
-    entries = {
-        key: ", ".join(f"{name} {value}" for name, value in content.items() if value is not None)
-        if isinstance(content, Mapping)
-        else str(content)
-        for key, content in stamp.items()
-        if content is not None
-    }
-    everything = element("a", "all figures as JSON", href=f"{part.name}/figures.json")
-    return element(
-        "details",
-        element("summary", "How this was made"),
-        _listed(entries),
-        element("p", "Beside this page: ", everything, "."),
-    )
 
 
 def _listed(entries: Mapping[str, str]) -> Html:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import shlex
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,118 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, sub_monitor
 from lipmotion.units import Lexicon
+from lipmotion_lab import hofer2008
+from lipmotion_lab.engine_comparison import engines
+from lipmotion_lab.folds import FOLDS, folds
+from lipmotion_lab.learning_curve import learning_curve
+from lipmotion_lab.minnis2000 import minnis2000
 from lipmotion_lab.report.page import FinishedPart, ReportPage
-from lipmotion_lab.report.parts import PARTS, TEST, PartRun, can_draw
+from lipmotion_lab.report.section import Section
+from lipmotion_lab.report.sections import (
+    engines_section,
+    folds_section,
+    hofer_section,
+    learning_section,
+    minnis_section,
+    xie_liu_section,
+)
 from lipmotion_lab.report.shown_clip import ClipKeeper, write_videos
-from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, quick_part
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, check_opening, take_quick_part
 from lipmotion_lab.stamp import Stamp
+from lipmotion_lab.xie_liu2007 import six_systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_CAPTIONS
+from lipmotion_lab.xie_liu2007.systems import COMPARED_SYSTEMS, select_systems
+
+TEST = "test"
+QUICK_FOLDS = 2
+
+
+@dataclass(frozen=True)
+class PartRun:
+    """What an experiment is run with.
+
+    work   : an existing folder for finished parts of it
+    models : a folder of engines' models, which several experiments share
+    plots  : a folder for pictures; None: none are drawn
+    """
+
+    corpus: Corpus
+    quick: bool
+    work: Path
+    models: Path
+    plots: Path | None
+    settings: ExperimentSettings
+
+
+@dataclass(frozen=True)
+class ReportPart:
+    """An experiment of a report.
+
+    lists    : that the corpus must have
+    share    : of the time that all take, roughly
+    run      : returns its figures
+    section  : returns what they say
+    draws    : whether it writes pictures, for which it needs matplotlib
+    """
+
+    lists: tuple[str, ...]
+    share: float
+    run: Callable[[PartRun], dict[str, Any]]
+    section: Callable[[Mapping[str, Any]], Section]
+    draws: bool = False
+
+
+def can_draw() -> bool:
+    """Return whether there is what draws the pictures of experiments: the extra ``plots``."""
+    return find_spec("matplotlib") is not None
+
+
+def _run_xie_liu(run: PartRun) -> dict[str, Any]:
+    options = six_systems.QUICK if run.quick else six_systems.DEFAULT_OPTIONS
+    if not run.corpus.names("val"):  # nothing to choose settings with
+        printed = [name for name in select_systems(options.systems) if not COMPARED_SYSTEMS[name].tunes]
+        options = replace(options, systems=printed)
+    return six_systems.xieliu2007(run.corpus, options, plots=run.plots, work=run.work, settings=run.settings)
+
+
+def _run_learning_curve(run: PartRun) -> dict[str, Any]:
+    count = len(run.corpus.names("train"))
+    sizes = [(count + 1) // 2, count] if run.quick else None
+    return learning_curve(run.corpus, sizes=sizes, work=run.work, settings=run.settings)
+
+
+def _run_folds(run: PartRun) -> dict[str, Any]:
+    count = min(QUICK_FOLDS if run.quick else FOLDS, len(run.corpus.names("train")))
+    return folds(run.corpus, count=count, work=run.work, settings=run.settings)
+
+
+PARTS: dict[str, ReportPart] = {
+    "hofer2008": ReportPart(
+        ("train", "val", TEST),
+        4,
+        lambda run: hofer2008.hofer2008(
+            run.corpus, hofer2008.QUICK if run.quick else hofer2008.FULL, work=run.work, settings=run.settings
+        ),
+        hofer_section,
+    ),
+    "xieliu2007": ReportPart(("train", TEST), 8, _run_xie_liu, xie_liu_section, draws=True),
+    "minnis2000": ReportPart(
+        ("train", TEST),
+        2,
+        lambda run: minnis2000(run.corpus, models=run.models, quick=run.quick, work=run.work, settings=run.settings),
+        minnis_section,
+    ),
+    "engines": ReportPart(
+        ("train", TEST),
+        4,
+        lambda run: engines(run.corpus, split=TEST, models=run.models, settings=run.settings),
+        engines_section,
+    ),
+    "learning-curve": ReportPart(("train", TEST), 2, _run_learning_curve, learning_section),
+    "folds": ReportPart(("train",), 4, _run_folds, folds_section),
+}
+"""All experiments by name, in the order of the report: the papers' first."""
+
 
 PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
 """The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
@@ -82,8 +189,18 @@ def experiment_report(
     if unknown:
         raise InputError(f"no experiment {unknown[0]!r}; there are: {', '.join(PARTS)}")
     wanted = [name for name in PARTS if only is None or name in only]
-    corpus = quick_part(corpus, settings.seed) if quick else corpus
-    possible, lacking = _possible(corpus, wanted, named=only is not None)
+    corpus = take_quick_part(corpus, settings.seed) if quick else corpus
+    for split in ("train", TEST):
+        if names := corpus.names(split):
+            check_opening(corpus, names)
+    lacking: dict[str, str] = {}
+    for name in wanted:
+        if missing_lists := [split for split in PARTS[name].lists if not corpus.names(split)]:
+            lacking[name] = f"left out: the corpus has no recordings of the list {', '.join(missing_lists)}"
+            lacking[name] += " (docs/corpora.md says how to make one)"
+    if lacking and (only is not None or len(lacking) == len(wanted)):
+        name, reason = next(iter(lacking.items()))
+        raise CorpusError(f"{corpus.path}: {name} is {reason}")
     check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
     _check_folder(folder)
     with locked(folder):
@@ -95,12 +212,11 @@ def experiment_report(
             corpus, folder, quick, settings, lacking, f"{of_input} {lists} {quick} {settings.seed} {can_draw()}"
         )
         writer.write_page(wanted)
-        missing = [name for name in possible if writer.record(name) is None]
-        whole = sum(PARTS[name].share for name in missing)
-        done = 0.0
+        missing = [name for name in wanted if name not in lacking and writer.record(name) is None]
+        total, done = sum(PARTS[name].share for name in missing), 0.0
         for name in missing:
             share = PARTS[name].share
-            part = sub_monitor(settings.monitor, done / whole, (done + share) / whole, f"{name}: ")
+            part = sub_monitor(settings.monitor, done / total, (done + share) / total, f"{name}: ")
             writer.try_to_run(name, replace(settings, monitor=part))
             writer.write_page(wanted)
             done += share
@@ -108,27 +224,6 @@ def experiment_report(
     verdicts = {part.name: part.section.verdict for part in finished}
     made = [name for name in missing if name not in writer.failed]
     return WrittenReport(folder / PAGE, verdicts, lacking, writer.failed, made)
-
-
-def _possible(corpus: Corpus, wanted: Sequence[str], *, named: bool) -> tuple[list[str], dict[str, str]]:
-    """Return the experiments for which a corpus has recordings, and what the others lack.
-
-    named : whether somebody has asked for them by name
-    Raises CorpusError: there is none, one of those named is impossible, or systems cannot be compared on the corpus.
-    """
-    for split in ("train", TEST):
-        if names := corpus.names(split):
-            channels_with_opening(corpus, names)
-    reasons = {
-        name: f"left out: the corpus has no recordings of the list {', '.join(lists)} (docs/corpora.md says how to "
-        "make one)"
-        for name in wanted
-        if (lists := PARTS[name].lacking(corpus))
-    }
-    if reasons and (named or len(reasons) == len(wanted)):
-        name, reason = next(iter(reasons.items()))
-        raise CorpusError(f"{corpus.path}: {name} is {reason}")
-    return [name for name in wanted if name not in reasons], reasons
 
 
 def _check_folder(folder: Path) -> None:
@@ -162,11 +257,6 @@ class _Writer:
     digest: str
     failed: dict[str, Exception] = field(default_factory=dict)
 
-    @property
-    def name(self) -> str:
-        """The name of the corpus: that of its folder."""
-        return self.corpus.path.resolve().name
-
     def key(self, name: str) -> str:
         """Return a digest of all that the figures of an experiment depend on."""
         return hashlib.sha256(f"{name} {self.digest}".encode()).hexdigest()
@@ -181,15 +271,15 @@ class _Writer:
 
     def finished(self) -> list[FinishedPart]:
         """Return all experiments that are finished, in the order of the page."""
-        found = []
-        for name in PARTS:
+        finished = []
+        for name, part in PARTS.items():
             record = self.record(name)
             if record is not None:
                 try:
-                    found.append(FinishedPart(name, *record, PARTS[name].section(record[0]["figures"])))
+                    finished.append(FinishedPart(name, *record, part.section(record[0]["figures"])))
                 except Exception as error:  # what one experiment says must not hide the others
                     self.failed[name] = error
-        return found
+        return finished
 
     def write_page(self, wanted: Sequence[str]) -> None:
         """Write the page, if anything in it has changed."""
@@ -200,10 +290,10 @@ class _Writer:
             for name in PARTS
             if name not in there and name not in self.failed
         }
-        failed = {name: f"{FAILED}{told(error)}; {AGAIN}" for name, error in self.failed.items()}
-        summary = self.corpus.summary() | {"corpus": self.name}
-        about = summary | {"made with": shlex.join(self._command(wanted))}
-        text = ReportPage(f"Experiments on {self.name}", about, finished, left_open, failed, self.quick).as_html()
+        failed = {name: f"{FAILED}{describe_error(error)}; {AGAIN}" for name, error in self.failed.items()}
+        corpus = self.corpus.path.resolve().name
+        about = self.corpus.summary() | {"corpus": corpus, "made with": shlex.join(self._command(wanted))}
+        text = ReportPage(f"Experiments on {corpus}", about, finished, left_open, failed, self.quick).as_html()
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
             with whole_file(page) as unfinished:
@@ -220,7 +310,7 @@ class _Writer:
         except ExportError:
             raise  # nor could the others write
         except Exception as error:  # one experiment must not stop the others
-            settings.monitor(Item(name, "failed", told(error)))
+            settings.monitor(Item(name, "failed", describe_error(error)))
             self.failed[name] = error
 
     def _run(self, name: str, settings: ExperimentSettings) -> None:
@@ -240,9 +330,12 @@ class _Writer:
                 if motion:
                     drawing = sub_monitor(settings.monitor, 0.95, 1)
                     videos = write_videos(motion, section.shown, self.corpus, made, drawing)
+                captions = PLOT_CAPTIONS if plots is not None else {}
+                for file in captions:
+                    shutil.move(work / "plots" / file, made / file)
+                pictures = [{"file": file, "caption": caption} for file, caption in captions.items()]
                 record: dict[str, Any] = {"experiment": name, "key": self.key(name), "stamp": made_with}
-                record["figures"] = figures
-                record |= {"videos": videos, "pictures": _moved_pictures(plots, made)}
+                record |= {"figures": figures, "videos": videos, "pictures": pictures}
                 folder = made / "tables"
                 folder.mkdir()
                 for table in section.tables:
@@ -253,24 +346,15 @@ class _Writer:
                 _write_json(made / FIGURES, record)
 
     def _command(self, wanted: Sequence[str]) -> list[str]:
-        words = ["lipmotion", "experiment", "all", self.name, "-o", self.folder.resolve().name]
+        words = ["lipmotion", "experiment", "all", self.corpus.path.resolve().name, "-o", self.folder.resolve().name]
         words += ["--only", ",".join(wanted)] if len(wanted) < len(PARTS) else []
         words += ["--lexicon", "FILE"] if self.settings.lexicon else []
         return [*words, *(["--quick"] if self.quick else [])]
 
 
-def told(error: Exception) -> str:
+def describe_error(error: Exception) -> str:
     """Return what an error says; of one that is not raised on purpose its kind, too."""
     return str(error) if isinstance(error, LipMotionError) else f"{type(error).__name__}: {error}"
-
-
-def _moved_pictures(plots: Path | None, target: Path) -> list[dict[str, str]]:
-    """Move the pictures of an experiment into its folder; return their files and captions."""
-    if plots is None:
-        return []
-    for file in PLOT_CAPTIONS:
-        shutil.move(plots / file, target / file)
-    return [{"file": file, "caption": caption} for file, caption in PLOT_CAPTIONS.items()]
 
 
 def _write_json(path: Path, content: Any) -> None:

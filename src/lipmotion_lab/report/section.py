@@ -1,12 +1,145 @@
-"""What a report says of one experiment."""
+"""What a report says of one experiment: words, charts, tables, and what held of the order that a paper prints."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from lipmotion.formats.web_page import Html
-from lipmotion_lab.report.table import Table
+from lipmotion.formats.web_page import Html, element, joined
+from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.storage.text_table import as_field
+from lipmotion_lab.comparison import sign_of_difference, significance_mark
+
+INTERVAL, DIFFERENCE = "_95", "_gain_95"
+"""Endings of the keys under which a row has the interval of a figure, and that of its difference from a reference."""
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A figure of every row.
+
+    key   : of the figure in a row; its interval and difference, where there are any, are beside it
+    title : above the column
+    form  : how numbers are written; empty: a text
+    note  : what the figure is, in words; empty: the title says it
+    """
+
+    key: str
+    title: str
+    form: str = ""
+    note: str = ""
+
+
+ACC = Column("acc", "ACC", ".3f", "correlation of the opening with the recording")
+NRMSE = Column("nrmse", "nRMSE", ".3f")
+SCORE = Column("score", "score", ".1f", "closings of the recording that the motion makes within two frames, in %")
+PRECISION = Column("precision", "precision", ".1f", "generated closings that are of the recording, in %")
+RECALL = Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %")
+VARIANCE = Column("global_variance", "variance", ".2f", "of the opening, by that of the recording")
+JERK = Column("jerk", "jerk", ".2f", "of the opening, by that of the recording")
+ELSEWHERE = Column("false_per_minute", "elsewhere", ".1f", "closings outside p, b and m, a minute of speech")
+OPENING = (ACC, NRMSE, SCORE, PRECISION, RECALL, VARIANCE)
+"""What the experiments that no paper printed say of the opening."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a report.
+
+    name      : of its files
+    caption   : above it
+    columns   : after the names of the rows
+    rows      : by name
+    reference : the row that differences are from; empty: there are no differences
+    head      : what the rows are
+    """
+
+    name: str
+    caption: str
+    columns: Sequence[Column]
+    rows: Mapping[str, Row]
+    reference: str = ""
+    head: str = "system"
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the rows as flat records with the same keys in each; intervals as two figures."""
+        endings = ((INTERVAL, ""), (DIFFERENCE, "_difference"))
+        records = []
+        for head, row in self.rows.items():
+            record: dict[str, Any] = {self.head: head}
+            for column in self.columns:
+                record[column.key] = row.get(column.key)
+                for ending, name in endings:
+                    if any(column.key + ending in each for each in self.rows.values()):
+                        low, high = row.get(column.key + ending) or (None, None)
+                        record |= {f"{column.key}{name}_low": low, f"{column.key}{name}_high": high}
+            records.append(record)
+        return records
+
+    def as_csv(self) -> str:
+        """Return the records as CSV; what is not defined is empty."""
+        text, records = io.StringIO(), self.records()
+        rows = csv.DictWriter(text, list(records[0]) if records else [self.head])
+        rows.writeheader()
+        for record in records:
+            rows.writerow({key: as_field(value) if isinstance(value, str) else value for key, value in record.items()})
+        return text.getvalue()
+
+    def as_content(self) -> dict[str, Any]:
+        """Return the table as content of a JSON file."""
+        columns = {column.key: column.note or column.title for column in self.columns}
+        about = {"caption": self.caption, "reference": self.reference or None, "columns": columns}
+        return about | {"rows": self.records()}
+
+    def as_html(self, folder: str) -> Html:
+        """Return the table on the page; where it is wider than the screen, it scrolls by itself.
+
+        folder : beside the page, that has the folder ``tables`` with its files
+        """
+        heads = [
+            element("th", self.head, scope="col"),
+            *(element("th", each.title, scope="col", class_="number" if each.form else None) for each in self.columns),
+        ]
+        lines = [
+            element("tr", element("th", name, scope="row"), *(_cell(column, row) for column in self.columns))
+            for name, row in self.rows.items()
+        ]
+        table = element(
+            "table",
+            element("caption", self.caption),
+            element("thead", element("tr", *heads)),
+            element("tbody", *lines),
+        )
+        # the star, the files, and what the columns are
+        files = [element("a", kind.upper(), href=f"{folder}/tables/{self.name}.{kind}") for kind in ("csv", "json")]
+        star = f"*: the 95 % interval of the difference from {self.reference} leaves out 0. " if self.reference else ""
+        notes = [joined(element("dt", each.title), element("dd", each.note)) for each in self.columns if each.note]
+        about = element(
+            "div",
+            element("p", star, "This table as ", files[0], " and ", files[1], "."),
+            element("details", element("summary", "What the columns are"), element("dl", *notes)),
+            class_="note",
+        )
+        scrolls = element("div", table, class_="scroll", tabindex="0", role="region", aria_label=self.caption)
+        return joined(scrolls, about)
+
+
+def _cell(column: Column, row: Row) -> Html:
+    value = row.get(column.key)
+    if not column.form:
+        return element("td", "–" if value is None else str(value))
+    mark = significance_mark(row.get(column.key + DIFFERENCE) or (None, None))
+    text: list[str] = [figure_text(value, column.form).strip() + mark]
+    low, high = row.get(column.key + INTERVAL) or (None, None)
+    if low is not None and high is not None:
+        form = column.form.replace("+", "")
+        text += [" ", element("small", f"{low:{form}}–{high:{form}}")]
+    return element("td", *text, class_="number")
+
 
 FEW_CLIPS = 10
 """Bootstrap intervals over fewer recordings are too narrow to be believed."""
@@ -41,7 +174,7 @@ class Section:
         return [self.table, *(table for _, table in self.more)]
 
 
-def warning_of(clips: int) -> dict[str, list[str]]:
+def warn_of_few(clips: int) -> dict[str, list[str]]:
     """Return a warning, as words of a section, where so few recordings were compared that intervals are too narrow."""
     if clips >= FEW_CLIPS:
         return {}
@@ -53,11 +186,109 @@ def warning_of(clips: int) -> dict[str, list[str]]:
     }
 
 
-def named(names: Sequence[str]) -> str:
-    """Return names as a list in words; ``none`` for an empty one."""
-    return ", ".join(names) or "none"
-
-
 def difference(one: float | None, other: float | None) -> float | None:
     """Return by how much a figure is above another one; None where one of them is not defined."""
     return None if one is None or other is None else one - other
+
+
+CHANCE = 0.05
+"""Share of 95 % intervals that leave out 0 where nothing differs."""
+
+
+@dataclass(frozen=True)
+class PaperPair:
+    """Two systems, of which the paper has the first as the better one.
+
+    difference : here, in the figure's unit, positive as in the paper; None: not defined
+    interval   : its 95 % interval on the same recordings
+    """
+
+    better: str
+    worse: str
+    difference: float | None
+    interval: Sequence[float | None]
+
+    @property
+    def sign(self) -> int:
+        """1: it holds here; -1: it is reversed; 0: the interval contains 0, so these recordings leave it open."""
+        return sign_of_difference(self.interval)
+
+
+@dataclass(frozen=True)
+class PaperOrder:
+    """The order of some systems by a figure, in a paper and here.
+
+    figure   : its name, in words
+    paper    : the paper's values
+    here     : the values here; None: not defined
+    pairs    : every two systems
+    form     : how a difference is written
+    is_error : whether the smallest value is the best
+    """
+
+    figure: str
+    paper: Mapping[str, float]
+    here: Mapping[str, float | None]
+    pairs: Sequence[PaperPair]
+    form: str
+    is_error: bool = False
+
+    def verdict(self) -> str:
+        """Return in two sentences whether the paper's order held, and which system is best."""
+        signs = [pair.sign for pair in self.pairs]
+        held, reverse = signs.count(1), signs.count(-1)
+        verdict = f"{self.figure}: of the paper's {len(signs)} pairs {held} held, {reverse} reversed, "
+        verdict += f"{signs.count(0)} open: "
+        if held or reverse:
+            outcomes = ("as many held as reversed", "more held than reversed", "more reversed than held")
+            verdict += "all held" if held == len(signs) else outcomes[(held > reverse) - (held < reverse)]
+        else:
+            verdict += "these recordings say nothing of its order"
+        here = ", ".join(self._best(self.here)) or "none"
+        return f"{verdict}. Best in print: {self._best(self.paper)[0]}; here: {here}."
+
+    def sentences(self) -> list[str]:
+        """Return what held and what did not, sentence by sentence."""
+        found = [f"In print: {self._list(self.paper)}.", f"Here: {self._list(self.here)}."]
+        best, here = self._best(self.paper)[0], self._best(self.here)
+        pair = next((each for each in self.pairs if here and {each.better, each.worse} == {best, here[0]}), None)
+        if best not in here and pair is not None and pair.difference is not None:
+            low, high = pair.interval
+            lies = "" if low is None or high is None else f", 95 % interval {low:{self.form}} to {high:{self.form}}"
+            found.append(
+                f"The paper's best is {-pair.difference:{self.form.replace('+', '')}} behind the best here: {best} "
+                f"against {here[0]} {pair.difference:{self.form}}{lies}, where print has it above 0."
+            )
+        for sign, what in (
+            (1, "Held: the interval of the difference is on the paper's side of 0"),
+            (-1, "Reversed: it is on the other side"),
+            (0, "Open: it contains 0"),
+        ):
+            grouped: dict[str, list[str]] = {}  # pairs of the same first system together; the better one here first
+            pairs = [pair for pair in self.pairs if pair.sign == sign]
+            for pair in pairs:
+                first, second = (pair.worse, pair.better) if sign < 0 else (pair.better, pair.worse)
+                grouped.setdefault(first, []).append(second)
+            if pairs:
+                joint = "over" if sign else "and"
+                names = "; ".join(f"{first} {joint} {', '.join(others)}" for first, others in grouped.items())
+                found.append(f"{what} ({len(pairs)} of {len(self.pairs)} pairs): {names}.")
+        agreeing = sum((pair.difference or 0) > 0 for pair in self.pairs)
+        found.append(
+            f"Intervals aside, {agreeing} of {len(self.pairs)} differences have the paper's sign. Of {len(self.pairs)} "
+            f"intervals about {CHANCE * len(self.pairs):.1f} would leave out 0 by chance if nothing differed."
+        )
+        return found
+
+    def _list(self, values: Mapping[str, float | None]) -> str:
+        """Return names with their values, from the best to the worst; those without a value are left out."""
+        known = [(name, value) for name, value in values.items() if value is not None]
+        form = self.form.replace("+", "")
+        known.sort(key=lambda pair: pair[1], reverse=not self.is_error)
+        return ", ".join(f"{name} {value:{form}}" for name, value in known)
+
+    def _best(self, values: Mapping[str, float | None]) -> list[str]:
+        """Return the names of the best value; none where none is defined."""
+        known = {name: value for name, value in values.items() if value is not None}
+        best = (min if self.is_error else max)(known.values(), default=None)
+        return [name for name, value in known.items() if value == best]

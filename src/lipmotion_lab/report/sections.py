@@ -9,12 +9,10 @@ from typing import Any
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion_lab.comparison import sign_of_difference
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY
-from lipmotion_lab.hofer2008.table1 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
-from lipmotion_lab.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
-from lipmotion_lab.report.charts import Dot, dots, rising
-from lipmotion_lab.report.order import PaperOrder, PaperPair
-from lipmotion_lab.report.section import Section, difference, named, warning_of
-from lipmotion_lab.report.table import (
+from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
+from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
+from lipmotion_lab.report.charts import Dot, draw_dots, draw_rising
+from lipmotion_lab.report.section import (
     ACC,
     ELSEWHERE,
     JERK,
@@ -25,12 +23,17 @@ from lipmotion_lab.report.table import (
     SCORE,
     VARIANCE,
     Column,
+    PaperOrder,
+    PaperPair,
     Row,
+    Section,
     Table,
+    difference,
+    warn_of_few,
 )
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, TUNED
 
-AS_PRINTED = next(iter(PINS))
+AS_PRINTED, SETS = next(iter(PINS)), "Unit sets, "
 HOFER_COLUMNS = (
     Column("paper", "paper: score", ".1f", "the paper's Table 1, in %: another speaker, corpus and threshold"),
     SCORE,
@@ -55,10 +58,20 @@ def hofer_section(figures: Mapping[str, Any]) -> Section:
         for block in blocks
         if (block["states"], block["condition"], block["pins"]) == (most, AUDIO_ONLY, AS_PRINTED)
     )
-    order, others = _order(main), [block for block in blocks if block is not main]
-    table = _table(main)
+    table, rows = _hofer_table(main), main["rows"]
+    pairs = [
+        PaperPair(
+            pair["better"],
+            pair["worse"],
+            difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
+            pair["score_gain_95"],
+        )
+        for pair in main["paper_order"]
+    ]
+    here = {name: row["score"] for name, row in rows.items()}
+    order = PaperOrder("Score of closings", {name: PAPER_SCORES[name] for name in rows}, here, pairs, "+.1f")
     charts = [
-        dots(
+        draw_dots(
             "Score of closings",
             "% of the recording's closings",
             [
@@ -70,39 +83,22 @@ def hofer_section(figures: Mapping[str, Any]) -> Section:
     closed = figures["closed_under"]
     about = (
         f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
-        f"{figures['trained_on']} recordings with each of {len(main['rows'])} sets, compared on {figures['clips']} of "
+        f"{figures['trained_on']} recordings with each of {len(rows)} sets, compared on {figures['clips']} of "
         f"{figures['split']}. The mouth is closed under {closed:.4f} eye distances; the recordings close it "
-        f"{next(iter(main['rows'].values()))['closings']} times. Shown first: sound alone, {AS_PRINTED}, {most} states."
+        f"{next(iter(rows.values()))['closings']} times. Shown first: sound alone, {AS_PRINTED}, {most} states."
     )
-    words = warning_of(figures["clips"]) | {"The paper's order": order.sentences()}
-    more = [(f"{_case(block)}: {what_held(block)}.", _table(block)) for block in others]
+    words = warn_of_few(figures["clips"]) | {"The paper's order": order.sentences()}
+    others = [(block, _hofer_table(block)) for block in blocks if block is not main]
+    more = [(f"{other.caption.removeprefix(SETS)}: {what_held(block)}.", other) for block, other in others]
     shown = [f"{units}, {most} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
     return Section(title, about, order.verdict(), words, charts, table, more, shown)
 
 
-def _order(block: Mapping[str, Any]) -> PaperOrder:
-    rows = block["rows"]
-    pairs = [
-        PaperPair(
-            pair["better"],
-            pair["worse"],
-            difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
-            pair["score_gain_95"],
-        )
-        for pair in block["paper_order"]
-    ]
-    paper = {name: PAPER_SCORES[name] for name in rows}
-    return PaperOrder("Score of closings", paper, {name: row["score"] for name, row in rows.items()}, pairs, "+.1f")
-
-
-def _table(block: Mapping[str, Any]) -> Table:
+def _hofer_table(block: Mapping[str, Any]) -> Table:
+    case = f"{block['states']} states, {block['condition']}, {block['pins']}"
     name = f"hofer2008-{block['states']}-states-{block['condition']}-{block['pins']}".replace(" ", "-")
-    return Table(name, f"Unit sets, {_case(block)}", HOFER_COLUMNS, block["rows"], REFERENCE_SET, "unit set")
-
-
-def _case(block: Mapping[str, Any]) -> str:
-    return f"{block['states']} states, {block['condition']}, {block['pins']}"
+    return Table(name, f"{SETS}{case}", HOFER_COLUMNS, block["rows"], REFERENCE_SET, "unit set")
 
 
 MINNIS_COLUMNS = (
@@ -120,34 +116,38 @@ MINNIS_COLUMNS = (
 
 def minnis_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``minnis2000`` say, on the last of its lists, which is ``test``."""
-    tables = [
-        Table(
-            f"minnis2000-{split}-{condition}".replace(" ", "-"),
-            f"Unit selection, {split}, {condition}",
-            MINNIS_COLUMNS,
-            _rows(rows),
-            PRINTED,
-        )
-        for split, found in figures["lists"].items()
-        for condition, rows in found["conditions"].items()
-    ]
+    tables: dict[tuple[str, str], Table] = {}
+    for split, found in figures["lists"].items():
+        for condition, rows in found["conditions"].items():
+            name, caption = f"minnis2000-{split}-{condition}", f"Unit selection, {split}, {condition}"
+            with_joins = {}
+            for system, row in rows.items():
+                joins = row["joins"]
+                shares = {key: None if joins[key] is None else 100 * joins[key] for key in ("hard", "smooth")}
+                own = {"joins_per_clip": joins["per_clip"], **{f"joins_{key}": share for key, share in shares.items()}}
+                with_joins[system] = {**row, **own}
+            tables[split, condition] = Table(name.replace(" ", "-"), caption, MINNIS_COLUMNS, with_joins, PRINTED)
     split, last = list(figures["lists"].items())[-1]
-    main = next(table for table in tables if table.caption == f"Unit selection, {split}, {AUDIO_ONLY}")
+    main = tables[split, AUDIO_ONLY]
     rows, everything = main.rows, main.rows[EVERYTHING]
     acc = figure_text(rows[PRINTED]["acc"], ".3f"), figure_text(everything["acc"], ".3f")
     gained = difference(everything["acc"], rows[PRINTED]["acc"])
-    sign = sign_of_difference(everything["acc_gain_95"])
-    effect = ("leave open whether they change", "raise", "lower")[sign]
+    effect = ("leave open whether they change", "raise", "lower")[sign_of_difference(everything["acc_gain_95"])]
+    gain, (low, high) = figure_text(gained, "+.3f"), everything["acc_gain_95"]
+    gain += "" if low is None else f", 95 % interval {low:+.3f} to {high:+.3f}"
+    closed = [
+        "–" if row["recall_p_b_m"] is None else f"{row['recall_p_b_m']:.1f} %" for row in (rows[PRINTED], everything)
+    ]
     verdict = (
         f"The paper prints no figures. All additions together {effect} the correlation of the opening: "
-        f"{acc[0]} as printed, {acc[1]} with them ({_interval(gained, everything)})."
+        f"{acc[0]} as printed, {acc[1]} with them ({gain})."
     )
-    words = warning_of(last["clips"]) | {
+    words = warn_of_few(last["clips"]) | {
         "Each addition alone": _effects(rows, ADDITIONS),
         "Other readings of the print": _effects(rows, VARIANTS),
         "Lips in p, b and m": [
-            f"As printed, the lips close in {_percent(rows[PRINTED]['recall_p_b_m'])} of {rows[PRINTED]['p_b_m']} p, b "
-            f"and m; with all additions in {_percent(everything['recall_p_b_m'])}; nothing is pinned."
+            f"As printed, the lips close in {closed[0]} of {rows[PRINTED]['p_b_m']} p, b and m; with all additions in "
+            f"{closed[1]}; nothing is pinned."
         ],
     }
     about = (
@@ -156,20 +156,10 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
         f"recordings of {split}, sound alone."
     )
     shown = [Dot(name, row["acc"], row["acc_95"]) for name, row in rows.items()]
-    charts = [dots("ACC of the opening", "ACC", shown)]
-    more = [(table.caption, table) for table in tables if table is not main]
+    charts = [draw_dots("ACC of the opening", "ACC", shown)]
+    more = [(table.caption, table) for table in tables.values() if table is not main]
     title, compared = "Minnis & Breen 2000: unit selection", (PRINTED, UNGUIDED, EVERYTHING)
     return Section(title, about, verdict, words, charts, main, more, compared)
-
-
-def _rows(rows: Mapping[str, Row]) -> dict[str, dict[str, Any]]:
-    """Return the rows with the figures of their joins beside the others."""
-    found = {}
-    for name, row in rows.items():
-        joins = row["joins"]
-        shares = {f"joins_{key}": None if joins[key] is None else 100 * joins[key] for key in ("hard", "smooth")}
-        found[name] = {**row, "joins_per_clip": joins["per_clip"], **shares}
-    return found
 
 
 def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
@@ -177,20 +167,11 @@ def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
     signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names}
     printed = rows[PRINTED]["acc"]
     described = {name: f"{name} ({figure_text(difference(rows[name]['acc'], printed), '+.3f')})" for name in signs}
-    said = ((1, "ACC is higher"), (-1, "ACC is lower"), (0, "The interval of the difference contains 0"))
+    outcomes = ((1, "ACC is higher"), (-1, "ACC is lower"), (0, "The interval of the difference contains 0"))
     return [
-        f"{what}: {named([described[name] for name, each in signs.items() if each == sign])}." for sign, what in said
+        f"{what}: {', '.join(described[name] for name, each in signs.items() if each == sign) or 'none'}."
+        for sign, what in outcomes
     ]
-
-
-def _interval(gained: float | None, row: Row) -> str:
-    low, high = row["acc_gain_95"]
-    told = figure_text(gained, "+.3f")
-    return told if low is None else f"{told}, 95 % interval {low:+.3f} to {high:+.3f}"
-
-
-def _percent(share: float | None) -> str:
-    return "–" if share is None else f"{share:.1f} %"
 
 
 XIELIU_COLUMNS = (
@@ -206,31 +187,30 @@ XIELIU_COLUMNS = (
     Column("parameters", "numbers", ".0f", "what the chains have learned"),
     Column("seconds", "seconds", ".1f", "of a processor, for training"),
 )
-MEASURES = (("acc", "ACC", "+.3f", False), ("amse", "AMSE", "+.4f", True))
+MEASURES = (("acc", "ACC", "+.3f"), ("amse", "AMSE", "+.4f"))
 
 
 def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``xieliu2007`` say, of the largest number of recordings."""
     size = figures["rows"][-1]
-    tables = {
-        condition: Table(
-            f"xieliu2007-{condition}".replace(" ", "-"),
-            f"Structures of chains, {condition}",
-            XIELIU_COLUMNS,
-            _rows_of_systems(size, rows),
-            REFERENCE_SYSTEM,
-        )
-        for condition, rows in size["conditions"].items()
-    }
+    tables = {}
+    for condition, rows in size["conditions"].items():
+        full_rows = {}
+        for name, row in rows.items():  # with the paper's figures, the opening, the training
+            amse, acc = PAPER_FIGURES.get(name.removesuffix(TUNED), (None, None))
+            training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
+            full_rows[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
+        name, caption = f"xieliu2007-{condition}".replace(" ", "-"), f"Structures of chains, {condition}"
+        tables[condition] = Table(name, caption, XIELIU_COLUMNS, full_rows, REFERENCE_SYSTEM)
     main = tables.pop(AUDIO_ONLY)
-    words, verdict, by_amse = warning_of(figures["clips"]), "", []
+    words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
     for ending, called in (("", "as printed"), (TUNED, "as tuned on val")):
         pairs = [pair for pair in size["pairs"] if pair["better"].endswith(TUNED) == bool(ending)]
         if pairs:
-            acc, amse = (_order_of_systems(main.rows, pairs, ending, measure) for measure in MEASURES)
-            words[f"Systems {called}, by ACC"] = [*([acc.verdict()] if verdict else []), *acc.sentences()]
-            by_amse.append(f"Systems {called}: {amse.verdict()}")
-            verdict = verdict or acc.verdict()
+            by_acc, by_error = (_order_of_systems(main.rows, pairs, ending, *measure) for measure in MEASURES)
+            words[f"Systems {called}, by ACC"] = [*([by_acc.verdict()] if verdict else []), *by_acc.sentences()]
+            by_amse.append(f"Systems {called}: {by_error.verdict()}")
+            verdict = verdict or by_acc.verdict()
     words["By AMSE"] = by_amse
     channels = figures["channels"]
     about = (
@@ -241,7 +221,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     if figures["tuning"]["tried"]:
         about += " Tuned systems have what the print leaves open as it was best on val; nothing was chosen on test."
     shown = [Dot(name, row["acc"], row["acc_95"], row["paper_acc"]) for name, row in main.rows.items()]
-    charts = [dots("ACC of every system", "ACC", shown)]
+    charts = [draw_dots("ACC of every system", "ACC", shown)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
     more = [(table.caption, table) for table in tables.values()]
     return Section(
@@ -249,45 +229,22 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     )
 
 
-def _rows_of_systems(size: Mapping[str, Any], rows: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the rows of a table, with what stands elsewhere: the paper's figures, the opening, the training."""
-    found = {}
-    for name, row in rows.items():
-        amse, acc = PAPER_FIGURES.get(name.removesuffix(TUNED), (None, None))
-        training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
-        found[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
-    return found
-
-
 def _order_of_systems(
-    rows: Mapping[str, Mapping[str, Any]],
-    pairs: Sequence[Mapping[str, Any]],
-    ending: str,
-    measure: tuple[str, str, str, bool],
+    rows: Mapping[str, Row], pairs: Sequence[Mapping[str, Any]], ending: str, key: str, title: str, form: str
 ) -> PaperOrder:
-    """Return the paper's order of systems by one measure.
-
-    ending : of their names here
-    """
-    key, name, form, is_error = measure
-    compared = [
-        PaperPair(
-            pair["better"].removesuffix(ending),
-            pair["worse"].removesuffix(ending),
-            _turned([pair[key]], is_error)[0],
-            _turned(pair[f"{key}_95"], is_error),
-        )
-        for pair in pairs
-    ]
-    names = [each for each in PAPER_FIGURES if each + ending in rows]
-    paper = {each: PAPER_FIGURES[each][0 if is_error else 1] for each in names}
-    here = {each: rows[each + ending][key] for each in names}
-    return PaperOrder(name, paper, here, compared, form, is_error)
-
-
-def _turned(values: Sequence[float | None], is_error: bool) -> tuple[float | None, ...]:
-    """Return differences, or the ends of an interval, such that positive ones are better."""
-    return tuple(None if value is None else -value for value in reversed(values)) if is_error else tuple(values)
+    """Return the paper's order of systems by one measure; ``ending``: of their names here."""
+    is_error = key == "amse"
+    compared = []
+    for pair in pairs:
+        gain, interval = pair[key], pair[f"{key}_95"]
+        if is_error:  # turned such that positive differences are better
+            gain = None if gain is None else -gain
+            interval = [None if end is None else -end for end in reversed(interval)]
+        better, worse = (pair[which].removesuffix(ending) for which in ("better", "worse"))
+        compared.append(PaperPair(better, worse, gain, interval))
+    paper = {name: PAPER_FIGURES[name][0 if is_error else 1] for name in PAPER_FIGURES if name + ending in rows}
+    here = {name: rows[name + ending][key] for name in paper}
+    return PaperOrder(title, paper, here, compared, form, is_error)
 
 
 def engines_section(figures: Mapping[str, Any]) -> Section:
@@ -304,11 +261,11 @@ def engines_section(figures: Mapping[str, Any]) -> Section:
     best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
     acc = figure_text(main.rows[best]["acc"], ".3f")
     verdict = f"Most alike to the recordings: {best} (ACC {acc}); nothing is in print to compare."
-    said = ((1, "higher than that"), (-1, "lower than that"), (0, "not different for sure from that"))
-    words = warning_of(figures["clips"]) | {
+    outcomes = ((1, "Higher than that"), (-1, "Lower than that"), (0, "Not different for sure from that"))
+    words = warn_of_few(figures["clips"]) | {
         "ACC of the opening": [
-            f"{what.capitalize()} of the engine {reference}: {named([n for n, each in signs.items() if each == sign])}."
-            for sign, what in said
+            f"{what} of the engine {reference}: {', '.join(n for n, each in signs.items() if each == sign) or 'none'}."
+            for sign, what in outcomes
         ]
     }
     minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
@@ -316,7 +273,7 @@ def engines_section(figures: Mapping[str, Any]) -> Section:
         f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "
         f"recordings of {figures['split']}, with closed lips forced in p, b and m."
     )
-    charts = [dots("ACC of the opening", "ACC", [Dot(n, r["acc"], r["acc_95"]) for n, r in main.rows.items()])]
+    charts = [draw_dots("ACC of the opening", "ACC", [Dot(n, r["acc"], r["acc_95"]) for n, r in main.rows.items()])]
     more = [(table.caption, table) for table in tables.values()]
     return Section("The engines of this project", about, verdict, words, charts, main, more, list(main.rows))
 
@@ -348,7 +305,7 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
         for size, before in zip(list(main.rows)[1:], main.rows, strict=False)
         if (difference(main.rows[size]["acc"], main.rows[before]["acc"]) or 0) < 0
     ]
-    words = warning_of(figures["clips"]) | {
+    words = warn_of_few(figures["clips"]) | {
         "More recordings": [
             f"From {first} to {last} recordings the correlation of the opening goes from {low} to {high}.",
             f"It falls at: {', '.join(steps)}." if steps else "It falls at no step.",
@@ -366,7 +323,7 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
         f"compared on {figures['clips']} of {figures['split']}."
     )
     verdict = f"ACC {low} with {first} recordings, {high} with {last}."
-    charts = [rising("ACC of the opening over recordings", "recordings", lines)] if len(sizes) > 1 else []
+    charts = [draw_rising("ACC of the opening over recordings", "recordings", lines)] if len(sizes) > 1 else []
     more = [(table.caption, table) for table in tables.values()]
     shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
     return Section("Learning curve", about, verdict, words, charts, main, more, shown)
@@ -386,7 +343,7 @@ def folds_section(figures: Mapping[str, Any]) -> Section:
         f"The training list in {figures['folds']} parts: each is generated by a model of the others, "
         f"{min(figures['trained_on'])} to {max(figures['trained_on'])} recordings."
     )
-    words = warning_of(figures["clips"]) | {
+    words = warn_of_few(figures["clips"]) | {
         "More closings than a test list has": [
             f"Of {row['p_b_m']} p, b and m the lips close in {figure_text(row['recall_p_b_m'], '.1f')} %; of "
             f"{row['closings']} closings {figure_text(row['score'], '.1f')} % are made in time."

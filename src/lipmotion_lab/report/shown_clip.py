@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from PIL.Image import Resampling
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.formats.web_page import Html
@@ -19,9 +20,9 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
 from lipmotion_faces import Staging, staged_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
-from lipmotion_lab.evaluation.figures import BILABIAL
+from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
-from lipmotion_lab.report.charts import curve
+from lipmotion_lab.report.charts import draw_curve
 
 FPS = 25.0
 MOUTH_SCALE = 4
@@ -52,6 +53,10 @@ class ClipKeeper:
         """Keep the motion of a system."""
         if condition != AUDIO_ONLY:
             return
+
+        def rounded(values: NDArray[np.float64]) -> Any:
+            return np.round(values, DECIMALS).tolist()
+
         closings = [sum(phone in BILABIAL for *_, phone in clip.spoken) for clip in clips]
         number = int(np.argmax(closings))
         clip, utterance = clips[number], recordings.utterances[number]
@@ -60,8 +65,8 @@ class ClipKeeper:
         if content.get("name") != utterance.name or not content["systems"]:
             content = {"key": self.key, "name": utterance.name, "words": list(utterance.words or ()), "systems": {}}
             content |= {"channels": [recordings.channels[column] for column in columns], "spoken": clip.spoken}
-            content |= {"time_s": _rounded(clip.time_s), RECORDED: _rounded(clip.original[:, columns])}
-        content["systems"][system] = _rounded(clip.generated[:, columns])
+            content |= {"time_s": rounded(clip.time_s), RECORDED: rounded(clip.original[:, columns])}
+        content["systems"][system] = rounded(clip.generated[:, columns])
         with whole_file(self.path) as unfinished:
             unfinished.write_text(as_json(content) + "\n", encoding="utf-8")
 
@@ -74,7 +79,7 @@ class ClipKeeper:
             return {}
 
 
-def curves(content: Mapping[str, Any], systems: Sequence[str]) -> list[Html]:
+def draw_curves(content: Mapping[str, Any], systems: Sequence[str]) -> list[Html]:
     """Return a chart of the opening for each of some systems, with the p, b and m of the recording.
 
     content : from ``ClipKeeper``
@@ -83,7 +88,7 @@ def curves(content: Mapping[str, Any], systems: Sequence[str]) -> list[Html]:
     recorded = np.array(content[RECORDED])[:, column]
     marked = [tuple(span) for span in content["spoken"] if span[2] in BILABIAL]
     return [
-        curve(name, time_s, recorded, np.array(content["systems"][name])[:, column], marked)
+        draw_curve(name, time_s, recorded, np.array(content["systems"][name])[:, column], marked)
         for name in systems
         if name in content["systems"]
     ]
@@ -106,7 +111,9 @@ def write_videos(
     sound, found = Audio(samples.astype(np.float32), SOUND_HZ), []
     crops = utterance.track.crops
     if crops is not None and len(crops):
-        write_mp4(folder / "mouth.mp4", map(_enlarged, crops), fps=utterance.track.motion.rate_hz, audio=sound)
+        size = (MOUTH_SCALE * crops.shape[2], MOUTH_SCALE * crops.shape[1])
+        enlarged = (np.asarray(Image.fromarray(np.asarray(crop)).resize(size, Resampling.BICUBIC)) for crop in crops)
+        write_mp4(folder / "mouth.mp4", enlarged, fps=utterance.track.motion.rate_hz, audio=sound)
         found.append({"file": "mouth.mp4", "caption": "the recording itself: the mouth as filmed"})
     shown = {RECORDED: content[RECORDED]}
     shown |= {name: content["systems"][name] for name in systems if name in content["systems"]}
@@ -125,12 +132,3 @@ def write_videos(
         write_mp4(folder / file, frames, fps=FPS, audio=sound)
         found.append({"file": file, "caption": "a drawn face, recorded motion" if name == RECORDED else name})
     return found
-
-
-def _enlarged(crop: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    height, width = (MOUTH_SCALE * size for size in crop.shape[:2])
-    return np.asarray(Image.fromarray(np.asarray(crop)).resize((width, height), Image.Resampling.BICUBIC))
-
-
-def _rounded(values: NDArray[np.float64]) -> Any:
-    return np.round(values, DECIMALS).tolist()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options
@@ -54,15 +54,19 @@ def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = ""
 
 def run_experiment(
     options: argparse.Namespace,
-    experiment: Callable[[Corpus, ExperimentSettings], dict[str, Any]],
+    experiment: Callable[..., dict[str, Any]],
     table: Callable[[dict[str, Any]], str],
+    *,
+    has_parts: bool = True,
 ) -> None:
-    """Call ``experiment(corpus, settings)``, print its table, and give its figures with their stamp.
+    """Call ``experiment(corpus, work=…, settings=…)``, print its table, and give its figures with their stamp.
 
-    With ``--quick`` the corpus is ``runner.quick_part``, the same recordings for all experiments.
+    ``work`` is a folder of finished parts, from which a second run goes on; None without an output, and not
+    ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
-    from lipmotion_lab.runner import ExperimentSettings, quick_part
+    from lipmotion.storage.files import unfinished_work
+    from lipmotion_lab.runner import ExperimentSettings, take_quick_part
     from lipmotion_lab.stamp import Stamp
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
@@ -70,18 +74,12 @@ def run_experiment(
         settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=monitor)
         corpus = Corpus.open(options.corpus)
         if getattr(options, "quick", False):
-            corpus = quick_part(corpus, settings.seed)
-        figures = experiment(corpus, settings)
+            corpus = take_quick_part(corpus, settings.seed)
+        with unfinished_work(options.output) if options.output and has_parts else nullcontext() as work:
+            figures = experiment(corpus, work=work, settings=settings)
         return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
 
     report_figures(options, compute, table)
-
-
-def unfinished_parts(options: argparse.Namespace) -> AbstractContextManager[Path | None]:
-    """Return the folder of finished parts, from which a second run of an experiment goes on; None without an output."""
-    from lipmotion.storage.files import unfinished_work
-
-    return unfinished_work(options.output) if options.output else nullcontext()
 
 
 def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -94,15 +92,11 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
 
 
 def run_hofer2008(options: argparse.Namespace) -> None:
-    """Call ``experiment.hofer2008`` and print its tables; with ``--output``, a second run goes on where one stopped."""
-    from lipmotion_lab.hofer2008.table1 import FULL, QUICK, hofer2008, table
+    """Call ``hofer2008`` and print its table."""
+    from lipmotion_lab.hofer2008 import FULL, QUICK, hofer2008, table
 
-    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        with unfinished_parts(options) as work:
-            chosen = QUICK if options.quick else FULL
-            return hofer2008(corpus, chosen, split=list_or_all(options.split), work=work, settings=settings)
-
-    run_experiment(options, experiment, table)
+    chosen = QUICK if options.quick else FULL
+    run_experiment(options, partial(hofer2008, options=chosen, split=list_or_all(options.split)), table)
 
 
 def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -117,15 +111,13 @@ def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentPar
 
 
 def run_learning_curve(options: argparse.Namespace) -> None:
-    """Call ``experiment.learning_curve``, print its table; with ``--output``, a second run goes on after a stop."""
+    """Call ``learning_curve`` and print its table."""
     from lipmotion.corpora.splits import read_names
     from lipmotion_lab.learning_curve import learning_curve, table
 
-    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+    def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
         order = read_names(options.order) if options.order else None
-        split = list_or_all(options.split)
-        with unfinished_parts(options) as work:
-            return learning_curve(corpus, order=order, sizes=options.sizes, split=split, work=work, settings=settings)
+        return learning_curve(corpus, order=order, sizes=options.sizes, split=list_or_all(options.split), **others)
 
     run_experiment(options, experiment, table)
 
@@ -142,14 +134,10 @@ def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 
 def run_folds(options: argparse.Namespace) -> None:
-    """Call ``experiment.folds``, print its table; with ``--output``, a second run goes on after a stop."""
+    """Call ``folds`` and print its table."""
     from lipmotion_lab.folds import folds, table
 
-    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        with unfinished_parts(options) as work:
-            return folds(corpus, count=options.folds, by_speaker=options.by_speaker, work=work, settings=settings)
-
-    run_experiment(options, experiment, table)
+    run_experiment(options, partial(folds, count=options.folds, by_speaker=options.by_speaker), table)
 
 
 def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -183,38 +171,29 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def run_xieliu2007(options: argparse.Namespace) -> None:
-    """Call ``experiment.xieliu2007`` and print its table."""
+    """Call ``xieliu2007`` and print its table."""
     from lipmotion.corpora.splits import read_names
     from lipmotion.errors import InputError
     from lipmotion_lab.noise import NoiseConditions, read_talkers
-    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
-    from lipmotion_lab.xie_liu2007.text import table
+    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, table, xieliu2007
 
     if options.quick and options.order:
         raise InputError("--quick takes recordings of its own, and --order is a list of others; leave out one of them")
 
-    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+    def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)
         talkers = tuple(read_talkers(options.talkers)) if options.talkers else ()
-        few = QUICK if options.quick else DEFAULT_OPTIONS
+        usual = QUICK if options.quick else DEFAULT_OPTIONS
         compared = replace(
-            few,
-            systems=options.systems or few.systems,
+            usual,
+            systems=options.systems or usual.systems,
             visual=options.visual,
             transcripts=options.transcripts,
             noise=NoiseConditions(kinds, tuple(map(float, options.snr)), talkers),
         )
-        with unfinished_parts(options) as work:
-            return xieliu2007(
-                corpus,
-                compared,
-                split=list_or_all(options.split),
-                order=read_names(options.order) if options.order else None,
-                sizes=options.sizes,
-                plots=options.plots,
-                work=work,
-                settings=settings,
-            )
+        order = read_names(options.order) if options.order else None
+        split, sizes, plots = list_or_all(options.split), options.sizes, options.plots
+        return xieliu2007(corpus, compared, split=split, order=order, sizes=sizes, plots=plots, **others)
 
     run_experiment(options, experiment, table)
 
@@ -228,14 +207,10 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def run_minnis2000(options: argparse.Namespace) -> None:
-    """Call ``experiment.minnis2000`` and print its table; with ``--output``, a second run goes on where one stopped."""
-    from lipmotion_lab.minnis_breen2000.minnis2000 import minnis2000, table
+    """Call ``minnis2000`` and print its table."""
+    from lipmotion_lab.minnis2000 import minnis2000, table
 
-    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        with unfinished_parts(options) as work:
-            return minnis2000(corpus, models=options.models, quick=options.quick, work=work, settings=settings)
-
-    run_experiment(options, experiment, table)
+    run_experiment(options, partial(minnis2000, models=options.models, quick=options.quick), table)
 
 
 def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -248,13 +223,13 @@ def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -
 
 
 def run_engines(options: argparse.Namespace) -> None:
-    """Call ``experiment.engines`` and print its table."""
-    from lipmotion_lab.engines.engine_comparison import engines, table
+    """Call ``engines`` and print its table."""
+    from lipmotion_lab.engine_comparison import engines, table
 
-    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+    def experiment(corpus: Corpus, *, settings: ExperimentSettings, work: None) -> dict[str, Any]:  # noqa: ARG001
         return engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)
 
-    run_experiment(options, experiment, table)
+    run_experiment(options, experiment, table, has_parts=False)
 
 
 def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -275,7 +250,7 @@ def run_all(options: argparse.Namespace) -> None:
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.corpora.store import Corpus
     from lipmotion.units import Lexicon
-    from lipmotion_lab.report.report import experiment_report, told
+    from lipmotion_lab.report.report import describe_error, experiment_report
     from lipmotion_lab.runner import ExperimentSettings
 
     with reporting(options) as report:
@@ -286,7 +261,7 @@ def run_all(options: argparse.Namespace) -> None:
         )
         lines = [f"{name}: {verdict}" for name, verdict in found.verdicts.items()]
         lines += [f"{name}: {reason}" for name, reason in found.left_out.items()]
-        lines += [f"{name}: failed: {told(error)}" for name, error in found.failed.items()]
+        lines += [f"{name}: failed: {describe_error(error)}" for name, error in found.failed.items()]
         is_done = not (found.made or found.failed)
         lines.append(f"{'nothing was left to do; ' if is_done else ''}report: {found.page}")
         figures: dict[str, Any] = {"report": str(found.page), "verdicts": dict(found.verdicts)}

@@ -14,24 +14,18 @@ from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.storage.files import make_folder, whole_file
 from lipmotion.types import GREY
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
-from lipmotion_lab.xie_liu2007.tuning import TrainedSystem
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
+from lipmotion_lab.xie_liu2007.systems import TrainedSystem
 
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
 """Recordings that are shown in one picture."""
 PLOT_FILES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
 """File names of the pictures like Figs. 7, 10 and 11."""
-PLOT_CAPTIONS = dict(
-    zip(
-        PLOT_FILES.values(),
-        (
-            "As Fig. 7: conversion by ph-vi-CHMM of one recording, from means along the best path by EM",
-            "As Fig. 10: convergence of the conversion, by steps of EM",
-            "As Fig. 11: predicted beside recorded motion, ph-vi-CHMM",
-        ),
-        strict=True,
-    )
-)
+PLOT_CAPTIONS = {
+    PLOT_FILES["start"]: "As Fig. 7: conversion by ph-vi-CHMM of one recording, from means along the best path by EM",
+    PLOT_FILES["steps"]: "As Fig. 10: convergence of the conversion, by steps of EM",
+    PLOT_FILES["clips"]: "As Fig. 11: predicted beside recorded motion, ph-vi-CHMM",
+}
 """What the pictures show, by their file names."""
 
 
@@ -66,12 +60,34 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     """
     figure = import_figure()
     some = recordings.first(CONVERGENCE_RECORDINGS)
-    by_em = compared_clips(some, AUDIO_ONLY, chains.engine, chains.model)
+    by_em = generate_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
-    by_path = compared_clips(some, AUDIO_ONLY, path_engine, chains.model)
+    by_path = generate_clips(some, AUDIO_ONLY, path_engine, chains.model)
     make_folder(folder)
-    _save(_conversion(figure, some, by_em[0], by_path[0]), folder / PLOT_FILES["start"])
-    _save(_convergence(figure, some, chains), folder / PLOT_FILES["steps"])
+
+    picture = figure(figsize=(10, 4.2), layout="constrained")
+    axes, clip = picture.subplots(), by_em[0]
+    axes.plot(clip.time_s, clip.original[:, 0], "k:", label="recorded")
+    axes.plot(by_path[0].time_s, by_path[0].generated[:, 0], color="tab:orange", label="means along the best path")
+    axes.plot(clip.time_s, clip.generated[:, 0], color="tab:blue", label="EM, started from these means")
+    _label_axes(axes, some, f"Audio to visual conversion: {some.utterances[0].name}")
+    axes.set_xlabel("time (s)")
+    axes.legend(loc="upper right")
+    _save(picture, folder / PLOT_FILES["start"])
+
+    picture = figure(figsize=(7, 4.6), layout="constrained")
+    axes, model = picture.subplots(), chains.model
+    for utterance in some.utterances:
+        observations = model.speech_observations(np.asarray(utterance.features.values))
+        steps = convert(model.chains, observations, model.chains.full_lattice, chains.engine.config.em).log_likelihood
+        axes.plot(range(len(steps)), steps, "o-", markersize=3, label=utterance.name)
+    axes.set_xlabel("step of EM (0: means along the best path)")
+    axes.set_ylabel("log likelihood of speech and lips (nats per frame)")
+    axes.set_title(f"Convergence of the conversion, {len(some.utterances)} recordings")
+    picture.legend(loc="outside right upper", fontsize="small")
+    axes.grid(alpha=0.3)
+    _save(picture, folder / PLOT_FILES["steps"])
+
     made = by_em[:PREDICTED_RECORDINGS]
     picture = figure(figsize=(10, 2.2 * len(made)), layout="constrained")
     all_axes = picture.subplots(len(made), 1, squeeze=False)[:, 0]
@@ -82,34 +98,6 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     all_axes[0].legend(loc="upper right", ncols=2)
     all_axes[-1].set_xlabel("time (s)")
     _save(picture, folder / PLOT_FILES["clips"])
-
-
-def _conversion(figure: Any, recordings: HeldOutRecordings, by_em: ComparedClip, by_path: ComparedClip) -> Any:
-    picture = figure(figsize=(10, 4.2), layout="constrained")
-    axes = picture.subplots()
-    axes.plot(by_em.time_s, by_em.original[:, 0], "k:", label="recorded")
-    axes.plot(by_path.time_s, by_path.generated[:, 0], color="tab:orange", label="means along the best path")
-    axes.plot(by_em.time_s, by_em.generated[:, 0], color="tab:blue", label="EM, started from these means")
-    _label_axes(axes, recordings, f"Audio to visual conversion: {recordings.utterances[0].name}")
-    axes.set_xlabel("time (s)")
-    axes.legend(loc="upper right")
-    return picture
-
-
-def _convergence(figure: Any, recordings: HeldOutRecordings, chains: TrainedSystem) -> Any:
-    picture = figure(figsize=(7, 4.6), layout="constrained")
-    axes = picture.subplots()
-    engine, model = chains.engine, chains.model
-    for utterance in recordings.utterances:
-        observations = model.speech_observations(np.asarray(utterance.features.values))
-        steps = convert(model.chains, observations, model.chains.full_lattice, engine.config.em).log_likelihood
-        axes.plot(range(len(steps)), steps, "o-", markersize=3, label=utterance.name)
-    axes.set_xlabel("step of EM (0: means along the best path)")
-    axes.set_ylabel("log likelihood of speech and lips (nats per frame)")
-    axes.set_title(f"Convergence of the conversion, {len(recordings.utterances)} recordings")
-    picture.legend(loc="outside right upper", fontsize="small")
-    axes.grid(alpha=0.3)
-    return picture
 
 
 def _label_axes(axes: Any, recordings: HeldOutRecordings, title: str) -> None:

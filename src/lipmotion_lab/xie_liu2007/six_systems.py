@@ -18,10 +18,12 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
+from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -29,29 +31,35 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Example, Monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
-from lipmotion_lab.comparison import ClipStatistic, correlation_statistic, distance_statistic, opening_curves
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.comparison import (
+    ClipStatistic,
+    correlation_statistic,
+    distance_statistic,
+    opening_curves,
+    significance_mark,
+)
+from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
     ComparedClip,
     HeldOutRecordings,
-    compared_clips,
-    held_out_recordings,
+    generate_clips,
+    load_held_out,
 )
-from lipmotion_lab.learning_curve import check_training_names, training_sizes
-from lipmotion_lab.noise import NoiseConditions, recordings_in_noise
+from lipmotion_lab.learning_curve import check_training_names, choose_sizes
+from lipmotion_lab.noise import NoiseConditions, add_noise
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     QUICK_CLIPS,
     ExperimentSettings,
     PartKey,
-    channels_with_opening,
+    check_opening,
     clips_from_arrays,
-    finished_parts,
-    opening_row,
+    clips_to_arrays,
+    open_parts,
+    opening_row_with_rates,
     shuffled,
-    stored_clips,
 )
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
@@ -59,20 +67,18 @@ from lipmotion_lab.xie_liu2007.systems import (
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     TUNED,
-    selected_systems,
-    stored_system,
-    system_from_arrays,
-    train_system,
-    tuned_options,
-    with_inputs_of,
-)
-from lipmotion_lab.xie_liu2007.tuning import (
     TUNING,
     TrainedSystem,
     Trial,
     TuningOptions,
     as_row,
-    changed_options,
+    list_changed_options,
+    select_systems,
+    system_from_arrays,
+    system_to_arrays,
+    train_system,
+    tune_options,
+    with_inputs_of,
 )
 
 TRIALS = "trials"
@@ -103,7 +109,7 @@ QUICK = ComparisonOptions(
         clips=QUICK_CLIPS["train"], judges=QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
     ),
 )
-"""A small comparison, for the recordings of ``runner.quick_part``; conversion by factorial chains is slow."""
+"""A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
 
 
 @one_thread()
@@ -132,16 +138,16 @@ def xieliu2007(  # noqa: PLR0913
     Raises MissingDependencyError: a system or the pictures need a package that is not installed.
     Raises ExportError: the pictures cannot be written.
     """
-    names, seed = selected_systems(options.systems), settings.seed
+    names, seed = select_systems(options.systems), settings.seed
     check_visual(options.visual)
     tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
     held_out, validation = corpus.required(split), corpus.required("val") if tunes else ()
     check_training_names(corpus, listed, (*held_out, *validation))
-    steps = training_sizes(sizes if sizes is not None else [len(listed)], len(listed))
+    steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
-        channels_with_opening(corpus, held_out)  # before the long work
+        check_opening(corpus, held_out)  # before the long work
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
@@ -155,7 +161,12 @@ def xieliu2007(  # noqa: PLR0913
         trained = setup.train(names, listed[:count], trials, part)
         kept = setup.checkpoint(listed[:count], held_out)
         rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
-    noise_rows = _noise_rows(trained, options.noise or NoiseConditions(), seed, sub_monitor(settings.monitor, 0.9, 1))
+    noise, noise_rows = options.noise or NoiseConditions(), []
+    noises = [(kind, ratio_db) for kind in noise.kinds for ratio_db in noise.ratios_db]
+    for kind, ratio_db in with_progress(noises, "comparing in noise", sub_monitor(settings.monitor, 0.9, 1)):
+        noisy = add_noise(trained.recordings, kind, ratio_db, noise.talkers, seed)
+        systems = _system_rows(noisy, _generate(noisy, AUDIO_ONLY, trained.systems), seed)
+        noise_rows.append({"kind": kind, "snr_db": ratio_db, "systems": systems})
     recordings = trained.recordings
     if plots is not None:
         draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
@@ -208,7 +219,7 @@ class _TrainingSetup:
             kept, stage = self.checkpoint(names), f"trials-{name}"
             found = kept.load(stage)
             if found is None:
-                tried = tuned_options(name, examples, recordings["val"], self.options.tuning, part)
+                tried = tune_options(name, examples, recordings["val"], self.options.tuning, part)
                 found = {TRIALS: np.array(json.dumps([asdict(trial) for trial in tried]))}
                 kept.save(stage, found)
             trials[name] = [Trial(**trial) for trial in json.loads(str(found[TRIALS]))]
@@ -230,7 +241,7 @@ class _TrainingSetup:
             known = with_inputs_of(name, examples, self.corpus)
             trained[name] = train_system(name, known, recordings.get("val"), trials, trained, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
-                found = stored_system(trained[name])
+                found = system_to_arrays(trained[name])
                 kept.save(f"system-{name}", found)
                 trained[name] = system_from_arrays(found)
         return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
@@ -251,7 +262,7 @@ class _TrainingSetup:
             phones, examples, _ = phones_and_examples(
                 utterances, config, lexicon, sub_monitor(monitor, 0, 0.7), self.checkpoint(names), team.ordered_map
             )
-        read = partial(held_out_recordings, self.corpus, cached_recogniser(phones), lexicon=lexicon)
+        read = partial(load_held_out, self.corpus, cached_recogniser(phones), lexicon=lexicon)
         read = partial(read, visual=visual, eigenlips=eigenlips)
         parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
         recordings: dict[str, HeldOutRecordings] = {}
@@ -265,7 +276,7 @@ class _TrainingSetup:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
         everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.tuning), *compared))
         key = PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
-        return finished_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
+        return open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
 
 def _size(
@@ -274,19 +285,26 @@ def _size(
     """Return the figures of all systems trained on one number of utterances."""
     recordings, systems, seed = trained.recordings, trained.systems, settings.seed
     conditions = list(recordings.conditions) if transcripts else [AUDIO_ONLY]
-    made = {condition: _made(recordings, condition, systems, kept) for condition in conditions}
-    for condition, of_systems in made.items():
+    generated = {condition: _generate(recordings, condition, systems, kept) for condition in conditions}
+    for condition, of_systems in generated.items():
         for name, clips in of_systems.items():
             settings.receive(name, condition, recordings, clips)
+    training: dict[str, dict[str, Any]] = {}
+    for name, system in systems.items():
+        row: dict[str, Any] = {"seconds": system.seconds, "parameters": None, "options": None}
+        row["tried"] = [*map(as_row, system.tried)]
+        if isinstance(system.model, CoupledModel):
+            row |= {"parameters": system.model.chains.parameters, "options": list_changed_options(system.engine.config)}
+        training[name] = row
     return {
         "used": len(trained.used),
-        "training": {name: _training_row(system) for name, system in systems.items()},
-        "conditions": {condition: _rows(recordings, own, seed) for condition, own in made.items()},
-        "pairs": _pairs(recordings, made[AUDIO_ONLY], seed),
+        "training": training,
+        "conditions": {condition: _system_rows(recordings, clips, seed) for condition, clips in generated.items()},
+        "pairs": _paper_pairs(recordings, generated[AUDIO_ONLY], seed),
     }
 
 
-def _made(
+def _generate(
     recordings: HeldOutRecordings,
     condition: str,
     systems: Mapping[str, TrainedSystem],
@@ -298,13 +316,15 @@ def _made(
         stage = f"{condition}-{name}"
         found = kept.load(stage)
         if found is None:
-            found = stored_clips(compared_clips(recordings, condition, system.engine, system.model))
+            found = clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
             kept.save(stage, found)
         made[name] = clips_from_arrays(found)
     return made
 
 
-def _pairs(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> list[dict[str, Any]]:
+def _paper_pairs(
+    recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int
+) -> list[dict[str, Any]]:
     """Return how much better each system of the paper is than each that is worse in print, on the same clips.
 
     Printed systems are compared with printed ones, and tuned ones with tuned ones; ``acc`` and ``amse``: difference.
@@ -323,40 +343,22 @@ def _pairs(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]]
     return rows
 
 
-def _training_row(system: TrainedSystem) -> dict[str, Any]:
-    """Return training time, number of parameters, settings, and those among which they were chosen."""
-    row: dict[str, Any] = {
-        "seconds": system.seconds,
-        "parameters": None,
-        "options": None,
-        "tried": [*map(as_row, system.tried)],
-    }
-    if isinstance(system.model, CoupledModel):
-        row |= {"parameters": system.model.chains.parameters, "options": changed_options(system.engine.config)}
-    return row
-
-
-def _rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
-    """Return the figures of what all systems generate for the same recordings."""
-    return {name: _row(recordings, own, made[REFERENCE_SYSTEM], seed) for name, own in made.items()}
-
-
-def _row(
-    recordings: HeldOutRecordings, made: Sequence[ComparedClip], reference: Sequence[ComparedClip], seed: int
-) -> dict[str, Any]:
-    """Return the figures of one system, and its differences from the reference system."""
-    figures, others = figures_of(made, recordings, seed), _statistics(recordings, reference)
-    row: dict[str, Any] = {}
-    for name, statistic in _statistics(recordings, made).items():
-        intervals = {"95": statistic.interval(seed), "gain_95": statistic.gain(others[name], seed)}
-        row |= {name: statistic.value} | {f"{name}_{key}": interval for key, interval in intervals.items()}
-    still = not varies(np.concatenate([clip.generated for clip in made])).any()
-    row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
-    if OPENING not in recordings.channels:
-        return row
-    lips, (generated, original) = figures["closures_p_b_m"], opening_curves(recordings, made)
-    opening = opening_row(figures) | {"rmse": float(curves.rmse(generated, original)[0])}
-    return row | {"opening": opening | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}}
+def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
+    """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
+    reference, rows = _statistics(recordings, made[REFERENCE_SYSTEM]), {}
+    for system, clips in made.items():
+        figures = figures_of(clips, recordings, seed)
+        row: dict[str, Any] = {}
+        for name, statistic in _statistics(recordings, clips).items():
+            row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
+            row[f"{name}_gain_95"] = statistic.gain(reference[name], seed)
+        still = not varies(np.concatenate([clip.generated for clip in clips])).any()
+        row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
+        if OPENING in recordings.channels:
+            rmse = float(curves.rmse(*opening_curves(recordings, clips))[0])
+            row["opening"] = opening_row_with_rates(figures) | {"rmse": rmse}
+        rows[system] = row
+    return rows
 
 
 def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, ClipStatistic]:
@@ -375,12 +377,114 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
     return statistics
 
 
-def _noise_rows(trained: _TrainedSystems, noise: NoiseConditions, seed: int, monitor: Monitor) -> list[dict[str, Any]]:
-    """Return the figures of all systems for every kind of noise and ratio."""
-    rows = []
-    conditions = [(kind, ratio_db) for kind in noise.kinds for ratio_db in noise.ratios_db]
-    for kind, ratio_db in with_progress(conditions, "comparing in noise", monitor):
-        recordings = recordings_in_noise(trained.recordings, kind, ratio_db, noise.talkers, seed)
-        systems = _rows(recordings, _made(recordings, AUDIO_ONLY, trained.systems), seed)
-        rows.append({"kind": kind, "snr_db": ratio_db, "systems": systems})
-    return rows
+WIDTH = 34
+NAMED_CHANNELS = 8
+"""Most channels that are named one by one."""
+HEAD = (
+    f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
+    "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
+)
+
+LEGEND = (
+    "paper: its AMSE and ACC; nRMSE, RMSE, variance: of the opening, the last by that of the recordings; lag: ms",
+    "score, p b m: %; false: closings outside p b m, a minute of speech; seconds: of a processor, for training",
+)
+
+
+def table(figures: Mapping[str, Any]) -> str:
+    """Return the figures of ``xieliu2007`` as text."""
+    order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
+    amse_form = ".1f" if figures["visual"] == EIGENLIPS else ".4f"  # grey levels, or eye distances
+    closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
+    names = figures["channels"]
+    compared = ", ".join(names) if len(names) <= NAMED_CHANNELS else f"{len(names)} channels"
+    lines = [
+        f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
+        f"AMSE, ACC of {compared}{closed}; numbers: what the chains have learned",
+    ]
+    for size in figures["rows"]:
+        for condition, rows in size["conditions"].items():
+            lines += ["", f"{condition}, {size['used']} of the first {size['names']} clips", HEAD]
+            lines += [_line(name, row, size["training"][name], amse_form) for name, row in rows.items()]
+            lines += _eigenlips(rows)
+        changed = []
+        for name, row in size["training"].items():
+            if row["tried"]:
+                options = {key: value for key, value in row["options"].items() if key not in ("structure", "chains")}
+                texts = (f"{key}={value}" if key == "start" else f"{key}={value:g}" for key, value in options.items())
+                changed.append(f"  {name:{WIDTH}}{', '.join(texts) or 'as printed'}")
+        lines += ["", "settings, the best on val", *changed] if changed else []
+        lines += _pair_lines(size["pairs"], amse_form)
+    for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
+        lines += ["", *_noise_lines(kind, figures, amse_form)]
+    lines += [
+        "",
+        f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
+        *LEGEND,
+    ]
+    return "\n".join(map(printable, lines))
+
+
+def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any], amse_form: str) -> str:
+    printed = "{:.3f} {:.3f}".format(*PAPER_FIGURES[name]) if name in PAPER_FIGURES else ""
+    amse, acc = _with_interval(row, "amse", amse_form), _with_interval(row, "acc", ".3f")
+    lips = (row["opening"] or {}) | {"lag_ms": row["lag_ms"]}
+    columns = {"nrmse": "7.3f", "rmse": "8.4f", "lag_ms": "+7.0f", "score": "7.1f", "recall_p_b_m": "7.1f"}
+    columns |= {"false_per_minute": "7.1f", "global_variance": "10.2f"}
+    texts = "".join(figure_text(lips.get(key), form) for key, form in columns.items())
+    return (
+        f"  {name:{WIDTH}}{printed:>13}  {amse:25}  {acc:22}  {_with_interval(row, 'opening_acc', '.3f'):22}{texts}"
+        f"{figure_text(training['parameters'], '10.0f')}{training['seconds']:9.1f}"
+    )
+
+
+def _pair_lines(pairs: Sequence[Mapping[str, Any]], amse_form: str) -> list[str]:
+    """Return the lines of the paper's order, pair by pair."""
+    if not pairs:
+        return []
+    lines = ["", f"  {'in the paper better than':{2 * WIDTH}}{'ACC (95 %)':27}AMSE (95 %)"]
+    for pair in pairs:
+        acc, amse = (
+            "{:+{f}}{} ({:+{f}} to {:+{f}})".format(
+                pair[key], significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], f=form
+            )
+            for key, form in (("acc", ".3f"), ("amse", amse_form))
+        )
+        lines.append(f"  {pair['better']:{WIDTH}}{pair['worse']:{WIDTH}}{acc:27}{amse}")
+    return lines
+
+
+def _eigenlips(rows: Mapping[str, Any]) -> list[str]:
+    """Return the lines of AMSE and ACC of eigenlips; none where eigenlips are not compared beside geometry."""
+    if "eigenlips_acc" not in next(iter(rows.values())):
+        return []
+    lines = [f"  {'eigenlips':{WIDTH}}{'AMSE (95 %)':27}{'ACC (95 %)'}"]
+    for name, row in rows.items():
+        amse, acc = _with_interval(row, "eigenlips_amse", ".2f"), _with_interval(row, "eigenlips_acc", ".3f")
+        lines.append(f"  {name:{WIDTH}}{amse:27}{acc}")
+    return lines
+
+
+def _with_interval(row: Mapping[str, Any], name: str, form: str) -> str:
+    if name not in row:
+        return "–"
+    low, high = (format(end, form) for end in row[f"{name}_95"])
+    return f"{row[name]:{form}}{significance_mark(row[f'{name}_gain_95'])} ({low}–{high})"
+
+
+def _noise_lines(kind: str, figures: Mapping[str, Any], amse_form: str) -> list[str]:
+    """Return the lines of ACC and AMSE of every system, from clean sound to the loudest noise."""
+    in_noise = [row for row in figures["noise"] if row["kind"] == kind]
+    size = figures["rows"][-1]
+    clean = next(iter(size["conditions"].values()))
+    heads = ["clean", *(f"{row['snr_db']:g} dB" for row in in_noise)]
+    lines = [f"{kind} noise, audio only, trained on {size['used']} clips without noise: ACC / AMSE"]
+    lines.append(f"  {'system':{WIDTH}}" + "".join(f"{head:>17}" for head in heads))
+    for name in clean:
+        cells = [
+            f"{row['acc']:.3f}{significance_mark(row['acc_gain_95'])} / "
+            f"{row['amse']:{amse_form}}{significance_mark(row['amse_gain_95'])}"
+            for row in (clean[name], *(row["systems"][name] for row in in_noise))
+        ]
+        lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))
+    return lines

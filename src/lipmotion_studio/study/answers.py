@@ -74,8 +74,8 @@ def is_possible(kind: str, value: str) -> bool:
     """Return whether a value can be the answer to a question of a kind."""
     if kind == PAIRED:
         return value in (FIRST, SECOND)
-    least, most = (1, HIGHEST_MOS) if kind == MOS else (0, HIGHEST_RANK)
-    return value.isascii() and value.isdecimal() and len(value) <= 3 and least <= int(value) <= most
+    low, high = (1, HIGHEST_MOS) if kind == MOS else (0, HIGHEST_RANK)
+    return value.isascii() and value.isdecimal() and len(value) <= 3 and low <= int(value) <= high
 
 
 COLUMNS = tuple(field.name for field in fields(Answer))

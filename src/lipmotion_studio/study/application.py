@@ -1,13 +1,10 @@
-"""The study as a web application: a page, its videos, and the answers; an ASGI application of Starlette.
-
-A rater is known by a token, which the page keeps in the part of its address that browsers do not send, and gives with
-every request. No part of an address is ever used as a path of a file: names are looked up among those of the study.
-"""
+"""The study as a web application: a page, its videos, and the answers; an ASGI application of Starlette."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection, Mapping
+import time
+from collections.abc import Callable, Collection, Hashable, Mapping
 from functools import lru_cache, partial
 from importlib.resources import files
 from ipaddress import ip_address
@@ -23,15 +20,80 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from lipmotion.errors import InputError
-from lipmotion.formats.web_page import coloured
-from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED
-from lipmotion_studio.study.limits import RateLimit
+from lipmotion.formats.web_page import colour_code
+from lipmotion.types.values import items, members, number, text, whole
+from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial
-from lipmotion_studio.study.questions import ASKED, POINTS, SCALES
-from lipmotion_studio.study.store import StudyStore, rater_name
-from lipmotion_studio.study.submission import submitted_sheet
+from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
+from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name
 from lipmotion_studio.study.trials import questions_of, trials_of
 from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal, json_of
+
+
+class RateLimit:
+    """Allows so many requests a second for each asker, and some more at once.
+
+    rate_hz : requests a second in the long run
+    burst   : requests at once after a pause
+    clock   : returns the time in seconds
+    Of askers whose allowance is full again nothing is kept: the memory is bounded by ``burst / rate_hz`` seconds of
+    requests, and askers are few.
+    """
+
+    def __init__(self, rate_hz: float, burst: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
+        self._full_at_s: dict[Hashable, float] = {}
+        self._sweep_at = 1024
+
+    def allows(self, asker: Hashable = "") -> bool:
+        """Return whether one more request is allowed, and count it if it is."""
+        now_s = self._clock()
+        full_at_s = max(self._full_at_s.get(asker, now_s), now_s) + 1 / self._rate_hz
+        if full_at_s - now_s > self._burst / self._rate_hz + 1e-9:
+            return False
+        self._full_at_s[asker] = full_at_s
+        if len(self._full_at_s) > self._sweep_at:
+            self._full_at_s = {who: at_s for who, at_s in self._full_at_s.items() if at_s > now_s}
+            self._sweep_at = 2 * len(self._full_at_s) + 1024
+        return True
+
+
+SHARE_PLAYED = 0.9
+"""Least time of a trial, as a share of the time that its videos last: clocks of browsers and files differ."""
+LONGEST_S, MAX_PLAYS = 86_400.0, 1000
+_MEMBERS = {
+    **{"trial": whole(0, 1 << 31), "values": items(text(100)), "plays": items(whole(1, MAX_PLAYS))},
+    "seconds": number(0, LONGEST_S),
+}
+_SHEET = members(_MEMBERS, _MEMBERS, alone=True)
+
+
+def check_sheet(study: Study, trials: list[StudyTrial], rater: int, content: Any) -> AnswerSheet:
+    """Return the answers that a page sent.
+
+    trials  : in the order of this rater
+    content : what the JSON text held: ``trial``, its number; ``values``, an answer to each question; ``plays``, how
+              often each video was played to its end; ``seconds``, from the start of the trial to the answer
+    Raises InputError: something else, an impossible value, or not all videos were played to their ends.
+    """
+    found = _SHEET(content)
+    if found["trial"] >= len(trials):
+        raise InputError(f"no such trial, required 0 to {len(trials) - 1}")
+    trial, seconds = trials[found["trial"]], found["seconds"]
+    if len(found["plays"]) != len(trial.videos):
+        raise InputError(f"required the plays of {len(trial.videos)} videos")
+    lasts_s = sum(video.seconds for video in study.shown(trial))
+    if seconds < SHARE_PLAYED * lasts_s:
+        raise InputError(f"{seconds:.1f} s for videos of {lasts_s:.1f} s; play all of them to their ends")
+    given = found["values"]
+    count = len(questions_of(study, trial))
+    if len(given) != count:
+        raise InputError(f"required {count} answers")
+    if not all(is_possible(study.kind, value) for value in given):
+        raise InputError(f"an answer that is not possible, required {POSSIBLE[study.kind]}")
+    values = tuple(given if study.kind == PAIRED else (str(int(value)) for value in given))
+    return AnswerSheet(rater, found["trial"], values, seconds, sum(found["plays"]))
+
 
 PAGE = {
     "": ("study.html", "text/html; charset=utf-8"),
@@ -71,9 +133,11 @@ def study_application(
     def refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
         return foreign_refusal(path, headers, is_own, names)
 
-    desk = _Desk(study, store)
+    replies = _Replies(study, store)
     folder = files("lipmotion_studio.study") / "page"
-    page = {name: (coloured((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()}
+    page = {
+        name: (colour_code((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()
+    }
 
     async def packaged(request: Request) -> Response:
         content, kind = page[request.url.path.removeprefix("/")]
@@ -88,10 +152,10 @@ def study_application(
     routes = [Route(f"/{name}", packaged) for name in page]
     routes += [
         Route(f"/{VIDEOS}/{{name}}", video),
-        Route("/api/study", desk.described),
-        Route("/api/raters", desk.joined, methods=["POST"]),
-        Route("/api/state", desk.state),
-        Route("/api/answers", desk.answered, methods=["POST"]),
+        Route("/api/study", replies.described),
+        Route("/api/raters", replies.joined, methods=["POST"]),
+        Route("/api/state", replies.state),
+        Route("/api/answers", replies.answered, methods=["POST"]),
     ]
     application = Starlette(routes=routes, exception_handlers=ERRORS)
     application.add_middleware(Guard, refusal=refusal)
@@ -99,7 +163,7 @@ def study_application(
     return application
 
 
-class _Desk:
+class _Replies:
     """Where raters join, get their trials, and hand in answers."""
 
     def __init__(self, study: Study, store: StudyStore) -> None:
@@ -132,7 +196,7 @@ class _Desk:
     async def answered(self, request: Request) -> Response:
         """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
         rater = self._rater(request)
-        sheet = submitted_sheet(self._study, self._trials(rater), rater, await json_of(request))
+        sheet = check_sheet(self._study, self._trials(rater), rater, await json_of(request))
         following = self._store.next_trial(rater)
         if sheet.trial > following:
             raise HTTPException(409, f"trial {sheet.trial} comes after trial {following}")

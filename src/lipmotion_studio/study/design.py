@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import installed_version
+from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.storage.files import read_text_file, sha256_of, whole_folder
 from lipmotion.types import Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
 from lipmotion_studio.study.answers import ANCHOR, KINDS, MOS, PAIRED, RANKING, RECORDING
-from lipmotion_studio.study.encoding import encode_shown
-from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, StudyVideo, write_manifest
-from lipmotion_studio.study.questions import CONSENT, INSTRUCTIONS
-from lipmotion_studio.study.settings import StudySettings
+from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo, write_manifest
+from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, StudySettings
 from lipmotion_studio.study.sources import (
     MadeVideo,
     StudySentence,
     condition_of,
-    drawn_job,
+    encode_shown,
     named_conditions,
-    split_sentences,
+    read_sentences,
 )
 from lipmotion_studio.study.trials import (
-    VideoNumbers,
     anchor_trials,
     attention_trials,
     main_trials,
@@ -33,9 +32,7 @@ from lipmotion_studio.study.trials import (
     shuffled,
 )
 
-LARGEST_TEXT_BYTES = 1 << 16
-
-
+MAX_TEXT_BYTES = 1 << 16
 DEFAULTS = StudySettings()
 
 
@@ -62,33 +59,47 @@ def design_study(
         raise InputError(f"a study of the kind {kind!r}, required one of {', '.join(KINDS)}")
     if output.exists():
         raise ExportError(f"{output}: exists; give the name of a new folder")
-    sources, said = named_conditions(conditions), split_sentences(sentences)
-    drawn = drawn_job(settings.face, settings.fps, settings.recogniser)
-    makers = {name: condition_of(source, said, drawn) for name, source in sources.items()}
+    sources, spoken = named_conditions(conditions), read_sentences(sentences)
+    drawn = Job(Request(recogniser=settings.recogniser), Outputs(face=settings.face, fps=settings.fps))
+    makers = {name: condition_of(source, spoken, drawn) for name, source in sources.items()}
     base = RECORDING if RECORDING in sources else next(iter(sources))
-    late = _late_sentences(kind, said, settings)
-    texts = _texts(kind, settings)
+    names, seed = [sentence.name for sentence in spoken], settings.seed
+    late = shuffled(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
+    if kind == RANKING:  # every page has one, if any has
+        late = names if settings.anchors else []
+    texts = {"consent": CONSENT, "instructions": INSTRUCTIONS[kind]}
+    for name in texts:
+        path = getattr(settings, name)
+        if path:
+            texts[name] = read_text_file(path, name, MAX_TEXT_BYTES).strip()
     with whole_folder(output) as folder:
         (folder / VIDEOS).mkdir()
         videos: list[StudyVideo] = []
-        wanted = [(sentence, name) for sentence in said for name in makers]
+        wanted = [(sentence, name) for sentence in spoken for name in makers]
         for sentence, name in with_progress(wanted, "making videos", monitor):
-            given = makers[name](sentence, folder / _UNFINISHED)
-            videos.append(_shown(given, sentence, name, folder, settings))
+            made = makers[name](sentence, folder / _UNFINISHED)
+            videos.append(_encode(made, sentence, name, folder, settings))
             if name == base and sentence.name in late:
-                videos.append(_shown(given, sentence, ANCHOR, folder, settings))
+                videos.append(_encode(made, sentence, ANCHOR, folder, settings))
             (folder / _UNFINISHED).unlink(missing_ok=True)
         numbers = {(video.sentence, video.condition): n for n, video in enumerate(videos)}
+        trials = main_trials(kind, list(sources), names, numbers)
+        with_anchor = [name for name in names if (name, ANCHOR) in numbers]
+        anchored = anchor_trials(base, with_anchor, numbers) if kind == PAIRED else []
+        checks = attention_trials(kind, trials, settings.checks, seed)
+        practice = practice_trials([*trials, *anchored], settings.practice, seed)
         study = Study(
             kind=kind,
             title=settings.title,
             **texts,
             scales=settings.scales if kind == MOS else (),
-            seed=settings.seed,
+            seed=seed,
             conditions=sources | ({ANCHOR: f"{base}, sound {settings.anchor_ms:g} ms late"} if late else {}),
-            sentences={each.name: {"file": each.recording.name, "sha256": sha256_of(each.recording)} for each in said},
+            sentences={
+                each.name: {"file": each.recording.name, "sha256": sha256_of(each.recording)} for each in spoken
+            },
             videos=tuple(videos),
-            trials=_trials(kind, sources, said, numbers, base, settings),
+            trials=(*practice, *trials, *anchored, *checks),
             made_by={"lipmotion": installed_version()}
             | {name: str(value) for name, value in asdict(settings).items() if name not in texts},
         )
@@ -99,45 +110,12 @@ def design_study(
 _UNFINISHED = "made.mp4"
 
 
-def _late_sentences(kind: str, sentences: Sequence[StudySentence], settings: StudySettings) -> list[str]:
-    """Return the names of the sentences that have an anchor; every page of a ranking has one, if any has."""
-    names = [sentence.name for sentence in sentences]
-    if kind == RANKING:
-        return names if settings.anchors else []
-    return shuffled(names, "anchor", settings.seed)[: settings.anchors]
-
-
-def _shown(given: MadeVideo, sentence: StudySentence, name: str, folder: Path, settings: StudySettings) -> StudyVideo:
+def _encode(video: MadeVideo, sentence: StudySentence, name: str, folder: Path, settings: StudySettings) -> StudyVideo:
     """Encode a video as it is shown, and name it by its content."""
     late_ms = settings.anchor_ms if name == ANCHOR else 0.0
     file = folder / VIDEOS / "encoded.mp4"
-    seconds = encode_shown(given.file, file, sentence.recording, settings.shown_region, late_ms)
+    seconds = encode_shown(video.file, file, sentence.recording, settings.shown_region, late_ms)
     digest = sha256_of(file)
     file.replace(file.with_name(f"{digest[:32]}.mp4"))
-    made = given.made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})
+    made = video.made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})
     return StudyVideo(f"{digest[:32]}.mp4", sentence.name, name, round(seconds, 3), digest, made)
-
-
-def _texts(kind: str, settings: StudySettings) -> dict[str, str]:
-    given = {"consent": settings.consent, "instructions": settings.instructions}
-    built_in = {"consent": CONSENT, "instructions": INSTRUCTIONS[kind]}
-    return {
-        name: read_text_file(path, name, LARGEST_TEXT_BYTES).strip() if path else built_in[name]
-        for name, path in given.items()
-    }
-
-
-def _trials(
-    kind: str,
-    conditions: Mapping[str, str],
-    sentences: Sequence[StudySentence],
-    numbers: VideoNumbers,
-    base: str,
-    settings: StudySettings,
-) -> tuple[StudyTrial, ...]:
-    names, seed = [sentence.name for sentence in sentences], settings.seed
-    trials = main_trials(kind, list(conditions), names, numbers)
-    late = [name for name in names if (name, ANCHOR) in numbers]
-    anchored = anchor_trials(base, late, numbers) if kind == PAIRED else []
-    checks = attention_trials(kind, trials, settings.checks, seed)
-    return (*practice_trials([*trials, *anchored], settings.practice, seed), *trials, *anchored, *checks)

@@ -12,13 +12,13 @@ from lipmotion.storage.files import read_text_file, sha256_of
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import any_members, as_tuple, items, number, text, truth, value_of, whole
 from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, is_possible
-from lipmotion_studio.study.questions import SCALES
+from lipmotion_studio.study.settings import SCALES
 
 FORMAT, VERSION = "lipmotion_studio.study", 1
 MANIFEST, VIDEOS = "study.json", "videos"
 VIDEO_NAME = re.compile(r"[0-9a-f]{32}\.mp4")
 """Names of videos: the beginning of the digest of their content, which says nothing of what made them."""
-MOST_TRIALS = 10_000
+MAX_TRIALS = 10_000
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ class Study:
         """Raise ValueError: the parts do not fit one another."""
         if self.kind not in KINDS:
             raise ValueError(f"the kind {self.kind!r}, required one of {', '.join(KINDS)}")
-        if not self.trials or len(self.trials) > MOST_TRIALS:
-            raise ValueError(f"{len(self.trials)} trials, required 1 to {MOST_TRIALS}")
+        if not self.trials or len(self.trials) > MAX_TRIALS:
+            raise ValueError(f"{len(self.trials)} trials, required 1 to {MAX_TRIALS}")
         if self.kind == MOS and (not self.scales or not set(self.scales) <= SCALES.keys()):
             raise ValueError(f"the scales {', '.join(self.scales)}, required some of {', '.join(SCALES)}")
         for video in self.videos:

@@ -1,15 +1,121 @@
-"""How a study is made, and what raters read."""
-# ruff: noqa: RUF009 (``option`` returns the field of a dataclass)
+"""How a study is made, and what raters read and are asked."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError
 from lipmotion.types.configuration import Configuration, Rule, option
-from lipmotion_studio.study.questions import SCALES
-from lipmotion_studio.study.region import Region
+from lipmotion_studio.study.answers import MOS, PAIRED, RANKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Pictures = NDArray[np.uint8]
+
+
+PREFERENCE, MATCH = "preference", "match"
+"""Questions of a paired comparison, and of a ranking."""
+
+
+@dataclass(frozen=True)
+class OpinionScale:
+    """A five-point scale.
+
+    title : its name, as raters read it
+    asks  : the question
+    """
+
+    title: str
+    asks: str
+
+
+SCALES = {
+    "smoothness": OpinionScale("Smoothness", "Does the mouth move smoothly, without jumps or trembling?"),
+    "closure": OpinionScale("Closure", "Do the lips close where they should, as in m, b and p, and only there?"),
+    "protrusion": OpinionScale("Protrusion", "Are the lips pushed forward where they should be, as in oo, w and sh?"),
+    "turning": OpinionScale("Turning", "Does the mouth turn from opening to closing, and back, at the right moments?"),
+    "overall": OpinionScale("Overall", "All in all, how natural is the mouth with this sound?"),
+}
+"""The criteria of Xie & Liu 2007 (section 7.3), which names them without a definition: the questions are ours."""
+POINTS = ("bad", "poor", "fair", "good", "excellent")
+"""Words of the points 1 to 5: the ends are the paper's, those between are of ITU-T P.800."""
+ASKED = {
+    PAIRED: "In which video do the lips match the sound better?",
+    MOS: "How good is the mouth in this video?",
+    RANKING: "How well do the lips match the sound? 0 is not at all, 100 is perfectly.",
+}
+"""The question of a page, for each kind."""
+CONSENT = """You will watch short videos of a person or a drawn face speaking, and judge how the mouth moves. Some of the videos are recordings of people; in others a program makes the mouth move.
+Taking part is voluntary. You may stop at any time by closing the page, without a reason.
+Stored are your judgements, how often you played each video, and how long each judgement took; under a number, without your name, address or anything about your device.
+You may have your judgements deleted later: tell the researcher your number, which the page shows."""  # noqa: E501
+INSTRUCTIONS = {
+    PAIRED: """You will see pairs of videos in which the same sentence is said. Play both to the end, with sound, as often as you like. Then choose the one in which the lips match the sound better. If you are not sure, guess.""",  # noqa: E501
+    MOS: """You will see one video at a time. Play it to the end, with sound, as often as you like. Then judge the mouth on every scale, from 1 (bad) to 5 (excellent).""",  # noqa: E501
+    RANKING: """You will see several videos of one sentence on a page. Play each to the end, with sound, as often as you like. Then set the slider of each between 0 (the lips do not match the sound at all) and 100 (they match it perfectly).""",  # noqa: E501
+}
+"""What raters are asked to do, for each kind; paragraphs are lines."""
+
+
+MIN_REGION_PX = 16
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of pictures, as shares of their width and height, from the upper left corner.
+
+    Raises InputError: it is not inside.
+
+    >>> Region.parsed("0.25,0.5,0.5,0.4")
+    Region(left=0.25, top=0.5, width=0.5, height=0.4)
+    """
+
+    left: float = 0.0
+    top: float = 0.0
+    width: float = 1.0
+    height: float = 1.0
+
+    def __post_init__(self) -> None:
+        inside = (
+            0 <= self.left < self.left + self.width <= 1 + 1e-9 and 0 <= self.top < self.top + self.height <= 1 + 1e-9
+        )
+        if not inside:
+            raise InputError(
+                f"the region {self.left:g},{self.top:g},{self.width:g},{self.height:g}, required shares of width and "
+                "height inside the picture: LEFT,TOP,WIDTH,HEIGHT"
+            )
+
+    @classmethod
+    def parsed(cls, text: str) -> Region:
+        """Return the region of a text ``LEFT,TOP,WIDTH,HEIGHT``; of an empty one, the whole picture.
+
+        Raises InputError: not four numbers, or not inside.
+        """
+        if not text:
+            return cls()
+        try:
+            left, top, width, height = map(float, text.split(","))
+        except ValueError as error:
+            raise InputError(f"the region {text!r}, required four numbers: LEFT,TOP,WIDTH,HEIGHT") from error
+        return cls(left, top, width, height)
+
+    def cut(self, picture: Pictures) -> Pictures:
+        """Return the part of a picture [shape=(H, W, 3)], of even height and width. Raises InputError: too small."""
+        full_height, full_width = picture.shape[:2]
+        top, left = round(self.top * full_height), round(self.left * full_width)
+        height, width = (round(self.height * full_height) // 2 * 2, round(self.width * full_width) // 2 * 2)
+        part = picture[top : top + height, left : left + width]
+        part = part[: len(part) // 2 * 2, : part.shape[1] // 2 * 2]
+        if min(part.shape[:2]) < MIN_REGION_PX:
+            raise InputError(f"the region has {part.shape[1]} × {part.shape[0]} pixels; give a larger one")
+        return part
+
+
+# ruff: noqa: RUF009 (``option`` returns the field of a dataclass)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,15 @@
-"""What a study shows: sentences, and conditions, each of which gives a video of every sentence."""
+"""What a study shows: sentences, conditions that give a video of each, and these videos as every browser plays them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
@@ -14,12 +18,16 @@ from lipmotion.pipeline.job import Job, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
 from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.pipeline.understand.recordings import recordings_of
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
-from lipmotion.storage.media import has_video
+from lipmotion.storage.media import has_video, open_media
+from lipmotion.types import Audio
+from lipmotion_faces.tracking.footage import read_video_frames
+from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
+from lipmotion_faces.video.synthetic_mark import LABEL, SOURCE_TYPE, mark_metadata
 from lipmotion_studio.study.answers import ANCHOR, RECORDING
+from lipmotion_studio.study.settings import Region
 
 MODEL_SUFFIX, JOB_SUFFIX = ".lipmotion", ".toml"
 SHIPPED = "shipped"
@@ -46,7 +54,7 @@ Condition = Callable[[StudySentence, Path], MadeVideo]
 """Gives the video of a sentence; where it has to be made, as the file of the path."""
 
 
-def split_sentences(given: Sequence[Path]) -> list[StudySentence]:
+def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
     """Return the sentences of files and folders of recordings, by the names of the files without suffix.
 
     Raises InputError: none, two of one name, or a folder without recordings.
@@ -104,8 +112,7 @@ def condition_of(source: str, sentences: Sequence[StudySentence], drawn: Job) ->
                 )
         return lambda sentence, target: MadeVideo(sentence.recording, {"made": "recording"})  # noqa: ARG005
     if path.is_dir():
-        found = {sentence.name: _file_of(path, sentence.name) for sentence in sentences}
-        return lambda sentence, target: _given(found[sentence.name], sentence, target, drawn)
+        return _finished(path, sentences, drawn)
     if source != SHIPPED and not path.is_file():
         raise InputError(f"{source}: no such model, job file or folder; give one, or {SHIPPED!r}: the model that ships")
     if path.suffix.lower() == JOB_SUFFIX:
@@ -117,9 +124,35 @@ def condition_of(source: str, sentences: Sequence[StudySentence], drawn: Job) ->
     return _animated(replace(drawn, request=replace(drawn.request, model=model)), {})
 
 
-def drawn_job(face: str, fps: float | None, recogniser: str) -> Job:
-    """Return how motion is made and drawn where a source does not say it."""
-    return Job(Request(recogniser=recogniser), Outputs(face=face, fps=fps))
+def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+    """Return a condition of finished videos, which stay as they are, or of motion, drawn with the sentences' sound.
+
+    Raises InputError: there is none of a sentence, or several.
+    """
+    files: dict[str, Path] = {}
+    for name in (sentence.name for sentence in sentences):
+        there = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stem == name]
+        for suffixes in (VIDEO_SUFFIXES, readable_suffixes()):
+            fitting = [path for path in there if path.suffix.lower() in suffixes]
+            if len(fitting) > 1:
+                raise InputError(f"{fitting[0]} and {fitting[1]}: both are of the sentence {name!r}; move one away")
+            if fitting:
+                files[name] = fitting[0]
+                break
+        else:
+            way_out = f"add {name}.mp4 or {name}.json"
+            raise InputError(f"{folder}: has no video and no motion of the sentence {name!r}; {way_out}")
+
+    def condition(sentence: StudySentence, target: Path) -> MadeVideo:
+        path, outputs = files[sentence.name], drawn.outputs
+        made = {"file": path.name, "file_sha256": sha256_of(path)}
+        if path.suffix.lower() in VIDEO_SUFFIXES:
+            return MadeVideo(path, made | {"made": "finished"})
+        generation = as_long_as(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
+        write(generation, target, speech=sentence.recording, face=outputs.face, fps=outputs.fps)
+        return MadeVideo(target, made | {"made": "drawn", "face": outputs.face})
+
+    return condition
 
 
 def _animated(job: Job, made: dict[str, str]) -> Condition:
@@ -139,24 +172,41 @@ def _animated(job: Job, made: dict[str, str]) -> Condition:
     return condition
 
 
-def _given(path: Path, sentence: StudySentence, target: Path, drawn: Job) -> MadeVideo:
-    """Return a finished video as it is, and motion drawn with the sound of the sentence."""
-    made = {"file": path.name, "file_sha256": sha256_of(path)}
-    if path.suffix.lower() in VIDEO_SUFFIXES:
-        return MadeVideo(path, made | {"made": "finished"})
-    outputs = drawn.outputs
-    generation = as_long_as(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
-    write(generation, target, speech=sentence.recording, face=outputs.face, fps=outputs.fps)
-    return MadeVideo(target, made | {"made": "drawn", "face": outputs.face})
+Pictures = NDArray[np.uint8]
 
 
-def _file_of(folder: Path, name: str) -> Path:
-    """Return the video, or else the motion file, of a sentence. Raises InputError: there is none, or several."""
-    there = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stem == name]
-    for suffixes in (VIDEO_SUFFIXES, readable_suffixes()):
-        fitting = [path for path in there if path.suffix.lower() in suffixes]
-        if len(fitting) > 1:
-            raise InputError(f"{fitting[0]} and {fitting[1]}: both are of the sentence {name!r}; move one away")
-        if fitting:
-            return fitting[0]
-    raise InputError(f"{folder}: has no video and no motion of the sentence {name!r}; add {name}.mp4 or {name}.json")
+def encode_shown(source: Path, target: Path, sound: Path, region: Region, late_ms: float = 0.0) -> float:
+    """Write a video as raters see it (H.264, AAC), and return how long it lasts, in seconds.
+
+    sound   : the recording whose sound a video without sound gets
+    late_ms : how much later than it was the sound comes; the video keeps its length
+    The mark of a synthetic video stays: raters do not see it, whoever gets the file can.
+    Raises InputError: it cannot be read, or the region is too small. Raises ExportError: it cannot be written.
+    """
+    frames, rate_hz = read_video_frames(source)
+    with open_media(source) as container:
+        has_sound, texts = bool(container.streams.audio), list(container.metadata.values())
+    played = read_audio(source if has_sound else sound, SOUND_HZ, warn=False)
+    shift, count = round(late_ms / 1000 * played.rate_hz), len(played.samples)
+    if not 0 <= shift < count:
+        raise InputError(f"the sound of {played.duration_s:.2f} s cannot be {late_ms:g} ms late; give longer sentences")
+    late = Audio(np.concatenate([np.zeros(shift, np.float32), played.samples[: count - shift]]), played.rate_hz)
+    is_marked = any(SOURCE_TYPE in text or text.startswith(LABEL) for text in texts)
+    mark = mark_metadata() if is_marked else None
+    marked: dict[str, Any] = {"tags": mark.tags, "xmp": mark.xmp} if mark else {}
+    counted = _Counted(region.cut(frame) for frame in frames)
+    write_mp4(target, counted, fps=rate_hz, audio=late, **marked)
+    return max(counted.count / rate_hz, played.duration_s)
+
+
+class _Counted:
+    """Pictures, and how many have been taken."""
+
+    def __init__(self, pictures: Iterable[Pictures]) -> None:
+        self._pictures = pictures
+        self.count = 0
+
+    def __iter__(self) -> Iterator[Pictures]:
+        for picture in self._pictures:
+            self.count += 1
+            yield picture

@@ -21,8 +21,8 @@ ResultT = TypeVar("ResultT")
 Work = Callable[[sqlite3.Connection], Any]
 ANSWERS = "answers.sqlite"
 SCHEMA_VERSION = 1
-MOST_RATERS = 100_000
-MOST_TOGETHER = 256
+MAX_RATERS = 100_000
+MAX_TOGETHER = 256
 """Most pieces of work that are committed together."""
 BUSY_S = 30.0
 """How long another process, such as ``forget``, is waited for."""
@@ -81,8 +81,8 @@ class StudyStore:
         for suffix in ("", "-wal", "-shm", "-journal"):  # which SQLite opens through links
             check_own(self.path.with_name(f"{ANSWERS}{suffix}"))
         try:
-            self._reader = self._opened(digest)
-            self._writer = self._connected()
+            self._reader = self._open(digest)
+            self._writer = self._connect()
         except sqlite3.OperationalError as error:
             raise ExportError(f"{self.path}: cannot be opened: {error}") from error
         except sqlite3.DatabaseError as error:
@@ -101,14 +101,14 @@ class StudyStore:
     def add_rater(self) -> Future[tuple[int, str]]:
         """Add a rater; the result is the rater's number and token, which cannot be guessed.
 
-        The result raises InputError: there are ``MOST_RATERS``.
+        The result raises InputError: there are ``MAX_RATERS``.
         """
         token = token_urlsafe(24)
 
         def work(database: sqlite3.Connection) -> tuple[int, str] | InputError:
             (count,) = database.execute("SELECT count(*) FROM raters").fetchone()
-            if count >= MOST_RATERS:
-                return InputError(f"the study has {count} raters, required at most {MOST_RATERS}")
+            if count >= MAX_RATERS:
+                return InputError(f"the study has {count} raters, required at most {MAX_RATERS}")
             number = database.execute("INSERT INTO raters (token_sha256) VALUES (?)", [_digest(token)]).lastrowid
             return int(number or 0), token
 
@@ -169,8 +169,8 @@ class StudyStore:
         self._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # the log would hold the answers for a while
         return int(count)
 
-    def _opened(self, digest: str) -> sqlite3.Connection:
-        database = self._connected()
+    def _open(self, digest: str) -> sqlite3.Connection:
+        database = self._connect()
         database.execute("PRAGMA journal_mode = WAL")
         database.execute("BEGIN IMMEDIATE")
         (version,) = database.execute("PRAGMA user_version").fetchone()
@@ -189,7 +189,7 @@ class StudyStore:
             )
         return database
 
-    def _connected(self) -> sqlite3.Connection:
+    def _connect(self) -> sqlite3.Connection:
         database = sqlite3.connect(self.path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
         for setting in ("synchronous = FULL", "foreign_keys = ON", "secure_delete = ON"):
             database.execute(f"PRAGMA {setting}")
@@ -204,7 +204,7 @@ class StudyStore:
         goes_on = True
         while goes_on:
             together = [self._waiting.get()]
-            while len(together) < MOST_TOGETHER and not self._waiting.empty():
+            while len(together) < MAX_TOGETHER and not self._waiting.empty():
                 together.append(self._waiting.get())
             goes_on = None not in together
             self._write([each for each in together if each is not None])

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from lipmotion_studio.study.answers import ANCHOR, FIRST, HIGHEST_RANK, MOS, PAIRED, SECOND
 from lipmotion_studio.study.manifest import Study, StudyTrial
-from lipmotion_studio.study.questions import MATCH, PREFERENCE
+from lipmotion_studio.study.settings import MATCH, PREFERENCE
 
 PlaceT = TypeVar("PlaceT")
 VideoNumbers = Mapping[tuple[str, str], int]

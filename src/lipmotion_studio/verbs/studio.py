@@ -12,9 +12,9 @@ from lipmotion.cli.terminal.printing import flush_output, print_line
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("studio", help="see, edit, approve and export motion on a page of this machine")
-    told = "a recording, a folder or a list of recordings, or a project; NAME.studio: made if it is not there "
-    told += "(default: an empty project)"
-    add_input(parser, "source", what="recording", nargs="?", metavar="FILE|FOLDER|PROJECT", help=told)
+    source = "a recording, a folder or a list of recordings, or a project; NAME.studio: made if it is not there "
+    source += "(default: an empty project)"
+    add_input(parser, "source", what="recording", nargs="?", metavar="FILE|FOLDER|PROJECT", help=source)
     project = "folder of a new project (default: beside the source, its name and .studio)"
     add_output(parser, "-o", "--output", metavar="PROJECT", help=project)
     model = "trained model of the project from now on (default: the one that ships with the package)"

@@ -21,29 +21,56 @@ KINDS = {
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its actions to the parser of the command line."""
-    parser = verbs.add_parser("study", help="show videos to people, and find out what they see")
-    actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    for action in (_add_design, _add_serve, _add_export, _add_analyse, _add_forget):
-        action(actions)
-
-
-def _add_design(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     from lipmotion_studio.study.settings import StudySettings
 
-    parser = actions.add_parser("design", help="make a study: videos, trials and a page for raters")
-    kinds = parser.add_mutually_exclusive_group(required=True)
-    for kind, says in KINDS.items():
-        kinds.add_argument(f"--{kind}", dest="kind", action="store_const", const=kind, help=says)
+    parser = verbs.add_parser("study", help="show videos to people, and find out what they see")
+    actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
+
+    design = actions.add_parser("design", help="make a study: videos, trials and a page for raters")
+    kinds = design.add_mutually_exclusive_group(required=True)
+    for kind, meaning in KINDS.items():
+        kinds.add_argument(f"--{kind}", dest="kind", action="store_const", const=kind, help=meaning)
     source = "a model, a job file, or a folder of videos or motion; or 'recording' alone; once for each condition"
-    parser.add_argument(
+    design.add_argument(
         "--condition", action="append", required=True, default=[], metavar="NAME=SOURCE", help=source, dest="conditions"
     )
     recordings = "recordings, or folders of them; the names of the files are those of the sentences"
-    add_input(parser, "--sentence", what="recording", nargs="+", required=True, metavar="FILE|FOLDER", help=recordings)
-    add_output(parser, "-o", "--output", is_folder=True, required=True, metavar="STUDY")
-    add_options(parser, StudySettings)
-    add_machine_readable(parser)
-    parser.set_defaults(run=run_design)
+    add_input(design, "--sentence", what="recording", nargs="+", required=True, metavar="FILE|FOLDER", help=recordings)
+    add_output(design, "-o", "--output", is_folder=True, required=True, metavar="STUDY")
+    add_options(design, StudySettings)
+    add_machine_readable(design)
+    design.set_defaults(run=run_design)
+
+    serve = actions.add_parser("serve", help="show a study to raters as a web page, and store their answers")
+    add_input(serve, "study", what="study", metavar="STUDY")
+    host = "address to listen at (default: 127.0.0.1, which only this machine reaches; see docs/study.md)"
+    serve.add_argument("--host", default="127.0.0.1", help=host)
+    serve.add_argument("--port", type=int, default=8000, help="0: any that is free (default: 8000)")
+    name = "name by which raters reach the server through another one, as study.example.org; may be repeated"
+    serve.add_argument("--name", action="append", default=[], metavar="HOST", help=name)
+    serve.set_defaults(run=run_serve)
+
+    export = actions.add_parser("export", help="write the answers as CSV, one row for each judgement")
+    add_input(export, "study", what="study", metavar="STUDY")
+    add_output(export, "-o", "--output", required=True, metavar="FILE.csv")
+    export.add_argument("--rater", metavar="NAME", help="the answers of this rater alone, as r007 (default: all)")
+    export.set_defaults(run=run_export)
+
+    analyse = actions.add_parser("analyse", help="print what the answers of a study say, and how sure it is")
+    add_input(analyse, "answers", what="table of answers", metavar="ANSWERS.csv", help="of lipmotion study export")
+    relative = "condition to which improvement is relative (default: that with the lowest mean)"
+    analyse.add_argument("--baseline", metavar="CONDITION", help=relative)
+    planned = "probability with which a planned study shall tell a difference (default: 0.8)"
+    analyse.add_argument("--power", type=float, default=0.8, metavar="P", help=planned)
+    count = "sentences of a planned study (default: as many as in this one)"
+    analyse.add_argument("--sentences", type=int, metavar="N", help=count)
+    add_figures_arguments(analyse, lexicon=False)
+    analyse.set_defaults(run=run_analyse)
+
+    forget = actions.add_parser("forget", help="delete all answers of one rater")
+    add_input(forget, "study", what="study", metavar="STUDY")
+    forget.add_argument("rater", help="name of the rater in the exported answers, as r007")
+    forget.set_defaults(run=run_forget)
 
 
 def run_design(options: argparse.Namespace) -> None:
@@ -62,24 +89,13 @@ def run_design(options: argparse.Namespace) -> None:
             monitor=report.receive,
         )
         counts = {"videos": len(study.videos), "trials": len(study.trials)}
-        said = f"{options.output}: {counts['videos']} videos, {counts['trials']} trials for each rater"
-        report.finish(printable(said), study=str(options.output), **counts)
-
-
-def _add_serve(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("serve", help="show a study to raters as a web page, and store their answers")
-    add_input(parser, "study", what="study", metavar="STUDY")
-    host = "address to listen at (default: 127.0.0.1, which only this machine reaches; see docs/study.md)"
-    parser.add_argument("--host", default="127.0.0.1", help=host)
-    parser.add_argument("--port", type=int, default=8000, help="0: any that is free (default: 8000)")
-    name = "name by which raters reach the server through another one, as study.example.org; may be repeated"
-    parser.add_argument("--name", action="append", default=[], metavar="HOST", help=name)
-    parser.set_defaults(run=run_serve)
+        message = f"{options.output}: {counts['videos']} videos, {counts['trials']} trials for each rater"
+        report.finish(printable(message), study=str(options.output), **counts)
 
 
 def run_serve(options: argparse.Namespace) -> None:
     """Call ``serve_study``; print the address of the page."""
-    from lipmotion_studio.study.serve import serve_study
+    from lipmotion_studio.study.conduct import serve_study
 
     def started(address: str) -> None:
         print_line(f"raters begin at {address} (Ctrl-C ends; answers are kept in {options.study})")
@@ -88,32 +104,11 @@ def run_serve(options: argparse.Namespace) -> None:
     serve_study(options.study, host=options.host, port=options.port, names=options.name, started=started)
 
 
-def _add_export(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("export", help="write the answers as CSV, one row for each judgement")
-    add_input(parser, "study", what="study", metavar="STUDY")
-    add_output(parser, "-o", "--output", required=True, metavar="FILE.csv")
-    parser.add_argument("--rater", metavar="NAME", help="the answers of this rater alone, as r007 (default: all)")
-    parser.set_defaults(run=run_export)
-
-
 def run_export(options: argparse.Namespace) -> None:
     """Call ``export_answers``; print how many there are."""
-    from lipmotion_studio.study.collected import export_answers
+    from lipmotion_studio.study.conduct import export_answers
 
     print_line(f"{options.output}: {export_answers(options.study, options.output, options.rater)} answers")
-
-
-def _add_analyse(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("analyse", help="print what the answers of a study say, and how sure it is")
-    add_input(parser, "answers", what="table of answers", metavar="ANSWERS.csv", help="of lipmotion study export")
-    relative = "condition to which improvement is relative (default: that with the lowest mean)"
-    parser.add_argument("--baseline", metavar="CONDITION", help=relative)
-    planned = "probability with which a planned study shall tell a difference (default: 0.8)"
-    parser.add_argument("--power", type=float, default=0.8, metavar="P", help=planned)
-    count = "sentences of a planned study (default: as many as in this one)"
-    parser.add_argument("--sentences", type=int, metavar="N", help=count)
-    add_figures_arguments(parser, lexicon=False)
-    parser.set_defaults(run=run_analyse)
 
 
 def run_analyse(options: argparse.Namespace) -> None:
@@ -130,16 +125,9 @@ def run_analyse(options: argparse.Namespace) -> None:
     )
 
 
-def _add_forget(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("forget", help="delete all answers of one rater")
-    add_input(parser, "study", what="study", metavar="STUDY")
-    parser.add_argument("rater", help="name of the rater in the exported answers, as r007")
-    parser.set_defaults(run=run_forget)
-
-
 def run_forget(options: argparse.Namespace) -> None:
     """Call ``forget_rater``; print how many answers there were."""
-    from lipmotion_studio.study.collected import forget_rater
+    from lipmotion_studio.study.conduct import forget_rater
 
     count = forget_rater(options.study, options.rater)
     print_line(f"{options.rater}: {count} answers deleted; files that were exported before still have them")

@@ -7,12 +7,12 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-MOST_CONNECTIONS, MOST_OF_ONE = 800, 256
+MAX_CONNECTIONS, MAX_OF_ONE = 800, 256
 """Connections at the same time, of all clients and of one: beyond these, those without a request are closed."""
 HEADERS_S, IDLE_S, STALLED_S = 5.0, 20, 30.0
 """How long the headers of a request may take; a connection is kept after a reply; and a reply may wait for its client,
-before that is asked to have taken ``LEAST_BYTES_S`` meanwhile."""
-LEAST_BYTES_S = 4096.0
+before that is asked to have taken ``MIN_BYTES_S`` meanwhile."""
+MIN_BYTES_S = 4096.0
 FIRST_READ_S = 0.1
 """After which the request of a new connection has been read, where it came with it."""
 
@@ -91,7 +91,7 @@ class PunctualConnection(H11Protocol):
 
     def _end_if_slow(self) -> None:
         self._count_taken()
-        if self._taken < LEAST_BYTES_S * self._waited_s:
+        if self._taken < MIN_BYTES_S * self._waited_s:
             self.transport.abort()
             return
         self._waited_s, self._taken = 0.0, 0
@@ -109,7 +109,7 @@ class PunctualConnection(H11Protocol):
         self.was_read = True
         everybody: set[Any] = {*self.connections}
         own = [each for each in everybody if each.client and self.client and each.client[0] == self.client[0]]
-        crowd = own if len(own) > MOST_OF_ONE else everybody if len(everybody) > MOST_CONNECTIONS else ()
+        crowd = own if len(own) > MAX_OF_ONE else everybody if len(everybody) > MAX_CONNECTIONS else ()
         if self in crowd:
             idle = [each for each in crowd if each.was_read and not each.is_busy]
             min(idle, key=lambda each: (each.cycle is not None, each.idle_since_s), default=self).transport.abort()

@@ -128,12 +128,12 @@ def json_reply(content: Any, status: int = 200) -> Response:
     return JSONResponse(content, status, FRESH)
 
 
-LARGEST_JSON_BYTES = 1 << 14
+MAX_JSON_BYTES = 1 << 14
 BODY_S = 10.0
 """How long the body of a request may take to arrive."""
 
 
-async def json_of(request: Request, largest: int = LARGEST_JSON_BYTES) -> Any:
+async def json_of(request: Request, largest: int = MAX_JSON_BYTES) -> Any:
     """Return the JSON that a request brings. Raises HTTPException: something else, too much, or too slowly."""
     if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
         raise HTTPException(415, "required application/json")  # which no other site's page can send unasked

@@ -11,8 +11,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
-from lipmotion_faces.appearance.chin import moved_part
-from lipmotion_faces.appearance.lower_face import mouth_ellipse, mouth_part, region_map, relit
+from lipmotion_faces.appearance.lower_face import mouth_ellipse, mouth_part, moved_part, region_map, relight
 from lipmotion_faces.appearance.person import Appearance, FaceCodes
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.appearance.refinement import STEADY
@@ -150,10 +149,10 @@ def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motio
 def test_the_light_is_that_of_the_footage(appearance: Appearance, backgrounds: list[Background]) -> None:
     """Under another lamp the same frames are made, under that lamp."""
     lamp = np.array([(1.1, 0.9, 0.7)])
-    lit = [replace(each, frame=relit(each.frame[None], lamp)[0]) for each in backgrounds[:8]]
+    lit = [replace(each, frame=relight(each.frame[None], lamp)[0]) for each in backgrounds[:8]]
     codes = appearance.of_motion(Motion(np.tile([[0.2, 0.55, 0.42]], (8, 1)), 25.0, TOY))
     plain, made = (stitched(appearance, codes, each) for each in (backgrounds[:8], lit))
-    wanted = relit(plain.astype(np.uint8), np.repeat(lamp, 8, axis=0)).astype(int)
+    wanted = relight(plain.astype(np.uint8), np.repeat(lamp, 8, axis=0)).astype(int)
     assert np.abs(made - wanted).mean() < 0.5
     assert np.abs(made - wanted).max() <= 12
 

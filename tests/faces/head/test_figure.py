@@ -13,18 +13,18 @@ OPEN = CharacterPose(gap=0.25, upper_rise=0.04, jaw=0.18)
 
 
 def rows(name: str) -> np.ndarray:
-    return figure().placed(REST)[0][figure().rows[name]]
+    return figure().place(REST)[0][figure().rows[name]]
 
 
 def test_all_parts_are_of_finite_places_and_unit_normals():
-    places, normals = figure().placed(OPEN)
+    places, normals = figure().place(OPEN)
     assert np.isfinite(places).all()
     used = np.unique(figure().triangles)
     assert np.linalg.norm(normals[used], axis=1) == pytest.approx(np.ones(len(used)), abs=0.01)
 
 
 def test_eyes_are_one_eye_distance_apart_at_their_outer_corners():
-    corners = [figure().placed(REST)[0][figure().skin.lid_rows(eye)[1]] for eye in (0, 1)]
+    corners = [figure().place(REST)[0][figure().skin.lid_rows(eye)[1]] for eye in (0, 1)]
     assert corners[0][:, 0].max() - corners[1][:, 0].min() == pytest.approx(1.0, abs=0.02)
 
 
@@ -42,7 +42,7 @@ def test_the_skin_at_rest_lies_on_its_form():
 
 
 def test_opening_moves_chin_and_lips_but_neither_forehead_nor_eyes():
-    rest, wide = figure().skin.posed(REST)[0], figure().skin.posed(OPEN)[0]
+    rest, wide = figure().skin.pose(REST)[0], figure().skin.pose(OPEN)[0]
     moved = np.linalg.norm(wide - rest, axis=1)
     assert moved[rest[:, 1] > -0.4].max() < 0.01
     chin = np.argmin(np.linalg.norm(rest - [0, -1.05, -0.02], axis=1))
@@ -107,9 +107,9 @@ def test_the_mesh_has_the_shapes_that_are_promised(mesh):
 
 
 def test_a_shape_at_full_weight_is_its_pose(mesh):
-    assert shaped(mesh, {"jawOpen": 1.0}) == pytest.approx(figure().placed(POSES["jawOpen"])[0], abs=1e-4)
+    assert shaped(mesh, {"jawOpen": 1.0}) == pytest.approx(figure().place(POSES["jawOpen"])[0], abs=1e-4)
     both = shaped(mesh, {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0})
-    assert both == pytest.approx(figure().placed(CharacterPose(shut=1))[0], abs=1e-4)
+    assert both == pytest.approx(figure().place(CharacterPose(shut=1))[0], abs=1e-4)
 
 
 def test_mouth_close_brings_the_lips_of_an_open_jaw_together(mesh):
@@ -132,7 +132,7 @@ def test_cheeks_come_forward_beside_spread_lips_and_sink_beside_round_ones():
     cheek = np.argmin(np.linalg.norm(skin.rest[: len(skin.face)] - [0.42, -0.46, -0.1], axis=1))
 
     def forward(pose: CharacterPose) -> float:
-        return float(skin.posed(pose)[0][cheek, 2] - skin.rest[cheek, 2])
+        return float(skin.pose(pose)[0][cheek, 2] - skin.rest[cheek, 2])
 
     assert forward(CharacterPose(spread=1.0)) > 0.01
     assert forward(CharacterPose(roundness=1.0)) < -0.005

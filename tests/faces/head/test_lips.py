@@ -15,7 +15,7 @@ from lipmotion_faces.head.lips import (
     section_points,
 )
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import jaw_moved
+from lipmotion_faces.head.skin import move_jaw
 from lipmotion_faces.head.stage import figure
 
 MEET, FRONT = 4, 15
@@ -84,7 +84,7 @@ def test_lips_never_reach_into_the_teeth(pose, tuck, press):
     teeth = TEETH_Z - ARCH * lips[:, 0] ** 2
     beside = (lips[:, 1] > TEETH_EDGE) & (np.abs(lips[:, 0]) < 0.24)
     assert (lips[beside, 2] - teeth[beside]).min() > 0.003
-    edge = jaw_moved(np.array([[0, LOWER_EDGE, TEETH_Z - 0.045]]), lower_drop(moved))[0]
+    edge = move_jaw(np.array([[0, LOWER_EDGE, TEETH_Z - 0.045]]), lower_drop(moved))[0]
     below = (lips[:, 1] < edge[1]) & (np.abs(lips[:, 0]) < 0.2)
     if below.any():
         assert (lips[below, 2] - (edge[2] - ARCH * lips[below, 0] ** 2)).min() > 0.003
@@ -98,9 +98,9 @@ def test_the_model_of_the_teeth_in_these_tests_is_that_of_the_teeth():
 
 
 def test_lower_teeth_close_behind_the_upper_ones():
-    shut = jaw_moved(lower_teeth().places, lower_drop(CharacterPose(bite=1)))
+    shut = move_jaw(lower_teeth().places, lower_drop(CharacterPose(bite=1)))
     assert shut[:, 1].max() > TEETH_EDGE
-    apart = jaw_moved(lower_teeth().places, lower_drop(CharacterPose(gap=0.2, jaw=0.15)))
+    apart = move_jaw(lower_teeth().places, lower_drop(CharacterPose(gap=0.2, jaw=0.15)))
     assert apart[:, 1].max() < TEETH_EDGE - 0.1
 
 

@@ -5,7 +5,7 @@ from faces.head.motions import NOTHING_SAID, opening, said, steady
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Prosody
 from lipmotion.units import LIP_CLOSING
-from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import head_poses
 
 
 def middle(phone: str, value: float = 0.08, before: str = "ah", after: str = "ah"):

@@ -8,8 +8,7 @@ import pytest
 from faces.head.motions import said
 from lipmotion.articulation.mouth import ROUND_GAP
 from lipmotion.types import Channel, Motion
-from lipmotion_faces.head.performance import head_poses
-from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.pose import CharacterPose, head_poses
 from lipmotion_faces.head.stage import Stage, camera_for
 from lipmotion_faces.rendering.rasteriser import Camera
 

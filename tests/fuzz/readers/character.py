@@ -16,7 +16,7 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion_faces.mesh import MeshStage
 from lipmotion_faces.rendering.drawn_surface import drawn_surface
@@ -38,7 +38,7 @@ def seeds(_: Good) -> list[Files]:
         write_glb(folder / "head.glb", whole)
         write_obj(folder / "head.obj", plain)
         (folder / "points.csv").write_text(named)
-        bound = driven_character(folder / "head.obj", points=folder / "points.csv")
+        bound = load_character(folder / "head.obj", points=folder / "points.csv")
         assert bound.binding is not None
         save_binding(folder / "head.binding", bound.binding, bound.mesh)
         write_weights(folder / "weights.csv", bound.binding)
@@ -133,7 +133,7 @@ def read(folder: Path, _: Good) -> None:
     mesh = read_character(path)
     surface = drawn_surface(mesh, np.ones(len(mesh.triangles), bool), 1.0)
     require(len(surface.triangles.levels) > surface.triangles.looks[:, 0].max(initial=-1), "a texture that is missing")
-    character = driven_character(path, points=found.get("points.csv"), binding=binding)
+    character = load_character(path, points=found.get("points.csv"), binding=binding)
     for vertices in islice(character.vertices(motion(), units(), np.array([0.55, 0.75, 1.15])), 3):
         require(bool(np.isfinite(vertices).all()), "vertices that are not finite")
     picture = MeshStage(character, 64, 64).picture(character.mesh.vertices, (0.1, 0.05, 0.0), (0.1, 0.0))

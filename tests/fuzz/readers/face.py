@@ -13,7 +13,7 @@ import numpy as np
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.types import Motion
-from lipmotion_faces.film.filmed_video import film_of
+from lipmotion_faces.film.filmed_video import make_film
 from lipmotion_faces.filmed.face import load_face, save_face
 from testing.toy_face import toy_face
 
@@ -58,5 +58,5 @@ def read(folder: Path, _: Good) -> None:
         require(bool(np.isfinite(values).all()), "codes that are not finite")
         require(float(np.abs(values).max(initial=0.0)) <= CODES, "codes that are absurd")
     height, width = face.background.video.size
-    for frame in islice(film_of(face, motion, fps=25.0).frames, FRAMES):
+    for frame in islice(make_film(face, motion, fps=25.0).frames, FRAMES):
         require(frame.shape == (height, width, 3) and frame.dtype == np.uint8, "a frame of another shape")

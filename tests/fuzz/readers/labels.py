@@ -16,7 +16,7 @@ from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.formats.label_files import read_labels
 from lipmotion.types import TimedWord, TranscriptLine
-from lipmotion_faces.corpus.supplied_motion import supplied_phones
+from lipmotion_faces.corpus.supplied import supplied_phones
 
 LONG = """File type = "ooTextFile"
 Object class = "TextGrid"

@@ -12,7 +12,7 @@ from typing import Any
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import good_model, require, short_speech
 from lipmotion.formats.sound import write_sound
-from lipmotion_studio.access import TOKEN_HEADER
+from lipmotion_studio.requests import TOKEN_HEADER
 from lipmotion_studio.study.application import study_application
 from lipmotion_studio.study.manifest import check_videos
 from lipmotion_studio.study.store import StudyStore

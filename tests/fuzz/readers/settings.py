@@ -18,7 +18,14 @@ from lipmotion.pipeline.job import check_outputs, open_face
 from lipmotion.storage.json_text import from_json
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion_studio.folder import PROJECT, VOTES, ProjectFolder
-from lipmotion_studio.project import ExportRecord, KeptVersion, Project, ProjectLine, project_document, project_from
+from lipmotion_studio.project import (
+    EditVersion,
+    ExportRecord,
+    Project,
+    ProjectRecording,
+    project_document,
+    project_from,
+)
 from lipmotion_studio.study.answers import COLUMNS, read_answers
 from lipmotion_studio.study.manifest import MANIFEST, read_study
 from lipmotion_studio.trainer import Trainer
@@ -48,9 +55,10 @@ def seeds(_: Good) -> list[Files]:
         Edits().then(*SENTENCES), Request(Path("a.wav")), phones, outlook, Edits().then("hold from 1 to 2").steps
     )
     exported = ExportRecord("film", {"exports/a.mp4": DIGEST}, "exports/a.edits.json", DIGEST, DIGEST, "1.0")
-    line = ProjectLine(1, "a", "sounds/a.wav", DIGEST, "hi", 1.5, 0.25, "approved", DIGEST, (exported,))
-    line = replace(line, versions=(KeptVersion(1, SENTENCES),))
-    project = Project({1: line}, "voices/a.lipmotion", characters={"a": "b.glb"}, recordings="r").with_lines([line])
+    recording = ProjectRecording(1, "a", "sounds/a.wav", DIGEST, "hi", 1.5, 0.25, "approved", DIGEST, (exported,))
+    recording = replace(recording, versions=(EditVersion(1, SENTENCES),))
+    project = Project(model="voices/a.lipmotion", characters={"a": "b.glb"}, recordings="r")
+    project = project.with_recordings([recording])
     side = {"name": "a", "model": DIGEST, "edits": DIGEST}
     votes = [{"line": "a", "shown": [side, side | {"name": "b", "model": ""}], "better": 1}]
     votes.append({"line": "a", "shown": ["x", "y"], "better": "x", "edits": DIGEST})

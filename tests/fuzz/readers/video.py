@@ -13,8 +13,7 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
-from lipmotion_faces.tracking.frames import open_video
-from lipmotion_faces.tracking.timing import nominal_rate_hz
+from lipmotion_faces.tracking.frames import nominal_rate_hz, open_video
 from speech.sounds import tone, write_pictures, write_sound
 
 CODECS = {

@@ -15,8 +15,7 @@ from lipmotion.formats.base import write_motion
 from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
-from lipmotion_faces.corpus import long_videos as module
-from lipmotion_faces.corpus.separate_sound import SeparateSound, in_step, on_own_time
+from lipmotion_faces.corpus.supplied import SeparateSound, align_sound, separate_sound, trim_to_shared
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 RATE = 60.0
@@ -66,10 +65,12 @@ def test_the_recorders_sound_is_used_from_the_right_moment(studio, tmp_path):
 
 def test_a_long_video_gets_the_recorders_sound_in_its_own_time(studio):
     recording = SourceRecording("take", studio / "take.wav", None, recorder=studio / "take.recorder.wav")
-    own, placed = read_audio(studio / "take.wav"), module._sound_of(recording)
+    own, sound = read_audio(studio / "take.wav"), separate_sound(recording)
+    assert sound is not None
+    placed = align_sound(sound, own.duration_s)
     assert len(placed.samples) == len(own.samples)
     assert np.abs(placed.samples).argmax() == pytest.approx(np.abs(own.samples).argmax(), abs=40)
-    assert module._sound_of(replace(recording, recorder=None)).samples.tolist() == own.samples.tolist()
+    assert separate_sound(replace(recording, recorder=None)) is None
 
 
 def test_a_given_offset_is_used(studio, tmp_path):
@@ -116,11 +117,11 @@ def track(frames: int) -> Track:
 def test_sound_and_motion_begin_together(late_s):
     """The sound is a ramp of its own time, as the motion is."""
     ramp = Audio((np.arange(4 * RATE_HZ) / RATE_HZ).astype(np.float32), RATE_HZ)
-    audio, found, start_s = in_step(SeparateSound(ramp, late_s, "x"), track(300))
+    audio, found, start_s = trim_to_shared(SeparateSound(ramp, late_s, "x"), track(300))
     assert found.motion.values[0, 0] == pytest.approx(start_s)
     assert audio.samples[0] == pytest.approx(start_s + late_s, abs=1 / RATE_HZ)
     assert audio.duration_s == pytest.approx(len(found.seen) / RATE, abs=1 / RATE)
-    placed = on_own_time(SeparateSound(ramp, late_s, "x"), 5.0)
+    placed = align_sound(SeparateSound(ramp, late_s, "x"), 5.0)
     assert len(placed.samples) == 5 * RATE_HZ
     middle = int(1.5 * RATE_HZ)
     assert placed.samples[middle] == pytest.approx(1.5 + late_s, abs=1 / RATE_HZ)
@@ -130,4 +131,4 @@ def test_sounds_that_share_nothing_are_refused():
     ramp = Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)
     for late_s in (-20.0, 20.0, 0.9):
         with pytest.raises(ValueError, match=r"share 0\.\d\d s, required 0.5"):
-            in_step(SeparateSound(ramp, late_s, "clap"), track(300))
+            trim_to_shared(SeparateSound(ramp, late_s, "clap"), track(300))

@@ -21,7 +21,7 @@ from lipmotion.motion import acoustic_network, posterior_network
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
 from lipmotion_faces.corpus import prepare as module
-from lipmotion_faces.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
+from lipmotion_faces.corpus.supplied import source_digests, supplied_phones, supplied_track
 from meshes.live_link_app import write_take
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))

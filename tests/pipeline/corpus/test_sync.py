@@ -88,12 +88,12 @@ def test_sync_moves_what_is_late_once(corpus: Corpus) -> None:
         assert read_entry(again.folder(name))["settings"] == {"recipe": "9"}
     assert abs(offsets(again).collections["there"].late_s) < 0.005
     assert "there" not in sync(again)
-    assert module._moved(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
+    assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
 
 
 def test_early_sound_gets_a_beginning(corpus: Corpus) -> None:
     late = corpus.utterance("here0")
-    moved = module._moved(late, -0.1)
+    moved = module.move_sound(late, -0.1)
     assert moved.audio.duration_s == pytest.approx(late.audio.duration_s + 0.1)
     np.testing.assert_array_equal(moved.audio.samples[1600:], late.audio.samples)
     assert float(moved.source["offset_removed_ms"]) == -100
@@ -103,7 +103,7 @@ def test_labels_move_with_the_sound(corpus: Corpus) -> None:
     bounds = [0.0, 0.4, 1.2, 3.0]
     spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
     for late_s, expected in ((0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])):
-        moved = module._moved(replace(corpus.utterance("here0"), phones=Timeline(spans)), late_s)
+        moved = module.move_sound(replace(corpus.utterance("here0"), phones=Timeline(spans)), late_s)
         found = list(moved.phones)
         assert [found[0].start_s, found[-1].start_s, found[-1].end_s] == pytest.approx(expected)
         assert found[-1].end_s == pytest.approx(moved.audio.duration_s)

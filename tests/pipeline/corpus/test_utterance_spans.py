@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lipmotion_faces.corpus.utterance_spans import (
+from lipmotion_faces.corpus.long_videos import (
     LEAST_S,
     LONGEST_S,
     MARGIN_S,

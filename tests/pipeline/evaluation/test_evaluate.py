@@ -22,13 +22,12 @@ from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
-from lipmotion_lab.evaluation.evaluate import _was_trained_on
-from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.evaluate import _was_trained_on, figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     ComparedClip,
-    held_out_recordings,
-    speech_of_condition,
+    load_held_out,
+    make_speech,
 )
 
 evaluate = partial(evaluated, recogniser="own")
@@ -86,10 +85,10 @@ def known() -> dict[float, Motion]:
 def test_a_voice_is_as_well_known_as_in_animation(toy_model: Model, toy_corpus: Corpus) -> None:
     """Whatever engine recognises nothing itself generates the motion of strangers as such."""
     phones = cached_recogniser(toy_model.phones, "own")
-    recordings = held_out_recordings(toy_corpus, phones, selection=Selection(split="val"), lexicon=Lexicon())
+    recordings = load_held_out(toy_corpus, phones, selection=Selection(split="val"), lexicon=Lexicon())
     for score, voice in ((NO_WEIGHT_SCORE, 0.0), ((NO_WEIGHT_SCORE + OWN_VOICE_SCORE) / 2, 0.5), (0.0, 1.0)):
         found = [replace(each, similarity=score) for each in recordings.recognitions]
-        speeches = speech_of_condition(replace(recordings, recognitions=found), AUDIO_ONLY, Medium(None), {})
+        speeches = make_speech(replace(recordings, recognitions=found), AUDIO_ONLY, Medium(None), {})
         assert [speech.voice for speech in speeches] == pytest.approx([voice] * len(found))
 
 

@@ -64,7 +64,7 @@ def test_heads_lie_upon_one_another_where_a_frame_fades(sequence: BackgroundSequ
     (first,) = sequence.frames(1, 25.0)
     moved, place = np.roll(first.frame, (4, 6), axis=(0, 1)), first.face_to_frame.copy()
     place[:, 2] += (6, 4)
-    half = background._mixed(first, replace(first, frame=moved, face_to_frame=place), 0.5)
+    half = background.mix_frames(first, replace(first, frame=moved, face_to_frame=place), 0.5)
     assert half.face_to_frame == pytest.approx((first.face_to_frame + place) / 2)
     x, y = half.face_to_frame[:, 2].round().astype(int)
     face = slice(y - 20, y + 20), slice(x - 30, x + 30)
@@ -100,7 +100,7 @@ def test_the_face_box_holds_the_head_in_every_frame(sequence: BackgroundSequence
 
 def test_a_larger_mouth_in_the_same_place(sequence: BackgroundSequence) -> None:
     middle = np.array([0.0, 76.0, 1.0])
-    larger = sequence.enlarged(1.3)
+    larger = sequence.enlarge(1.3)
     for old, new in zip(sequence.face_to_frame, larger.face_to_frame, strict=True):
         assert new @ middle == pytest.approx(old @ middle)
         assert new[:, :2] == pytest.approx(1.3 * old[:, :2])
@@ -127,7 +127,7 @@ def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.long
 def test_the_best_background_is_one_part(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of at most some seconds, without cuts, in which the face is seen."""
-    monkeypatch.setattr(background, "registered_maps", lambda footage: footage.face_to_image)
+    monkeypatch.setattr(background, "register_maps", lambda footage: footage.face_to_image)
     monkeypatch.setattr(background, "MOST_BACKGROUND_S", 1.0)
     monkeypatch.setattr(background, "MOST_PART_S", 1.0)
     best = best_background([footage_of(video)])

@@ -70,7 +70,7 @@ def test_parts_show_the_face_without_a_cut() -> None:
     seen[100:110] = False  # 0.4 s
     seen[300] = False  # one picture was dropped
     seen[-2:] = False
-    parts = [(start, stop) for _, start, stop in background._parts(footage(seen, cuts=(500,)))]
+    parts = [(start, stop) for _, start, stop in background.divide_footage(footage(seen, cuts=(500,)))]
     assert parts == [(0, 100), (110, 305), (305, 500), (500, 749), (749, 998)]
 
 
@@ -78,10 +78,10 @@ def test_short_parts_are_compared_only_if_there_are_no_others() -> None:
     seen = np.ones(400, bool)
     seen[np.r_[50:60, 110:120, 260:270]] = False
     for frames, expected in ((seen, [(120, 260), (270, 400)]), (seen[:170], [(0, 50), (60, 110), (120, 170)])):
-        assert [part[1:] for part in background._compared([footage(frames)])] == expected
+        assert [part[1:] for part in background.choose_parts([footage(frames)])] == expected
 
 
 def test_parts_are_of_one_size() -> None:
     """That of most of the footage."""
     small, large = footage(np.ones(100, bool)), replace(footage(np.ones(160, bool)), size=(4, 4))
-    assert [part[0] for part in background._compared([small, large, small])] == [small, small]
+    assert [part[0] for part in background.choose_parts([small, large, small])] == [small, small]

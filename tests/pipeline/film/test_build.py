@@ -13,8 +13,7 @@ from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion_faces.film import build
-from lipmotion_faces.film.build import build_face
-from lipmotion_faces.film.takes import Take
+from lipmotion_faces.film.build import Take, build_face
 from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
@@ -211,7 +210,7 @@ def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path: Path) ->
     )
     sound = Audio(np.ones(round(16_000 * count / rate_hz), np.float32), 16_000)
     take = build._Filmed(footage, np.arange(count), np.zeros((0, 128, 128, 3), np.uint8), sound)
-    (kept,) = build._spoken([take, take])
+    (kept,) = build.select_speech([take, take])
     assert len(kept.motion.values) == 599
 
 
@@ -220,5 +219,5 @@ def test_silence_is_no_sound(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     for count, level, expected_s in ((64_000, 1.0, 2.0), (24_000, 1.0, 0.5), (8000, 1.0, 0.0), (64_000, 0.0, 0.0)):
         audio = Audio(np.full(count, level, np.float32), 16_000)
         monkeypatch.setattr(build, "read_audio", lambda *_, audio=audio, **__: audio)
-        found = build._sound(take)
+        found = build.read_sound(take)
         assert (0 if found is None else found.duration_s) == pytest.approx(expected_s)

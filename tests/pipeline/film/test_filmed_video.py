@@ -19,7 +19,7 @@ from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeli
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.film import filmed_video as module
 from lipmotion_faces.film.background import stored_sequence
-from lipmotion_faces.film.filmed_video import face_codes, film_of, write_film
+from lipmotion_faces.film.filmed_video import face_codes, make_film, write_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptions
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -57,7 +57,7 @@ def pictures(path: Path) -> tuple[list[np.ndarray], Any, dict[str, str]]:
 
 def test_any_rate(filmed_face: FilmedFace, motion: Motion) -> None:
     for fps in (None, 12.5, 30.0):
-        film = film_of(filmed_face, motion, fps=fps)
+        film = make_film(filmed_face, motion, fps=fps)
         frames = list(film.frames)
         assert film.rate_hz == pytest.approx(fps or 25.0)
         assert len(frames) == int((len(motion.values) - 1) / 100 * film.rate_hz + 1e-9) + 1
@@ -66,23 +66,23 @@ def test_any_rate(filmed_face: FilmedFace, motion: Motion) -> None:
         assert np.corrcoef(dark(frames), opening)[0, 1] > 0.85
     for fps in (0.0, -25.0, float("nan"), float("inf")):
         with pytest.raises(InputError, match=r"the frame rate is .*, required more than 0"):
-            film_of(filmed_face, motion, fps=fps)
+            make_film(filmed_face, motion, fps=fps)
 
 
 def test_speech_longer_and_shorter_than_the_background(filmed_face: FilmedFace, motion: Motion) -> None:
-    frames = list(film_of(filmed_face, motion).frames)
+    frames = list(make_film(filmed_face, motion).frames)
     assert len(frames) == pytest.approx(len(motion.values) / 4, abs=1)
     assert len(frames) > len(filmed_face.background.video)
     for samples, count in ((9, 3), (1, 1)):
         short = Motion(motion.values[:samples], 100.0, motion.channels)
-        assert len(list(film_of(filmed_face, short).frames)) == count
+        assert len(list(make_film(filmed_face, short).frames)) == count
 
 
 def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion, toy_sentence: ToySentence) -> None:
     closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(brief.values), 1)), 100.0, brief.channels)
     sound = Audio(toy_sentence.audio.samples[16_000 * 4 // 10 :], 16_000)
     films = {
-        jaw: np.stack(list(film_of(filmed_face, closed, sound=sound, options=Outputs(jaw=jaw)).frames)).astype(int)
+        jaw: np.stack(list(make_film(filmed_face, closed, sound=sound, options=Outputs(jaw=jaw)).frames)).astype(int)
         for jaw in ("motion", "energy", "none")
     }
     below = (slice(None), slice(212, 240), slice(90, 134))  # the chin
@@ -91,14 +91,14 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion,
     shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))]).astype(int)
     assert np.array_equal(films["none"][:20][:, 225:], shown[:, 225:])  # the background's own jaw
     with pytest.raises(InputError, match="a jaw that follows the energy needs the sound; give the recording"):
-        film_of(filmed_face, brief, options=Outputs(jaw="energy"))
+        make_film(filmed_face, brief, options=Outputs(jaw="energy"))
 
 
 def test_lips_close_in_p_b_and_m(filmed_face: FilmedFace) -> None:
     """Also where the motion leaves them apart."""
     parted = toy_motion(Timeline((Span(0.0, 0.8, Unit("ax")),)), 100.0)
     said = Timeline((Span(0.0, 0.3, Unit("ax")), Span(0.3, 0.42, Unit("b")), Span(0.42, 0.8, Unit("ax"))))
-    closed, apart = (dark(list(film_of(filmed_face, parted, units=units).frames)) for units in (said, None))
+    closed, apart = (dark(list(make_film(filmed_face, parted, units=units).frames)) for units in (said, None))
     assert closed[8:10].min() == 0
     assert min(apart[8:10].min(), closed[4]) > 20
 
@@ -122,20 +122,20 @@ def test_the_refinement_as_printed(filmed_face: FilmedFace, brief: Motion) -> No
 def test_sound_and_pictures_are_as_long(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
-    write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), toy_sentence.audio)
+    write_film(tmp_path / "a.mp4", make_film(filmed_face, motion), toy_sentence.audio)
     frames, rate, _ = pictures(tmp_path / "a.mp4")
     assert rate == 25
     assert len(frames) / 25 == pytest.approx(toy_sentence.audio.duration_s, abs=0.08)
-    drawn = list(film_of(filmed_face, motion).frames)
+    drawn = list(make_film(filmed_face, motion).frames)
     assert np.abs(np.stack(frames).astype(int) - np.stack(drawn)).mean() < 2
 
 
 def test_the_mark(filmed_face: FilmedFace, brief: Motion, tmp_path: Path) -> None:
     path, sound = tmp_path / "a.mp4", Audio(np.zeros(16_000 * 8 // 10, np.float32), 16_000)
-    plain = np.stack(list(film_of(filmed_face, brief).frames))[::10].astype(int)
+    plain = np.stack(list(make_film(filmed_face, brief).frames))[::10].astype(int)
     for mark in ("metadata", "visible", "none"):
         options: dict[str, Any] = {} if mark == "metadata" else {"mark": mark}  # it is the default
-        write_film(path, film_of(filmed_face, brief), sound, **options)
+        write_film(path, make_film(filmed_face, brief), sound, **options)
         frames, _, tags = pictures(path)
         assert tags.get("comment", "").startswith("synthetic:") == (mark != "none")
         assert (SOURCE_TYPE.encode() in path.read_bytes()) == (mark != "none")
@@ -148,11 +148,13 @@ def test_motion_that_the_face_cannot_show(
 ) -> None:
     blendshapes = Motion(motion.values, 100.0, tuple(Channel(name, "weight") for name in ("jawOpen", "a", "b")))
     with pytest.raises(InputError, match=r"no channel 'opening' \(3 of the 3 that this face needs are missing\)"):
-        film_of(filmed_face, blendshapes)
+        make_film(filmed_face, blendshapes)
     broken = motion.values.copy()
     broken[48:53, 1] = np.nan
     with pytest.raises(InputError, match="not finite"):
-        write_film(tmp_path / "a.mp4", film_of(filmed_face, Motion(broken, 100.0, motion.channels)), toy_sentence.audio)
+        write_film(
+            tmp_path / "a.mp4", make_film(filmed_face, Motion(broken, 100.0, motion.channels)), toy_sentence.audio
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -160,13 +162,13 @@ def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_sp
     words = "an overlay shows the video of the speech: give a video as speech, and no background"
     for overlay in ("inset", "mouth"):
         with pytest.raises(InputError, match=words):
-            film_of(filmed_face, motion, options=Outputs(overlay=overlay))
+            make_film(filmed_face, motion, options=Outputs(overlay=overlay))
         (tmp_path / "b.mp4").write_text("video")
         both = Outputs(overlay=overlay, background=tmp_path / "b.mp4")
         with pytest.raises(InputError, match=words):
-            film_of(filmed_face, motion, speech=toy_speech, options=both)
+            make_film(filmed_face, motion, speech=toy_speech, options=both)
         with pytest.raises(InputError, match="has no pictures, and an overlay shows them; give a video as speech"):
-            film_of(filmed_face, motion, speech=toy_speech, options=Outputs(overlay=overlay))
+            make_film(filmed_face, motion, speech=toy_speech, options=Outputs(overlay=overlay))
 
 
 @pytest.mark.long
@@ -174,7 +176,7 @@ def test_progress_is_that_of_the_frames(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
     events: list[Progress | Item] = []
-    film = film_of(filmed_face, motion)
+    film = make_film(filmed_face, motion)
     write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
     shares = [event.share for event in events if isinstance(event, Progress)]
     assert len(shares) == len(events) > 2
@@ -204,7 +206,7 @@ def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None
 def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Motion, tmp_path: Path) -> None:
     """The video is shorter than the speech: as many frames as there are of both."""
     video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
-    film = film_of(filmed_face, motion, speech=video, options=Outputs(overlay="inset"))
+    film = make_film(filmed_face, motion, speech=video, options=Outputs(overlay="inset"))
     frames = np.stack(list(film.frames))
     assert frames.shape == (25, 48, 64, 3)
     assert film.rate_hz == pytest.approx(25.0)
@@ -226,15 +228,15 @@ def test_eigenlips_become_the_person(
     assert eigenlips is not None
     names = {channel.name for channel in eigenlips.channels}
     assert names < set(result.motion.names)
-    frames = list(film_of(filmed_face, result.motion, model=pictured_model).frames)
+    frames = list(make_film(filmed_face, result.motion, model=pictured_model).frames)
     opening = toy_motion(toy_sentence.units, 25.0)["opening"][: len(frames)]
     assert np.corrcoef(dark(frames)[: len(opening)], opening)[0, 1] > 0.7
     only = [n for n, name in enumerate(result.motion.names) if name in names]
     alone = Motion(result.motion.values[:, only], 100.0, tuple(result.motion.channels[n] for n in only))
-    again = list(film_of(filmed_face, alone, model=pictured_model).frames)
+    again = list(make_film(filmed_face, alone, model=pictured_model).frames)
     assert np.corrcoef(dark(again), dark(frames))[0, 1] > 0.9
     with pytest.raises(InputError, match="no channel 'opening'"):
-        film_of(filmed_face, alone)
+        make_film(filmed_face, alone)
     write(result, tmp_path / "a.mp4", speech=toy_sentence.audio, model=pictured_model, face=filmed_face)
     assert len(pictures(tmp_path / "a.mp4")[0]) == len(frames)
 
@@ -266,11 +268,13 @@ def test_writing_is_whole_or_not_at_all(
 ) -> None:
     (tmp_path / "a.mp4").write_text("older")
     with pytest.raises(ExportError):
-        write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), Audio(np.zeros(0, np.float32), 16_000))
+        write_film(tmp_path / "a.mp4", make_film(filmed_face, motion), Audio(np.zeros(0, np.float32), 16_000))
     damaged = replace(filmed_face.background.video, data=_spoiled(filmed_face.background.video.data))
     background = replace(filmed_face.background, video=damaged)
     with pytest.raises(ModelFormatError):
-        write_film(tmp_path / "a.mp4", film_of(replace(filmed_face, background=background), motion), toy_sentence.audio)
+        write_film(
+            tmp_path / "a.mp4", make_film(replace(filmed_face, background=background), motion), toy_sentence.audio
+        )
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.mp4", "older")]
 
 
@@ -298,8 +302,8 @@ def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(
 
     monkeypatch.setattr(module, "Stitcher", Noted)
     monkeypatch.setattr(module, "open_background", lambda *_, in_time: sequence if in_time else None)
-    film_of(filmed_face, brief)
-    film = film_of(filmed_face, brief, speech=video, fps=50.0, options=Outputs(overlay="mouth"))
+    make_film(filmed_face, brief)
+    film = make_film(filmed_face, brief, speech=video, fps=50.0, options=Outputs(overlay="mouth"))
     assert stitched == [True, False]
     assert film.rate_hz == pytest.approx(25.0)
-    assert film.covered == pytest.approx(sequence.enlarged(1.3).face_box)
+    assert film.covered == pytest.approx(sequence.enlarge(1.3).face_box)

@@ -12,7 +12,7 @@ from lipmotion import animate
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
-from lipmotion_faces.film.filmed_video import film_of, write_film
+from lipmotion_faces.film.filmed_video import make_film, write_film
 from lipmotion_faces.filmed.face import load_face
 from lipmotion_faces.tracking.track import track
 
@@ -77,7 +77,7 @@ def test_what_was_built(built: Path) -> None:
 def test_tracked_motion_of_unseen_speech_is_tracked_again(built: Path, clips: list[Path], tmp_path: Path) -> None:
     clip = clips[CLIPS]
     original = track(clip, crops=False).motion
-    write_film(tmp_path / "a.mp4", film_of(load_face(built), original), read_audio(clip))
+    write_film(tmp_path / "a.mp4", make_film(load_face(built), original), read_audio(clip))
     assert likeness(opening_in(tmp_path / "a.mp4"), np.asarray(original["opening"])) > 0.85
 
 

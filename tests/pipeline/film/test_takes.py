@@ -12,8 +12,8 @@ from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import toy_utterances
-from lipmotion_faces.film import takes
-from lipmotion_faces.film.takes import MOST_FOOTAGE_S, takes_of
+from lipmotion_faces.film import build as takes
+from lipmotion_faces.film.build import MOST_FOOTAGE_S, choose_takes
 from speech.sounds import tone, write_sound
 
 MakeVideos = Callable[..., Path]
@@ -44,14 +44,14 @@ def names(found: list[takes.Take]) -> list[str]:
 
 def test_one_video(videos: MakeVideos) -> None:
     video = videos("a") / "a.mkv"
-    (take,) = takes_of(video)
+    (take,) = choose_takes(video)
     assert (take.name, take.file, take.collection, take.speaker) == ("a", video, "filmed/anna", "")
     assert (take.span.start_s, take.span.end_s) == (0.0, MOST_FOOTAGE_S)
 
 
 def test_a_folder(videos: MakeVideos) -> None:
     folder = videos("a", "b", "c")
-    found = takes_of(folder)
+    found = choose_takes(folder)
     assert names(found) == ["a", "b", "c"]
     assert {take.collection for take in found} == {"filmed/anna"}
     assert all(take.file.parent == folder for take in found)
@@ -63,12 +63,12 @@ def test_of_a_folder_with_lists_the_training_list(videos: MakeVideos) -> None:
     (folder / "train.txt").write_text("b\nd\n")
     (folder / "test.txt").write_text("a\n")
     (folder / "val.txt").write_text("c\n")
-    assert names(takes_of(folder)) == ["b", "d"]
+    assert names(choose_takes(folder)) == ["b", "d"]
 
 
 def test_long_footage_is_used_in_part_evenly(videos: MakeVideos, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 3.0)
-    found = takes_of(videos(*(f"clip{number}" for number in range(9))))
+    found = choose_takes(videos(*(f"clip{number}" for number in range(9))))
     assert 3 <= len(found) <= 4
     numbers = [int(name[-1]) for name in names(found)]
     assert numbers[0] <= 1
@@ -80,24 +80,24 @@ def test_one_of_several_people(videos: MakeVideos, tmp_path: Path) -> None:
     videos("a", "b", folder="filmed/anna")
     videos("c", folder="filmed/ben")
     folder = tmp_path / "filmed"
-    found = takes_of(folder, speaker="anna")
+    found = choose_takes(folder, speaker="anna")
     assert [take.speaker for take in found] == ["anna", "anna"]
     assert {Path(take.file).stem for take in found} == {"a", "b"}
     with pytest.raises(InputError, match=r"2 speakers, a face is that of one person; name it \(--speaker\): anna, ben"):
-        takes_of(folder)
+        choose_takes(folder)
     with pytest.raises(InputError, match=r"no speaker 'cleo', a face is that of one person; name it .*: anna, ben"):
-        takes_of(folder, speaker="cleo")
+        choose_takes(folder, speaker="cleo")
 
 
 def test_no_videos(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such"):
-        takes_of(tmp_path / "missing.mp4")
+        choose_takes(tmp_path / "missing.mp4")
     (tmp_path / "empty").mkdir()
     with pytest.raises(CorpusError, match="no videos in it"):
-        takes_of(tmp_path / "empty")
+        choose_takes(tmp_path / "empty")
     (tmp_path / "empty.mp4").touch()
     with pytest.raises(InputError, match="the file is empty; give a video"):
-        takes_of(tmp_path / "empty.mp4")
+        choose_takes(tmp_path / "empty.mp4")
 
 
 def prepared(folder: Path, files: list[str], speakers: tuple[str, ...] = ("",)) -> Corpus:
@@ -112,7 +112,7 @@ def prepared(folder: Path, files: list[str], speakers: tuple[str, ...] = ("",)) 
 def test_a_corpus_with_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
     folder = videos("a", "b", "c")
     corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "gone.mkv"])
-    found = takes_of(corpus.path, folder)
+    found = choose_takes(corpus.path, folder)
     assert names(found) == ["toy00", "toy01"]
     assert [take.file.name for take in found] == ["a.mkv", "b.mkv"]
     assert {take.collection for take in found} == {"filmed/anna"}
@@ -122,19 +122,19 @@ def test_a_corpus_with_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
 def test_a_corpus_of_several_people(tmp_path: Path, videos: MakeVideos) -> None:
     folder = videos("a", "b", "c", "d")
     corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "c.mkv", "d.mkv"], ("anna", "ben"))
-    assert [take.file.name for take in takes_of(corpus.path, folder, "ben")] == ["b.mkv", "d.mkv"]
+    assert [take.file.name for take in choose_takes(corpus.path, folder, "ben")] == ["b.mkv", "d.mkv"]
     with pytest.raises(InputError, match=r"2 speakers, a face is that of one person"):
-        takes_of(corpus.path, folder)
+        choose_takes(corpus.path, folder)
 
 
 def test_a_corpus_without_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
     corpus = prepared(tmp_path / "corpus", ["a.mkv"])
     with pytest.raises(InputError, match=r"holds the pictures of mouths, but not of faces; .* --recordings FOLDER"):
-        takes_of(corpus.path)
+        choose_takes(corpus.path)
     with pytest.raises(InputError, match="no such folder; give the one of the videos of the corpus"):
-        takes_of(corpus.path, tmp_path / "missing")
+        choose_takes(corpus.path, tmp_path / "missing")
     with pytest.raises(InputError, match=r"holds none of the videos of .*; give the folder that they are in"):
-        takes_of(corpus.path, videos("other"))
+        choose_takes(corpus.path, videos("other"))
 
 
 def test_long_videos_are_shortened_before_short_ones_are_left_out(
@@ -143,7 +143,7 @@ def test_long_videos_are_shortened_before_short_ones_are_left_out(
     """The seconds of a folder are bounded, and not by the first of its videos."""
     durations = {"a": 300.0, "b": 3.0, "c": 3.0, "d": 7200.0}
     monkeypatch.setattr(takes, "_duration_s", lambda take: durations[take.name])
-    found = takes_of(videos(*durations))
+    found = choose_takes(videos(*durations))
     assert names(found) == list(durations)
     used = [min(take.span.end_s - take.span.start_s, durations[take.name]) for take in found]
     assert sum(used) == pytest.approx(MOST_FOOTAGE_S)
@@ -153,7 +153,7 @@ def test_long_videos_are_shortened_before_short_ones_are_left_out(
 def test_many_long_videos_are_used_in_part(videos: MakeVideos, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 30.0)
     monkeypatch.setattr(takes, "_duration_s", lambda _: 600.0)
-    found = takes_of(videos("a", "b", "c", "d", "e", "f"))
+    found = choose_takes(videos("a", "b", "c", "d", "e", "f"))
     assert [take.span.end_s for take in found] == [takes.LONG_S] * 3
 
 
@@ -166,9 +166,9 @@ def test_videos_of_the_same_name_are_told_apart(tmp_path: Path, videos: MakeVide
         source = {"file": "x.mkv", "bytes": str(file.stat().st_size), "sha256": sha256_of(file)}
         for utterance in toy_utterances(3)[:1]:
             corpus.add(replace(utterance, source=source, split="train"))
-        (found,) = takes_of(corpus.path, tmp_path / "filmed")
+        (found,) = choose_takes(corpus.path, tmp_path / "filmed")
         assert found.file == file
     (tmp_path / "other").mkdir()
     other = write_sound(tmp_path / "other" / "x.mkv", tone(16_000, 0.5), 16_000, "flac", video=True)
     with pytest.raises(InputError, match="holds none of the videos"):
-        takes_of(corpus.path, other.parent)
+        choose_takes(corpus.path, other.parent)

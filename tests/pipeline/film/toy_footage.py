@@ -67,4 +67,4 @@ def install(monkeypatch: pytest.MonkeyPatch, videos: Mapping[Path, ToyVideo], se
 
     for module in (build, background):
         monkeypatch.setattr(module, "track_footage", track_footage)
-    monkeypatch.setattr(background, "registered_maps", lambda footage: footage.face_to_image)  # needs OpenCV
+    monkeypatch.setattr(background, "register_maps", lambda footage: footage.face_to_image)  # needs OpenCV

@@ -21,7 +21,7 @@ from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_ch
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance
-from lipmotion_lab.evaluation.held_out import compared_clips, held_out_recordings
+from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 ENGINE = engine_named("trajectory", {"articulation": False})
@@ -161,11 +161,9 @@ def test_figures_of_both(models: dict[str, Path], toy_model: Model, toy_corpus: 
 def test_originals_are_the_projected_pictures(models: dict[str, Path], toy_corpus: Corpus) -> None:
     model = load_model(models[BOTH])
     assert model.eigenlips is not None
-    found = held_out_recordings(
-        toy_corpus, Recogniser(model.phones, "own"), visual=model.visual, eigenlips=model.eigenlips
-    )
+    found = load_held_out(toy_corpus, Recogniser(model.phones, "own"), visual=model.visual, eigenlips=model.eigenlips)
     assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
-    made = compared_clips(found, "with transcript", model.engine, model.learned)
+    made = generate_clips(found, "with transcript", model.engine, model.learned)
     for clip, name in zip(made, toy_corpus.names("test"), strict=True):
         images = crops([toy_corpus.utterance(name)])[0]
         assert np.array_equal(clip.original[:, 3:], model.eigenlips.project(images))

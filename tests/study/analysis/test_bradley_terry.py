@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from lipmotion_studio.study.analysis.paired import deviations, fit_strengths, linked
+from lipmotion_studio.study.analysis.paired import deviations, fit_strengths, link_groups
 
 TEAMS = ("Milwaukee", "Detroit", "Toronto", "New York", "Boston", "Cleveland", "Baltimore")
 HOME_WINS = [
@@ -133,4 +133,4 @@ def test_one_order_alone_has_no_effect() -> None:
 def test_groups_that_nothing_links() -> None:
     comparisons = np.zeros((5, 5))
     comparisons[0, 3] = comparisons[4, 3] = comparisons[1, 2] = 1
-    assert linked(comparisons) == [[0, 3, 4], [1, 2]]
+    assert link_groups(comparisons) == [[0, 3, 4], [1, 2]]

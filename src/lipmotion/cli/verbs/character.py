@@ -87,12 +87,12 @@ def _write_blank_table(character: Path) -> None:
     """Write the table of a character whose mouth was not found, to be filled in; where there is none yet."""
     from lipmotion.meshes.files.character_files import read_character
     from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
-    from lipmotion.meshes.fitting.own_curves import rows_found
+    from lipmotion.meshes.fitting.driven import list_rows
     from lipmotion.storage.sources import is_file
 
     path = table_path(character)
     if not is_file(path):
-        write_rig_table(path, rows_found(read_character(character), None, {}))
+        write_rig_table(path, list_rows(read_character(character), None, {}))
         print_line(path)
 
 

@@ -76,10 +76,10 @@ def _render(job: Job, motion: Path, rate_hz: float | None, monitor: Monitor) -> 
 
 def _sound_named_by(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
-    from lipmotion.meshes.files.gltf_writer import named_sound
+    from lipmotion.meshes.files.gltf_writer import find_named_sound
     from lipmotion.storage.sources import is_file
 
-    named = named_sound(motion) if motion.suffix.lower() == ".glb" and is_file(motion) else None
+    named = find_named_sound(motion) if motion.suffix.lower() == ".glb" and is_file(motion) else None
     if named is None:
         return None
     sound, start_s = named

@@ -11,7 +11,7 @@ import numpy as np
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError, shortened
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
-from lipmotion.meshes.model.binding import MOST_WEIGHTS, ControlBinding
+from lipmotion.meshes.model.binding import MAX_WEIGHTS, ControlBinding
 from lipmotion.meshes.model.file_limits import MOST_VERTICES
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
@@ -81,7 +81,7 @@ def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
             raise ValueError("its points are not those of motion")
         if max(arrays["vertices"].max(), arrays["rows"].max(initial=0)) >= count:
             raise ValueError("it names vertices that do not exist")
-        if arrays["controls"].max(initial=0) >= len(template.points) or arrays["controls"].shape[1] > MOST_WEIGHTS:
+        if arrays["controls"].max(initial=0) >= len(template.points) or arrays["controls"].shape[1] > MAX_WEIGHTS:
             raise ValueError("it names control points that do not exist")
         if (np.diff(arrays["rows"]) <= 0).any() or arrays["weights"].sum(axis=1).max(initial=0.0) > 1 + 1e-6:
             raise ValueError("its vertices are not in order, or weights are more than 1")
@@ -90,10 +90,7 @@ def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
 
 
 def write_weights(path: Path, binding: ControlBinding) -> None:
-    """Write the weights as a table, one row a vertex and point: ``vertex,point,weight``.
-
-    Raises ExportError: it cannot be written.
-    """
+    """Write the weights as a table ``vertex,point,weight``. Raises ExportError: it cannot be written."""
     with whole_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(WEIGHT_COLUMNS) + "\n")
         for row, controls, weights in zip(binding.rows, binding.controls, binding.weights, strict=True):
@@ -103,27 +100,26 @@ def write_weights(path: Path, binding: ControlBinding) -> None:
 
 
 def read_weights(path: Path) -> dict[int, dict[int, float]]:
-    """Return a table of weights: for each vertex that it names, the weight of each point; for ``painted``.
+    """Return a table of weights: for each vertex that it names, the weight of each point; for ``paint_weights``.
 
     A vertex that follows nothing has one row, with any point and weight 0.
     Raises InputError: no such file, other columns, a row that is damaged, or a vertex and point that occur twice.
     """
     paint: dict[int, dict[int, float]] = {}
     for number, row in _rows(path, WEIGHT_COLUMNS, "table of weights"):
-        vertex, point = (_whole(path, number, text) for text in row[:2])
-        given = paint.setdefault(vertex, {})
-        if point in given:
+        vertex, point = (parse_whole(text, f"{path}: line {number}: the number of a point is") for text in row[:2])
+        weights = paint.setdefault(vertex, {})
+        if point in weights:
             raise InputError(f"{path}: line {number}: vertex {vertex} and point {point} occur twice; remove one")
         try:
-            given[point] = float(row[2])
+            weights[point] = float(row[2])
         except ValueError as error:
             raise InputError(f"{path}: line {number}: {shortened(row[2])!r} is no number") from error
     return paint
 
 
 def write_points(path: Path, placement: LipPlacement) -> None:
-    """Write the vertex of each lip and jaw point as a table: ``point,vertex``. Raises ExportError: it cannot be
-    written."""
+    """Write the vertex of each lip and jaw point, ``point,vertex``. Raises ExportError: it cannot be written."""
     with whole_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(POINT_COLUMNS) + "\n")
         file.writelines(
@@ -132,21 +128,17 @@ def write_points(path: Path, placement: LipPlacement) -> None:
 
 
 def read_points(path: Path) -> dict[int, int]:
-    """Return the vertices of lip points from a table ``point,vertex``, for ``placed_by_points``.
+    """Return the vertices of lip points from a table ``point,vertex``, for ``place_lips_by_points``.
 
     Raises InputError: no such file, other columns, a row that is damaged, or a point that occurs twice.
     """
     named: dict[int, int] = {}
     for number, row in _rows(path, POINT_COLUMNS, "table of lip points"):
-        point, vertex = (_whole(path, number, text) for text in row)
+        point, vertex = (parse_whole(text, f"{path}: line {number}: the number of a point is") for text in row)
         if point in named:
             raise InputError(f"{path}: line {number}: the point {point} occurs twice; remove one")
         named[point] = vertex
     return named
-
-
-def _whole(path: Path, line: int, text: str) -> int:
-    return parse_whole(text, f"{path}: line {line}: the number of a point is")
 
 
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
@@ -159,8 +151,8 @@ def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int
             raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(columns)}") from error
     if table.plain_names != list(columns):
-        found = shortened(",".join(table.plain_names))
-        raise InputError(f"{path}: the columns are {found!r}, required {','.join(columns)}")
+        names = shortened(",".join(table.plain_names))
+        raise InputError(f"{path}: the columns are {names!r}, required {','.join(columns)}")
     for line, row in rows:
         if not row[0].startswith("#"):
             if len(row) != len(columns):

@@ -1,15 +1,284 @@
-"""Files of characters: which reader a name asks for."""
+"""Files of characters: Wavefront OBJ, one mesh a file, or a folder of a neutral mesh and its blendshapes; all kinds."""
 
 from __future__ import annotations
 
+import re
+import warnings
+from array import array
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from lipmotion.errors import InputError
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.obj_files import read_obj, read_obj_folder
-from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.file_limits import Budget
+from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.storage.sources import check_kind
+from lipmotion.meshes.model.textures import Texture, read_texture
+from lipmotion.storage.sources import check_kind, is_file
+
+NEUTRAL = "neutral"
+"""The file of a folder with this word in its name, in any case, is the mesh; the others are its blendshapes."""
+MIN_SHARE = 1e-5
+"""Vertices that a blendshape moves by less than this share of the size of the mesh are not stored: OBJ files of one
+head are written with rounded numbers."""
+LARGEST_NUMBER = 1e9
+LARGEST_LIBRARY_BYTES = 1 << 20
+MAX_CORNERS = 1000
+"""Most corners of a polygon."""
+LONGEST_LINE = 1 << 16
+MIN_OPAQUE_LEVEL = 250
+"""A texture with pixels of a lower opacity than this, of 255, has holes."""
+_NO_COLOUR = (np.nan,) * 3
+_SHININESS = 60.0
+"""A specular exponent (``Ns``) of so much is a gloss of 1/2."""
+_REST = rb")(?=\s|\Z)[^\r\n\\]*(?:\\(?:\r?\n)?[^\r\n\\]*)*)"
+_STATEMENTS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:v|vt|f|o|g|usemtl|mtllib" + _REST)
+_LOOKS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:newmtl|map_Kd|Kd|Ns|d|Tf" + _REST)
+_VERTEX = re.compile(rb"(?:\A|[\r\n])v[ \t]([^\r\n]*)")
+
+
+@dataclass
+class _Surface:
+    """What the lines of a file have given so far: three numbers a vertex, two a corner of a texture, and triangles.
+
+    corners, mapped : of each triangle, its vertices and its corners of textures (-1: none);  parts : its part
+    """
+
+    budget: Budget
+    vertices: array[float] = field(default_factory=lambda: array("d"))
+    colours: array[float] = field(default_factory=lambda: array("d"))
+    textures: array[float] = field(default_factory=lambda: array("d"))
+    corners: array[int] = field(default_factory=lambda: array("i"))
+    mapped: array[int] = field(default_factory=lambda: array("i"))
+    parts: array[int] = field(default_factory=lambda: array("i"))
+    names: dict[tuple[str, str], int] = field(default_factory=dict)
+    here: tuple[str, str] = ("", "")
+    library: str = ""
+
+    def add(self, kind: bytes, words: list[bytes]) -> None:
+        """Add a line. Raises ValueError: it is damaged, or there are too many."""
+        if kind == b"f":
+            if not 3 <= len(words) <= MAX_CORNERS:
+                raise InputError(f"a polygon of {len(words)} corners, required 3 to {MAX_CORNERS}")
+            self.budget.spend("triangles", len(words) - 2)
+            if self.here not in self.names:
+                self.budget.spend("parts", 1)
+                self.names[self.here] = len(self.names)
+            vertices, textures = len(self.vertices) // 3, len(self.textures) // 2
+            split = [word.split(b"/", 2) for word in words]
+            corners = [_index(each[0], vertices) for each in split]
+            mapped = [_index(each[1], textures) if len(each) > 1 and each[1] else -1 for each in split]
+            for n in range(1, len(words) - 1):
+                self.corners.extend((corners[0], corners[n], corners[n + 1]))
+                self.mapped.extend((mapped[0], mapped[n], mapped[n + 1]))
+                self.parts.append(self.names[self.here])
+        elif kind == b"v":
+            self.budget.spend("vertices", 1)
+            _add_vertex(self.vertices, words)
+            self.colours.extend(map(float, words[3:6]) if len(words) == 6 else _NO_COLOUR)
+        elif kind == b"vt":
+            self.budget.spend("corners of textures", 1)
+            self.textures.extend(map(float, [*words, b"0", b"0"][:2]))
+        elif kind in {b"o", b"g"}:
+            self.here = (_text(words), self.here[1])
+        elif kind == b"usemtl":
+            self.here = (self.here[0], _text(words))
+        elif kind == b"mtllib":
+            self.library = _text(words)
+
+
+def read_obj(path: Path) -> Mesh:
+    """Return the mesh of an OBJ file; polygons become triangles, materials become parts.
+
+    Vertices keep their numbers, counted from 0. Their colours (``v x y z r g b``: sRGB, 0 to 1; 0 to 255 where one is
+    above 1) replace those of materials without a texture, unless all are white. Colours of materials and textures
+    (``map_Kd``) come from files in the same folder, where there are some. Lines, curves and normals are ignored.
+    Raises InputError: no such file, too large, no triangles, or a damaged line, whose number is named.
+    """
+    budget = Budget()
+    surface, number = _Surface(budget), 0
+    try:
+        for line, words in _lines(budget.file_bytes(path, "mesh"), _STATEMENTS, budget):
+            number = line
+            surface.add(words[0], words[1:])
+        number = 0
+        vertices, uv = _as_rows(surface.vertices, 3), _as_rows(surface.textures, 2)
+        painted = _as_rows(surface.colours, 3, missing=True)
+    except ValueError as error:
+        raise _damaged(path, error, number) from error
+    if not surface.corners:
+        raise InputError(f"{path}: there are no polygons in it, required a mesh; export the surface, not points alone")
+    used = {material for _, material in surface.names}
+    materials = _read_materials(path.parent, surface.library, used, budget)
+    part = np.array(surface.parts)
+    order = np.argsort(part, kind="stable")
+    stops = np.cumsum([0, *np.bincount(part, minlength=len(surface.names))])
+    parts = tuple(
+        MeshPart(group or material, int(first), int(stop), materials.get(material, Material(material)))
+        for (group, material), first, stop in zip(surface.names, stops, stops[1:], strict=False)
+    )
+    textures = np.array(surface.mapped).reshape(-1, 3)[order]
+    mapped = np.where(textures[..., None] >= 0, uv[textures], 0.0) if len(uv) else None
+    triangles = np.array(surface.corners, np.int32).reshape(-1, 3)[order]
+    if not (painted < 1).any():  # none, or all are white, as programs write them that have none
+        return Mesh(vertices, triangles, parts, uv=mapped)
+    colours = painted / 255 if (painted > 1).any() else painted
+    for each in parts:
+        rows = np.unique(triangles[each.first : each.stop])
+        colours[rows[np.isnan(colours[rows, 0])]] = each.material.colour
+    return Mesh(vertices, triangles, parts, uv=mapped, colours=np.clip(np.nan_to_num(colours), 0, 1))
+
+
+def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True) -> Mesh:
+    """Return the neutral mesh of a folder of OBJ files, with the other files as blendshapes, named by their files.
+
+    wanted : whether a blendshape of a name is read; the others are left out
+    Raises InputError: no neutral mesh or several ones, a file with another number of vertices, or as ``read_obj``.
+    """
+    files = sorted(path for path in folder.glob("*.[oO][bB][jJ]") if not path.name.startswith("."))
+    neutral = [path for path in files if NEUTRAL in path.stem.lower()]
+    if len(neutral) != 1:
+        raise InputError(
+            f"{folder}: {len(neutral)} OBJ files have {NEUTRAL!r} in their name, required one: the mesh at rest, "
+            "beside its blendshapes"
+        )
+    mesh = read_obj(neutral[0])
+    others = [path for path in files if path != neutral[0] and wanted(path.stem)]
+    budget = Budget()
+    budget.spend("blendshapes", len(others))
+    smallest = MIN_SHARE * float(np.ptp(mesh.vertices, axis=0).max())
+    shapes = []
+    for path in others:
+        read, places = Budget(), array("d")  # its vertices, without reading its polygons
+        try:
+            for line in _VERTEX.finditer(read.file_bytes(path, "mesh")):
+                read.spend("vertices", 1)
+                _add_vertex(places, line[1].split())
+            vertices = _as_rows(places, 3)
+        except ValueError as error:
+            raise _damaged(path, error) from error
+        if vertices.shape != mesh.vertices.shape:
+            raise InputError(
+                f"{path}: {len(vertices)} vertices, required {len(mesh.vertices)} as in {neutral[0].name}; "
+                "move other meshes to another folder"
+            )
+        shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=smallest))
+        budget.spend("displacements", len(shapes[-1].rows))
+    return replace(mesh, shapes=tuple(shapes))
+
+
+def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
+    """Return the error of a file, whose line is named where the number is not 0."""
+    text = str(error)
+    if text.startswith(str(path)):
+        return InputError(text)
+    return InputError(
+        f"{path}: {shortened(text)}{f' in line {number}' if number else ''}; export the mesh as OBJ again"
+    )
+
+
+def _lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
+    """Yield the number of each line of some kinds, and its words; a backslash at the end of a line continues it."""
+    budget.spend("lines", max(content.count(b"\n"), content.count(b"\r")))
+    number, at = 1, 0
+    for line in kinds.finditer(content):
+        number += content.count(b"\n", at, line.start())
+        at = line.start()
+        if line.end() - at > LONGEST_LINE:
+            raise InputError(f"a line of {line.end() - at} bytes, required at most {LONGEST_LINE}, in line {number}")
+        yield number, line[1].replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").split()
+
+
+def _add_vertex(vertices: array[float], words: list[bytes]) -> None:
+    if len(words) < 3:
+        raise ValueError(f"{_text(words)!r} is no vertex of 3 numbers")
+    vertices.extend(map(float, words[:3]))
+
+
+def _as_rows(numbers: array[float], width: int, *, missing: bool = False) -> NDArray[np.float64]:
+    values = np.array(numbers).reshape(-1, width)
+    if not ((np.abs(values) <= LARGEST_NUMBER) | (missing & np.isnan(values))).all():
+        raise ValueError(f"a vertex has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}")
+    return values
+
+
+def _index(word: bytes, count: int) -> int:
+    number = int(word)
+    index = number - 1 if number > 0 else count + number
+    if number == 0 or not 0 <= index < count:
+        raise ValueError(f"a polygon names vertex {shortened(_text([word]))} of {count}")
+    return index
+
+
+def _text(words: list[bytes]) -> str:
+    return b" ".join(words).decode("utf-8", "replace")
+
+
+def _read_materials(folder: Path, library: str, used: Collection[str], budget: Budget) -> dict[str, Material]:
+    """Return those materials of an MTL file in a folder that are used; none if there is no such file."""
+    path = _find_sibling(folder, library)
+    if path is None or path.stat().st_size > LARGEST_LIBRARY_BYTES:
+        return {}
+    materials: dict[str, Material] = {}
+    pictures: dict[str, str] = {}
+    name = ""
+    for _, (kind, *words) in _lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
+        if kind == b"newmtl":
+            name = _text(words)
+            materials[name] = Material(name)
+        elif name in materials and name in used and words:
+            if kind == b"map_Kd":
+                pictures[name] = _text(words[-1:])
+            elif kind == b"Kd" and len(words) == 3:
+                red, green, blue = (min(max(_number(word), 0.0), 1.0) for word in words)
+                materials[name] = replace(materials[name], colour=(red, green, blue))
+            elif kind == b"Ns" and len(words) == 1:
+                shininess = max(_number(words[0]), 0.0)
+                materials[name] = replace(materials[name], gloss=shininess / (shininess + _SHININESS))
+            elif kind in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
+                materials[name] = replace(materials[name], opacity=min(max(_number(words[-1]), 0.0), 1.0))
+    textures = {picture: _read_texture(folder, picture, budget) for picture in dict.fromkeys(pictures.values())}
+    for name, picture in pictures.items():
+        texture = textures[picture]
+        if texture is not None:
+            clear = bool((texture.pixels[..., 3] < MIN_OPAQUE_LEVEL).any())  # there are holes
+            materials[name] = replace(materials[name], texture=texture, alpha=MASK if clear else OPAQUE)
+    return {name: material for name, material in materials.items() if name in used}
+
+
+def _read_texture(folder: Path, name: str, budget: Budget) -> Texture | None:
+    """Return the texture in a picture in a folder; None, and a warning, where there is none that can be read."""
+    path, texture = _find_sibling(folder, name), None
+    if path is not None:
+        content = budget.file_bytes(path, "picture")
+        budget.spend("bytes of pictures", len(content))
+        texture = read_texture(content, budget)
+    if texture is None:
+        warnings.warn(
+            f"{folder / name}: a texture of the character is not in the same folder, or is no PNG, JPEG or WebP. Its "
+            "surface has one colour",
+            UserWarning,
+            stacklevel=2,
+        )
+    return texture
+
+
+def _find_sibling(folder: Path, name: str) -> Path | None:
+    """Return the file of a name in a folder; None if there is none, or the name leads elsewhere."""
+    return folder / name if name and Path(name).name == name and is_file(folder / name) else None
+
+
+def _number(word: bytes) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        return 0.0
+    return value if np.isfinite(value) else 0.0
+
 
 GLTF_SUFFIXES = (".glb", ".gltf", ".vrm")
 OBJ_SUFFIX = ".obj"

@@ -1,9 +1,12 @@
-"""glTF scenes: nodes, skins at rest and primitives, as one mesh."""
+"""glTF scenes as one mesh: nodes, skins at rest, primitives, and the expressions of VRM as blendshapes.
+
+Source: the specifications of VRM 0.x (glTF extension ``VRM``) and VRM 1.0 (``VRMC_vrm``), by the VRM Consortium.
+"""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,23 +15,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
-from lipmotion.meshes.files.gltf_nodes import PlacedNode, placed_nodes
+from lipmotion.meshes.files.gltf_document import (
+    GltfArrays,
+    GltfDocument,
+    PlacedNode,
+    place_nodes,
+    plain_name,
+    read_gltf_document,
+)
 from lipmotion.meshes.files.gltf_schema import COMPONENTS, LARGEST_NUMBER, MOST_GROUPS, WIDTHS
-from lipmotion.meshes.files.vrm import expression_shapes, looks_backwards
-from lipmotion.meshes.model.bones import Bone, merged_bones
+from lipmotion.meshes.model.bones import Bone, merge_bones
 from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Material, Mesh, MeshPart, PartNames
-from lipmotion.meshes.model.textures import Texture, linear, read_texture
+from lipmotion.meshes.model.textures import Texture, decode_srgb, encode_srgb, read_texture
 
-Colours = NDArray[np.float64]
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
 UNKNOWN = (0.8, 0.72, 0.66)
 """The colour (sRGB) of a material whose texture cannot be read: a pale skin, rather than the white that is usually
 multiplied by the texture."""
+WHITE = (1.0, 1.0, 1.0)
+"""The colour of a primitive that has colours of vertices and no material."""
+MIN_WEIGHT = 1e-6
+TRIANGLES = 4
+"""The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
+MIN_DISPLACEMENT = 1e-9
+"""Vertices that a morph target moves by no more than this, in the unit of the file, are not stored."""
+PRESETS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed"}
+"""Names of presets of VRM 0.x in the words of VRM 1.0; all others are the same in both."""
+FULL_WEIGHT = 100.0
+"""Weights of VRM 0.x are per cent."""
+Bind = tuple[int, int, float]
+"""A mesh of the document, one of its morph targets, and the weight of it."""
 
 
-class GltfMaterials:
+class _Materials:
     """The materials of a document; every picture is read once."""
 
     def __init__(self, document: GltfDocument, arrays: GltfArrays) -> None:
@@ -45,10 +66,27 @@ class GltfMaterials:
         if number is None:
             return Material()
         if number not in self._materials:
-            self._materials[number] = self._read(self._document.items("materials")[number])
+            stored = self._document.items("materials")[number]
+            look, alpha = stored.get("pbrMetallicRoughness", {}), stored.get("alphaMode", OPAQUE)
+            factor = np.clip(look.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), 0, 1)
+            colour, texture = encode_srgb(factor[:3]), None
+            if "baseColorTexture" in look:
+                texture = self._texture(self._document.items("textures")[look["baseColorTexture"]["index"]])
+                colour = colour if texture else np.array(UNKNOWN)
+            red, green, blue = np.clip(colour, 0, 1).tolist()
+            self._materials[number] = Material(
+                plain_name(stored.get("name", "")),
+                (red, green, blue),
+                1 - min(max(look.get("roughnessFactor", 1.0), 0.0), 1.0),
+                1.0 if alpha == OPAQUE else float(factor[3]),
+                texture,
+                alpha,
+                min(max(stored.get("alphaCutoff", 0.5), 0.0), 1.0),
+                stored.get("doubleSided", False),
+            )
         return self._materials[number]
 
-    def moved(self, number: int | None, uv: Colours) -> Colours:
+    def move_uv(self, number: int | None, uv: Array) -> Array:
         """Return places in a material's texture as its extension ``KHR_texture_transform`` moves them.
 
         uv : v downwards [shape=(N, 2)]
@@ -61,29 +99,6 @@ class GltfMaterials:
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         return (uv * how.get("scale", (1.0, 1.0))) @ turn + how.get("offset", (0.0, 0.0))
 
-    def _read(self, found: dict[str, Any]) -> Material:
-        look = found.get("pbrMetallicRoughness", {})
-        factor = np.clip(look.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), 0, 1)
-        linear = factor[:3]
-        coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-        alpha = found.get("alphaMode", OPAQUE)
-        texture = None
-        if "baseColorTexture" in look:
-            texture = self._texture(self._document.items("textures")[look["baseColorTexture"]["index"]])
-            if texture is None:
-                coded = np.array(UNKNOWN)
-        red, green, blue = np.clip(coded, 0, 1).tolist()
-        return Material(
-            plain_name(found.get("name", "")),
-            (red, green, blue),
-            1 - min(max(look.get("roughnessFactor", 1.0), 0.0), 1.0),
-            1.0 if alpha == OPAQUE else float(factor[3]),
-            texture,
-            alpha,
-            min(max(found.get("alphaCutoff", 0.5), 0.0), 1.0),
-            found.get("doubleSided", False),
-        )
-
     def _texture(self, texture: dict[str, Any]) -> Texture | None:
         source = texture.get("extensions", {}).get("EXT_texture_webp", texture).get("source")
         if source is None:
@@ -92,41 +107,28 @@ class GltfMaterials:
         image = self._document.items("images")[source]
         place = image.get("bufferView", image.get("uri", ""))
         if place not in self._textures:
-            self._textures[place] = self._picture(place)
+            self._textures[place] = None
+            try:
+                linked = isinstance(place, str)
+                content = self._document.linked(place, "picture") if linked else self._arrays.bytes_of(place)
+                self._document.budget.spend("bytes of pictures", len(content))
+                self._textures[place] = read_texture(content, self._document.budget)
+                if self._textures[place] is None:
+                    _warn("is damaged, too large, or no PNG, JPEG or WebP; export it again")
+            except InputError as error:
+                _warn(f"cannot be read: {error}")
         return self._textures[place]
-
-    def _picture(self, place: int | str) -> Texture | None:
-        try:
-            if isinstance(place, str):
-                content: bytes | memoryview = self._document.linked(place, "picture")
-            else:
-                content = self._arrays.bytes_of(place)
-            self._document.budget.spend("bytes of pictures", len(content))
-            texture = read_texture(content, self._document.budget)
-        except InputError as error:
-            _warn(f"cannot be read: {error}")
-            return None
-        if texture is None:
-            _warn("is damaged, too large, or no PNG, JPEG or WebP; export it again")
-        return texture
 
 
 def _warn(what: str) -> None:
     warnings.warn(f"a texture of the character {what}. Its surface has one colour", UserWarning, stacklevel=2)
 
 
-Array = NDArray[np.float64]
-WHITE = (1.0, 1.0, 1.0)
-"""The colour of a primitive that has colours of vertices and no material."""
-
-
-def vertex_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: int) -> Array:
+def _read_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: int) -> Array:
     """Return the light and the opacity by which those of a material are multiplied, 0 to 1 [shape=(N, 4)].
 
     number : of the accessor of ``COLOR_0``: three or four numbers, of floats or of bytes or shorts without a sign;
              whole numbers count as parts of the largest one, also where the file does not say so
-    count  : of the vertices
-    Raises InputError: another kind of numbers, another number of vertices, or as ``GltfArrays.floats``.
     """
     accessor = document.items("accessors")[number]
     width, kind = WIDTHS[accessor["type"]], np.dtype(COMPONENTS[accessor["componentType"]])
@@ -143,126 +145,58 @@ def vertex_tints(document: GltfDocument, arrays: GltfArrays, number: int, count:
     return tints
 
 
-def counted(tints: Array, material: Material) -> Array:
-    """Return tints [shape=(N, 4)] as a material counts them: where it hides what is behind, their opacity is 1."""
-    if material.alpha != OPAQUE:
-        return tints
-    return np.concatenate([tints[:, :3], np.ones((len(tints), 1))], axis=1)
-
-
-def tinted(colours: Array, tints: Array) -> Array:
-    """Return colours, sRGB, 0 to 1 [shape=(N, 3)], whose light is multiplied by tints [shape=(N, 4)]."""
-    light = linear(colours) * tints[:, :3]
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-
-
-Matrix = NDArray[np.float64]
-Numbers = NDArray[np.int64]
-LEAST_WEIGHT = 1e-6
-
-
 @dataclass(frozen=True, eq=False)
-class GltfSkin:
-    """The joints of a skin.
-
-    joints   : their nodes, in the order of the skin [J]
-    matrices : where each takes what follows it [shape=(J, 3, 4)]
-    """
+class _Skin:
+    """The joints of a skin [J], and where each takes what follows it [shape=(J, 3, 4)]."""
 
     joints: tuple[PlacedNode, ...]
-    matrices: Matrix
+    matrices: Array
 
+    def weigh(self, arrays: GltfArrays, attributes: Mapping[str, int], count: int) -> tuple[Rows, Array]:
+        """Return the joints that every vertex follows, as rows of the skin's list, and how far [shape=(N, W), both]."""
+        joints, weights = [np.zeros((count, 0), np.int64)], [np.zeros((count, 0))]
+        for group in range(MOST_GROUPS):
+            if f"JOINTS_{group}" not in attributes or f"WEIGHTS_{group}" not in attributes:
+                break
+            numbers = arrays.whole(attributes[f"JOINTS_{group}"], 4, count)
+            if count and not 0 <= numbers.min() <= numbers.max() < len(self.joints):
+                raise InputError(f"vertices follow joint {numbers.max()} of {len(self.joints)}; export it again")
+            joints.append(numbers)
+            weights.append(arrays.floats(attributes[f"WEIGHTS_{group}"], 4, count))
+        return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
 
-def read_skin(document: GltfDocument, number: int, arrays: GltfArrays, nodes: Mapping[int, PlacedNode]) -> GltfSkin:
-    """Return a skin of a document at rest. Raises InputError: a joint is not in the scene, or matrices are missing."""
-    skin = document.items("skins")[number]
-    listed, inverse = skin["joints"], skin.get("inverseBindMatrices")
-    count = len(listed) if inverse is None else arrays.count(inverse)
-    document.budget.spend("joints", max(count, len(listed)))
-    if not all(joint in nodes for joint in listed):
-        raise InputError("a skin with joints that are not in the scene; export it again")
-    if count < len(listed):
-        raise InputError(f"{count} matrices of {len(listed)} joints; export it again")
-    joints = tuple(nodes[joint] for joint in listed)
-    matrices = np.array([joint.matrix for joint in joints])
-    if inverse is not None:
-        matrices = matrices @ arrays.floats(inverse, 16)[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
-    return GltfSkin(joints, matrices[:, :3])
+    def blend(self, joints: Rows, weights: Array) -> tuple[Array, Array]:
+        """Return how the skin at rest maps every vertex: matrices [shape=(N, 3, 3)] and shifts [shape=(N, 3)]."""
+        blended = np.zeros((len(weights), 3, 4))
+        for column in range(weights.shape[1]):
+            blended += weights[:, column, None, None] * self.matrices[joints[:, column]]
+        total = weights.sum(axis=1)
+        held = total > MIN_WEIGHT
+        blended[held] /= total[held, None, None]
+        blended[~held] = np.eye(4)[:3]
+        if not (np.abs(blended) <= LARGEST_NUMBER).all():
+            raise InputError(f"a skin takes vertices beyond ±{LARGEST_NUMBER:g}; export it again")
+        return blended[:, :, :3], blended[:, :, 3]
 
+    def find_head_bones(
+        self, joints: Rows, weights: Array, nodes: Mapping[int, PlacedNode], first: int
+    ) -> Iterator[Bone]:
+        """Yield the bones of the head that vertices follow, or whose parts they follow.
 
-def skin_weights(
-    skin: GltfSkin, arrays: GltfArrays, attributes: Mapping[str, int], count: int
-) -> tuple[Numbers, Matrix]:
-    """Return the joints that every vertex follows, as rows of the skin's list, and how far [shape=(N, W), both].
-
-    count : of the vertices
-    Raises InputError: the numbers do not fit.
-    """
-    joints, weights = [np.zeros((count, 0), np.int64)], [np.zeros((count, 0))]
-    for group in range(MOST_GROUPS):
-        if f"JOINTS_{group}" not in attributes or f"WEIGHTS_{group}" not in attributes:
-            break
-        numbers = arrays.whole(attributes[f"JOINTS_{group}"], 4, count)
-        if count and not 0 <= numbers.min() <= numbers.max() < len(skin.joints):
-            raise InputError(f"vertices follow joint {numbers.max()} of {len(skin.joints)}; export it again")
-        joints.append(numbers)
-        weights.append(arrays.floats(attributes[f"WEIGHTS_{group}"], 4, count))
-    return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
-
-
-def skinned_frames(skin: GltfSkin, joints: Numbers, weights: Matrix) -> tuple[Matrix, Matrix]:
-    """Return how a skin at rest maps every vertex: matrices [shape=(N, 3, 3)] and shifts [shape=(N, 3)].
-
-    joints, weights : as of ``skin_weights``
-    """
-    blended = np.zeros((len(weights), 3, 4))
-    for column in range(weights.shape[1]):
-        blended += weights[:, column, None, None] * skin.matrices[joints[:, column]]
-    total = weights.sum(axis=1)
-    held = total > LEAST_WEIGHT
-    blended[held] /= total[held, None, None]
-    blended[~held] = np.eye(4)[:3]
-    if not (np.abs(blended) <= LARGEST_NUMBER).all():
-        raise InputError(f"a skin takes vertices beyond ±{LARGEST_NUMBER:g}; export it again")
-    return blended[:, :, :3], blended[:, :, 3]
-
-
-def head_bones(
-    skin: GltfSkin, joints: Numbers, weights: Matrix, nodes: Mapping[int, PlacedNode], first: int
-) -> Iterator[Bone]:
-    """Yield the bones of the head that vertices follow, or whose parts they follow.
-
-    joints, weights : as of ``skin_weights``;  first : number of the first vertex in the whole mesh
-    """
-    total = np.maximum(weights.sum(axis=1), LEAST_WEIGHT)
-    for kind in sorted({kind for joint in skin.joints for kind in joint.kinds}):
-        member = np.array([kind in joint.kinds for joint in skin.joints])
-        shares = np.clip((weights * member[joints]).sum(axis=1) / total, 0, 1)
-        rows = np.flatnonzero(shares > 0)
-        if len(rows):
-            node = next(joint.kinds[kind] for joint in skin.joints if kind in joint.kinds)
-            yield Bone(kind, nodes[node].matrix[:3, 3], rows + first, shares[rows])
-
-
-def held_bones(node: PlacedNode, nodes: Mapping[int, PlacedNode], first: int, count: int) -> Iterator[Bone]:
-    """Yield the bones that a mesh without skin hangs on; all of its vertices follow.
-
-    first, count : its first vertex in the whole mesh, and how many
-    """
-    for kind, above in sorted(node.kinds.items()):
-        if count:
-            yield Bone(kind, nodes[above].matrix[:3, 3], np.arange(first, first + count), np.ones(count))
-
-
-TRIANGLES = 4
-"""The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
-LEAST_DISPLACEMENT = 1e-9
-"""Vertices that a morph target moves by no more than this, in the unit of the file, are not stored."""
+        joints, weights : as of ``weigh``;  first : number of the first vertex in the whole mesh
+        """
+        total = np.maximum(weights.sum(axis=1), MIN_WEIGHT)
+        for kind in sorted({kind for joint in self.joints for kind in joint.kinds}):
+            member = np.array([kind in joint.kinds for joint in self.joints])
+            shares = np.clip((weights * member[joints]).sum(axis=1) / total, 0, 1)
+            rows = np.flatnonzero(shares > 0)
+            if len(rows):
+                node = next(joint.kinds[kind] for joint in self.joints if kind in joint.kinds)
+                yield Bone(kind, nodes[node].matrix[:3, 3], rows + first, shares[rows])
 
 
 def read_gltf(path: Path) -> Mesh:
-    """Return all meshes of a ``.glb``, ``.gltf`` or ``.vrm`` file as one, in the place where its scene has them at
-    rest.
+    """Return all meshes of a ``.glb``, ``.gltf`` or ``.vrm`` file as one, where its scene has them at rest.
 
     Every primitive becomes a part. Morph targets become blendshapes; those of one name in several primitives become
     one. Expressions of a VRM become blendshapes as well (``aa``, ``ih``, ...), after the targets.
@@ -280,9 +214,9 @@ class _SharedVertices:
     """Vertices that primitives of a node share: the number of the first one, and how they look."""
 
     first: int
-    vertices: Matrix
-    colours: Matrix
-    tints: Matrix
+    vertices: Array
+    colours: Array
+    tints: Array
 
 
 class _SceneSurface:
@@ -291,15 +225,15 @@ class _SceneSurface:
     def __init__(self, document: GltfDocument) -> None:
         self._document, self._budget = document, document.budget
         self._arrays = GltfArrays(document)
-        self._materials = GltfMaterials(document, self._arrays)
-        self._nodes = placed_nodes(document)
-        self._skins: dict[int, GltfSkin] = {}
+        self._materials = _Materials(document, self._arrays)
+        self._nodes = place_nodes(document)
+        self._skins: dict[int, _Skin] = {}
         self._blocks: dict[Any, _SharedVertices] = {}
-        self._triangles: list[NDArray[np.int64]] = []
-        self._uv: list[Matrix] = []
+        self._triangles: list[Rows] = []
+        self._uv: list[Array] = []
         self._parts: list[tuple[str, Material]] = []
         self._names = PartNames()
-        self._moved: dict[str, list[tuple[NDArray[np.int64], Matrix]]] = {}
+        self._moved: dict[str, list[tuple[Rows, Array]]] = {}
         self._targets: dict[tuple[int, int], str] = {}
         self._bones: list[Bone] = []
         self._mapped = self._tinted = False
@@ -315,19 +249,16 @@ class _SceneSurface:
                 self._budget.spend("parts", len(mesh["primitives"]))
                 for primitive in mesh["primitives"]:
                     if primitive.get("mode", TRIANGLES) == TRIANGLES and "POSITION" in primitive["attributes"]:
-                        attributes = primitive["attributes"]
-                        moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
-                        shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
-                        if shared not in self._blocks:
-                            self._blocks[shared] = self._block(
-                                number, primitive, target_names(self._document, mesh, primitive)
-                            )
-                        self._add_primitive(primitive, name, self._blocks[shared])
+                        self._add_primitive(primitive, name, self._share_vertices(number, mesh, primitive))
         if not self._triangles:
             raise InputError("there are no triangles in it; export the surface")
-        turn = np.array([-1.0, 1.0, -1.0]) if looks_backwards(self._document) else np.ones(3)
-        shapes = [self._shape(name, turn) for name in list(self._moved)]
-        shapes += expression_shapes(self._document, self._targets, shapes)
+        # characters of VRM 0.x look along −z, all others along +z
+        turn = np.array([-1.0, 1.0, -1.0]) if "VRM" in self._document.parts.get("extensions", {}) else np.ones(3)
+        shapes = []
+        for name in list(self._moved):
+            rows, moved = zip(*self._moved.pop(name), strict=True)
+            shapes.append(Blendshape(name, np.concatenate(rows), np.concatenate(moved) * turn))
+        shapes += _build_expression_shapes(self._document, self._targets, shapes)
         stops = np.cumsum([0, *map(len, self._triangles)])
         parts = tuple(
             MeshPart(name, int(first), int(stop), material)
@@ -341,13 +272,9 @@ class _SceneSurface:
             tuple(shapes),
             np.concatenate(self._uv) if self._mapped else None,
             np.concatenate([block.colours for block in blocks]),
-            tuple(replace(bone, place=bone.place * turn) for bone in merged_bones(self._bones)),
+            tuple(replace(bone, place=bone.place * turn) for bone in merge_bones(self._bones)),
             np.concatenate([block.tints for block in blocks]) if self._tinted else None,
         )
-
-    def _shape(self, name: str, turn: Matrix) -> Blendshape:
-        rows, moved = zip(*self._moved.pop(name), strict=True)
-        return Blendshape(name, np.concatenate(rows), np.concatenate(moved) * turn)
 
     def _add_primitive(self, primitive: dict[str, Any], name: str, block: _SharedVertices) -> None:
         attributes, count = primitive["attributes"], len(block.vertices)
@@ -359,77 +286,102 @@ class _SceneSurface:
         if not corners.size:
             return
         material = self._materials.material(primitive.get("material"))
+        if "COLOR_0" in attributes and "material" not in primitive:
+            material = replace(material, colour=WHITE)
         used = np.unique(corners)
-        tints = None
-        if "COLOR_0" in attributes:
-            material = material if "material" in primitive else replace(material, colour=WHITE)
-            tints = counted(vertex_tints(self._document, self._arrays, attributes["COLOR_0"], count)[used], material)
-            block.tints[used] = tints
-            self._tinted = True
         colours = np.tile(material.colour, (len(used), 1))
         mapped = np.zeros((corners.size // 3, 3, 2))
         if "TEXCOORD_0" in attributes:
-            in_texture = self._arrays.floats(attributes["TEXCOORD_0"], 2, count)
-            in_texture = self._materials.moved(primitive.get("material"), in_texture)
-            mapped = (in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
+            uv = self._materials.move_uv(
+                primitive.get("material"), self._arrays.floats(attributes["TEXCOORD_0"], 2, count)
+            )
+            mapped = (uv * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
             self._mapped = True
             if material.texture is not None:
-                colours = material.texture.at(in_texture[used])[:, :3] * material.colour
-        block.colours[used] = colours if tints is None else tinted(colours, tints)
+                colours = material.texture.at(uv[used])[:, :3] * material.colour
+        if "COLOR_0" in attributes:
+            tints = _read_tints(self._document, self._arrays, attributes["COLOR_0"], count)[used]
+            if material.alpha == OPAQUE:
+                tints[:, 3] = 1.0
+            block.tints[used] = tints
+            colours = encode_srgb(decode_srgb(colours) * tints[:, :3])
+            self._tinted = True
+        block.colours[used] = colours
         self._triangles.append(corners.reshape(-1, 3) + block.first)
         self._parts.append((self._names.unused(name, material.name), material))
         self._uv.append(mapped)
 
-    def _block(self, number: int, primitive: dict[str, Any], names: list[str]) -> _SharedVertices:
+    def _share_vertices(self, number: int, mesh: dict[str, Any], primitive: dict[str, Any]) -> _SharedVertices:
         """Return the vertices of a primitive at their places in the scene; keep its bones and morph targets."""
         node, attributes = self._document.items("nodes")[number], primitive["attributes"]
+        moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
+        shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
+        if shared in self._blocks:
+            return self._blocks[shared]
         count = self._arrays.count(attributes["POSITION"])
         self._budget.spend("vertices", count)
         vertices = self._arrays.floats(attributes["POSITION"], 3)
         if "skin" in node:
             skin = self._skin(node["skin"])
-            joints, weights = skin_weights(skin, self._arrays, attributes, count)
-            linear, shift = skinned_frames(skin, joints, weights)
-            self._bones += head_bones(skin, joints, weights, self._nodes, self._count)
-        else:
-            placed = self._nodes[number]
+            joints, weights = skin.weigh(self._arrays, attributes, count)
+            linear, shift = skin.blend(joints, weights)
+            self._bones += skin.find_head_bones(joints, weights, self._nodes, self._count)
+        else:  # all vertices follow the bones that the node hangs on
+            placed, rows = self._nodes[number], np.arange(self._count, self._count + count)
             linear, shift = placed.matrix[:3, :3], placed.matrix[:3, 3]
-            self._bones += held_bones(placed, self._nodes, self._count, count)
-        self._add_targets(node["mesh"], primitive.get("targets", []), names, linear, count)
-        block = _SharedVertices(
-            self._count, _mapped(linear, vertices) + shift, np.zeros((count, 3)), np.ones((count, 4))
-        )
-        block.colours[:] = self._materials.material(primitive.get("material")).colour
+            for kind, above in sorted(placed.kinds.items()):
+                self._bones.append(Bone(kind, self._nodes[above].matrix[:3, 3], rows, np.ones(count)))
+        self._add_targets(node["mesh"], mesh, primitive, linear, count)
+        colours = np.tile(self._materials.material(primitive.get("material")).colour, (count, 1))
+        block = _SharedVertices(self._count, _map_vectors(linear, vertices) + shift, colours, np.ones((count, 4)))
+        self._blocks[shared] = block
         self._count += count
         return block
 
-    def _skin(self, number: int) -> GltfSkin:
+    def _skin(self, number: int) -> _Skin:
+        """Return a skin at rest. Raises InputError: a joint is not in the scene, or matrices are missing."""
         if number not in self._skins:
-            self._skins[number] = read_skin(self._document, number, self._arrays, self._nodes)
+            skin = self._document.items("skins")[number]
+            listed, inverse = skin["joints"], skin.get("inverseBindMatrices")
+            count = len(listed) if inverse is None else self._arrays.count(inverse)
+            self._budget.spend("joints", max(count, len(listed)))
+            if not all(joint in self._nodes for joint in listed):
+                raise InputError("a skin with joints that are not in the scene; export it again")
+            if count < len(listed):
+                raise InputError(f"{count} matrices of {len(listed)} joints; export it again")
+            joints = tuple(self._nodes[joint] for joint in listed)
+            matrices = np.array([joint.matrix for joint in joints])
+            if inverse is not None:
+                inverses = self._arrays.floats(inverse, 16)[: len(joints)].reshape(-1, 4, 4)
+                matrices = matrices @ inverses.transpose(0, 2, 1)
+            self._skins[number] = _Skin(joints, matrices[:, :3])
         return self._skins[number]
 
     def _add_targets(
-        self, mesh: int, targets: list[dict[str, Any]], names: list[str], linear: Matrix, count: int
+        self, number: int, mesh: dict[str, Any], primitive: dict[str, Any], linear: Array, count: int
     ) -> None:
+        targets = primitive.get("targets", [])
         self._budget.spend("morph targets", len(targets))
-        for number, (name, target) in enumerate(zip(names, targets, strict=True)):
-            self._targets[(mesh, number)] = name
+        for column, (name, target) in enumerate(
+            zip(name_targets(self._document, mesh, primitive), targets, strict=True)
+        ):
+            self._targets[(number, column)] = name
             if name not in self._moved:
                 self._budget.spend("blendshapes", 1)
-            kept = self._moved.setdefault(name, [])
+            displacements = self._moved.setdefault(name, [])
             if "POSITION" not in target:
-                kept.append((np.zeros(0, np.int64), np.zeros((0, 3))))
+                displacements.append((np.zeros(0, np.int64), np.zeros((0, 3))))
                 continue
-            if self._arrays.count(target["POSITION"]) != count:
-                found = self._arrays.count(target["POSITION"])
-                raise InputError(f"the target {shortened(name)!r} moves {found} of {count} vertices; export it again")
-            moved = _mapped(linear, self._arrays.floats(target["POSITION"], 3))
-            rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST_DISPLACEMENT)
+            size = self._arrays.count(target["POSITION"])
+            if size != count:
+                raise InputError(f"the target {shortened(name)!r} moves {size} of {count} vertices; export it again")
+            moved = _map_vectors(linear, self._arrays.floats(target["POSITION"], 3))
+            rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > MIN_DISPLACEMENT)
             self._budget.spend("displacements", len(rows))
-            kept.append((rows + self._count, moved[rows]))
+            displacements.append((rows + self._count, moved[rows]))
 
 
-def _mapped(linear: Matrix, vectors: Matrix) -> Matrix:
+def _map_vectors(linear: Array, vectors: Array) -> Array:
     """Return vectors [shape=(N, 3)] under one matrix [shape=(3, 3)], or one each [shape=(N, 3, 3)]."""
     mapped = vectors @ linear.T if linear.ndim == 2 else np.einsum("nij,nj->ni", linear, vectors)
     if not (np.abs(mapped) <= LARGEST_NUMBER).all():
@@ -437,7 +389,7 @@ def _mapped(linear: Matrix, vectors: Matrix) -> Matrix:
     return mapped
 
 
-def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
+def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
     """Return the names of the morph targets of a primitive: those of the mesh, or else of its arrays.
 
     Targets without a name, or with that of another before, are numbered.
@@ -446,16 +398,52 @@ def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
     accessors = document.items("accessors")
     arrays = [accessors[target["POSITION"]].get("name", "") if "POSITION" in target else "" for target in targets]
     holders = [holder.get("extras", {}).get("targetNames", []) for holder in (mesh, primitive)]
-    given: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
+    stored: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
     names: list[str] = []
     for number in range(len(targets)):
-        name = plain_name(given[number]) if number < len(given) else ""
+        name = plain_name(stored[number]) if number < len(stored) else ""
         names.append(name if name and name not in names else f"target {number}")
     return names
 
 
-def mesh_target_names(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
+def name_mesh_targets(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the morph targets of a mesh; some of its primitives may have none."""
-    named = [target_names(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
-    longest = max(named, key=len, default=[])
-    return tuple(longest)
+    named = [tuple(name_targets(document, mesh, primitive)) for primitive in mesh.get("primitives", [])]
+    return max(named, key=len, default=())
+
+
+def _build_expression_shapes(
+    document: GltfDocument, targets: Mapping[tuple[int, int], str], shapes: Sequence[Blendshape]
+) -> Iterator[Blendshape]:
+    """Yield the expressions of a VRM as blendshapes, by the names of VRM 1.0; none for other files.
+
+    targets : the name of each morph target, by mesh and number
+    shapes  : the blendshapes of the targets; names that they have are left out
+    Binds that name no target are left out, as viewers do. Raises InputError: they move too many vertices.
+    """
+    extensions, expressions = document.parts.get("extensions", {}), dict[str, list[Bind]]()
+    for group in extensions.get("VRM", {}).get("blendShapeMaster", {}).get("blendShapeGroups", []):
+        preset = plain_name(group.get("presetName", "")).lower()
+        name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else plain_name(group.get("name", ""))
+        expressions[name] = [_read_bind(each["mesh"], each, FULL_WEIGHT) for each in group.get("binds", [])]
+    kinds = extensions.get("VRMC_vrm", {}).get("expressions", {})
+    meshes = dict(enumerate(node.get("mesh", -1) for node in document.items("nodes")))
+    for kind in ("preset", "custom"):
+        for name, expression in kinds.get(kind, {}).items():
+            binds = expression.get("morphTargetBinds", [])
+            expressions[plain_name(name)] = [_read_bind(meshes.get(each["node"], -1), each, 1.0) for each in binds]
+    by_name = {shape.name: shape for shape in shapes}
+    for name, bound in expressions.items():
+        used = [(by_name[targets[bind[:2]]], bind[2]) for bind in bound if bind[:2] in targets]
+        if used and name and name not in by_name:
+            document.budget.spend("blendshapes", 1)
+            document.budget.spend("displacements", sum(len(shape.rows) for shape, _ in used))
+            rows = np.unique(np.concatenate([shape.rows for shape, _ in used]))
+            moved = np.zeros((len(rows), 3))
+            for shape, weight in used:
+                moved[np.searchsorted(rows, shape.rows)] += weight * shape.displacements
+            yield Blendshape(name, rows, moved)
+
+
+def _read_bind(mesh: int, bind: Mapping[str, float], full: float) -> Bind:
+    return mesh, int(bind["index"]), min(max(bind["weight"] / full, 0.0), 1.0)

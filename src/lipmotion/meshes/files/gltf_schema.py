@@ -46,6 +46,21 @@ ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"
 """What a document of any version has."""
 
 
+_ANY_NUMBER = whole(-_LARGEST_INTEGER, _LARGEST_INTEGER)
+_OLD_BIND = {"mesh": _ANY_NUMBER, "index": _ANY_NUMBER, "weight": _NUMBER}
+_OLD_BINDS = items(if_fits(members(_OLD_BIND, list(_OLD_BIND))))
+_NEW_BIND = {"node": _ANY_NUMBER, "index": _ANY_NUMBER, "weight": _NUMBER}
+_NEW_BINDS = any_members(members({"morphTargetBinds": items(if_fits(members(_NEW_BIND, list(_NEW_BIND))))}))
+_GROUP = members({"name": _NAME, "presetName": _NAME, "binds": _OLD_BINDS})
+_MOVED = any_members(if_fits(members({"node": whole(0, _LARGEST_INTEGER)}, ["node"])))
+_VRM = {
+    "VRMC_vrm_animation": if_fits(members({"expressions": members({"preset": _MOVED, "custom": _MOVED})})),
+    "VRM": members({"blendShapeMaster": members({"blendShapeGroups": items(_GROUP)})}),
+    "VRMC_vrm": members({"expressions": members({"preset": _NEW_BINDS, "custom": _NEW_BINDS})}),
+}
+"""What is used of VRM 0.x and of VRM 1.0."""
+
+
 def gltf_schema(json: Mapping[str, Any]) -> Schema:
     """Return the schema of one document: its references must be to items that it has."""
     counts = {name: len(found) for name in _LISTS if isinstance(found := json.get(name), list)}
@@ -71,8 +86,19 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
         **{"name": _NAME, "mesh": to("meshes"), "skin": to("skins"), "children": items(to("nodes"))},
         **{"matrix": vector(16), "translation": vector(3), "rotation": vector(4), "scale": vector(3)},
     }
+    place = {"bufferView": to("bufferViews"), "byteOffset": _SIZE}
+    indices = {**place, "componentType": one_of([5121, 5123, 5125])}
+    sparse = {
+        "count": _SIZE,
+        "indices": members(indices, ["bufferView", "componentType"]),
+        "values": members(place, ["bufferView"]),
+    }
+    accessor = {
+        **{**place, "componentType": one_of(COMPONENTS), "count": _SIZE, "type": one_of(WIDTHS), "normalized": truth},
+        **{"name": _NAME, "sparse": members(sparse, list(sparse))},
+    }
     lists = {
-        "accessors": members(_accessor(to("bufferViews")), ["componentType", "count", "type"]),
+        "accessors": members(accessor, ["componentType", "count", "type"]),
         "animations": if_fits(members(_animation(to("nodes"), to("accessors")))),
         "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
         "bufferViews": members(_view(to("buffers")), ["buffer", "byteLength"]),
@@ -82,12 +108,17 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
         "nodes": members(node),
         "scenes": members({"nodes": items(to("nodes"))}),
         "skins": members({"joints": items(to("nodes"), 1), "inverseBindMatrices": to("accessors")}, ["joints"]),
-        "textures": members({"source": to("images"), "extensions": members(_webp(to("images")))}),
+        "textures": members(
+            {
+                "source": to("images"),
+                "extensions": members({"EXT_texture_webp": members({"source": to("images")}, ["source"])}),
+            }
+        ),
     }
     table = {
         name: items(schema, most=ALLOWANCE["nodes"] if name == "nodes" else None) for name, schema in lists.items()
     }
-    others = {"scene": to("scenes"), "extensionsRequired": items(_WORD), "extensions": members(_vrm())}
+    others = {"scene": to("scenes"), "extensionsRequired": items(_WORD), "extensions": members(_VRM)}
     return members(table | others)
 
 
@@ -115,21 +146,6 @@ def _reference(name: str, count: int) -> Schema:
     return checked
 
 
-def _accessor(view: Schema) -> dict[str, Schema]:
-    kind = one_of([5121, 5123, 5125])
-    place = {"bufferView": view, "byteOffset": _SIZE}
-    sparse = {
-        "count": _SIZE,
-        "indices": members({**place, "componentType": kind}, ["bufferView", "componentType"]),
-        "values": members(place, ["bufferView"]),
-    }
-    return {
-        **{**place, "componentType": one_of(COMPONENTS), "count": _SIZE, "type": one_of(WIDTHS), "normalized": truth},
-        "name": _NAME,
-        "sparse": members(sparse, list(sparse)),
-    }
-
-
 def _view(buffer: Schema) -> dict[str, Schema]:
     place = {"buffer": buffer, "byteOffset": _SIZE, "byteLength": _SIZE}
     packed = {
@@ -153,23 +169,4 @@ def _material(texture: Schema, vector: Any) -> dict[str, Schema]:
     return {
         **{"name": _NAME, "pbrMetallicRoughness": members(look), "doubleSided": truth},
         **{"alphaMode": one_of(["OPAQUE", "MASK", "BLEND"]), "alphaCutoff": _NUMBER},
-    }
-
-
-def _webp(image: Schema) -> dict[str, Schema]:
-    return {"EXT_texture_webp": members({"source": image}, ["source"])}
-
-
-def _vrm() -> dict[str, Schema]:
-    """Return what is used of VRM 0.x and of VRM 1.0."""
-    any_number = whole(-_LARGEST_INTEGER, _LARGEST_INTEGER)
-    old = {"mesh": any_number, "index": any_number, "weight": _NUMBER}
-    group = {"name": _NAME, "presetName": _NAME, "binds": items(if_fits(members(old, list(old))))}
-    new = {"node": any_number, "index": any_number, "weight": _NUMBER}
-    expressions = any_members(members({"morphTargetBinds": items(if_fits(members(new, list(new))))}))
-    moved = any_members(if_fits(members({"node": whole(0, _LARGEST_INTEGER)}, ["node"])))
-    return {
-        "VRMC_vrm_animation": if_fits(members({"expressions": members({"preset": moved, "custom": moved})})),
-        "VRM": members({"blendShapeMaster": members({"blendShapeGroups": items(members(group))})}),
-        "VRMC_vrm": members({"expressions": members({"preset": expressions, "custom": expressions})}),
     }

@@ -18,13 +18,10 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
-from lipmotion.meshes.files.gltf_nodes import placed_nodes
-from lipmotion.meshes.files.gltf_scene import mesh_target_names
-from lipmotion.meshes.files.steady_rate import exact_rate, strongest_columns
-from lipmotion.meshes.model.bones import HEAD, NECK, bone_kind
-from lipmotion.meshes.model.head_angles import ANGLES, head_angles
+from lipmotion.meshes.files.gltf_document import GltfArrays, GltfDocument, place_nodes, plain_name, read_gltf_document
+from lipmotion.meshes.files.gltf_scene import name_mesh_targets
+from lipmotion.meshes.files.steady_rate import choose_columns, exact_rate
+from lipmotion.meshes.model.bones import ANGLES, HEAD, NECK, bone_kind, head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.moods import MOODS
@@ -103,17 +100,24 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """
     document = read_gltf_document(path)
     arrays = GltfArrays(document)
-    found = [
+    animations = [
         (each, tracks) for each in document.items("animations") if (tracks := list(_tracks(document, arrays, each)))
     ]
-    if not found:
+    if not animations:
         raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
-    animation, tracks = next((each for each in found if any(map(_moves_mouth, each[1]))), found[0])
-    if len(found) > 1:
-        named = [plain_name(each.get("name", "")) or "without a name" for each, _ in found]
-        which = [each is animation for each, _ in found].index(True)
-        LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(found), ", ".join(named), named[which])
-    return _motion(document, tracks, _turns(document, arrays, animation)), Timeline(())
+    animation, tracks = next((each for each in animations if any(map(_moves_mouth, each[1]))), animations[0])
+    if len(animations) > 1:
+        named = [plain_name(each.get("name", "")) or "without a name" for each, _ in animations]
+        which = [each is animation for each, _ in animations].index(True)
+        listed = ", ".join(named)
+        LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(named), listed, named[which])
+    turns: dict[str, tuple[int, _Track]] = {}  # of the first neck and the first head, with the numbers of their nodes
+    for number, target, sampler in _targets(document, animation):
+        kind = bone_kind(document.items("nodes")[number].get("name", ""))
+        if target == "rotation" and kind in TURNING and kind not in turns:
+            turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
+    ordered = dict(turns[kind] for kind in TURNING if kind in turns)
+    return _merge_tracks(document, tracks, ordered), Timeline(())
 
 
 def _moves_mouth(track: _Track) -> bool:
@@ -122,7 +126,7 @@ def _moves_mouth(track: _Track) -> bool:
     return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
 
 
-def _motion(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
+def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
     """Return all curves of some tracks at one rate."""
     longest = max(tracks, key=lambda track: len(track.time_s))
     end_s = max(float(track.time_s[-1]) for track in tracks)
@@ -136,17 +140,17 @@ def _motion(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _T
         for name, curve in zip(track.names, track.at(time_s).T, strict=True)
         for known in KNOWN_AS.get(name, (name,))
     ]
-    kept = strongest_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
-    curves = dict(every[column] for column in kept)
+    columns = choose_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
+    curves = dict(every[column] for column in columns)
     channels = [Channel(name, WEIGHT) for name in curves]
     if turns:
-        angles = np.unwrap(head_angles(_turned(document, turns, time_s)), axis=0)
+        angles = np.unwrap(head_angles(_turn_head(document, turns, time_s)), axis=0)
         curves |= dict(zip(ANGLES, angles.T, strict=True))
         channels += [Channel(name, RADIAN) for name in ANGLES]
     return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels))
 
 
-def _turned(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:
+def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:
     """Return how the head is turned against its rest pose, in the axes of the scene, as quaternions [shape=(T, 4)].
 
     turns : of the neck and the head, in this order, by the numbers of their nodes
@@ -154,26 +158,16 @@ def _turned(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) 
     """
     from scipy.spatial.transform import Rotation
 
-    placed, whole = placed_nodes(document), Rotation.identity()
+    placed, turned = place_nodes(document), Rotation.identity()
     try:
         for number, track in turns.items():
             if number in placed:
                 own = Rotation.from_quat(document.items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
                 at_rest = Rotation.from_matrix(placed[number].matrix[:3, :3])
-                whole = whole * (at_rest * own.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
+                turned = turned * (at_rest * own.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
     except ValueError as error:  # a quaternion of zeros, a bone without size
         raise InputError(f"a rotation of the head is none ({error}); export the animation again") from error
-    return np.asarray(np.broadcast_to(whole.as_quat(), (len(time_s), 4)))
-
-
-def _turns(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> dict[int, _Track]:
-    """Return the turns of the first neck and the first head that an animation turns, by the numbers of their nodes."""
-    found: dict[str, tuple[int, _Track]] = {}
-    for number, path, sampler in _targets(document, animation):
-        kind = bone_kind(document.items("nodes")[number].get("name", ""))
-        if path == "rotation" and kind in TURNING and kind not in found:
-            found[kind] = number, _track(arrays, sampler, QUATERNION, 4)
-    return dict(found[kind] for kind in TURNING if kind in found)
+    return np.asarray(np.broadcast_to(turned.as_quat(), (len(time_s), 4)))
 
 
 def _rate(time_s: Array) -> float:
@@ -209,17 +203,17 @@ def _targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tupl
 
 def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
     """Yield what moves a face in an animation. Raises InputError: its keys are damaged."""
-    given = document.parts.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions", {})
+    stored = document.parts.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions", {})
     expressions = {
         each["node"]: plain_name(name)
         for kind in ("preset", "custom")
-        for name, each in given.get(kind, {}).items()
+        for name, each in stored.get(kind, {}).items()
         if "node" in each
     }
     for node, path, sampler in _targets(document, animation):
         if path.startswith("weights"):
             owner, one = document.items("nodes")[node].get("mesh", -1), path.partition("/")[2]
-            names = mesh_target_names(document, document.items("meshes")[owner]) if owner >= 0 else ()
+            names = name_mesh_targets(document, document.items("meshes")[owner]) if owner >= 0 else ()
             names = names[int(one) :][:1] if one else names
             if names:
                 yield _track(arrays, sampler, names, 1)

@@ -1,8 +1,9 @@
-"""Writing of glTF: a mesh with its blendshapes, and their weights over time, as one ``.glb`` file."""
+"""Writing of ``.glb``: a mesh with its blendshapes and weights over time, or a user's file with one animation more."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -10,10 +11,14 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.files.gltf_container import read_gltf_document, write_container
+from lipmotion.meshes.files.gltf_document import read_gltf_document, write_container
+from lipmotion.meshes.files.gltf_scene import name_mesh_targets
+from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Blendshape, MeshPart
-from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
+from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, compute_shading_normals
+from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion.storage.files import as_text
+from lipmotion.types import Motion
 
 AUDIO = "audio"
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:|//")
@@ -30,7 +35,7 @@ def sound_extras(sound: str, start_s: float) -> dict[str, Any]:
     return {AUDIO: {"uri": quote(as_text(sound), safe="/"), "start_s": start_s}}
 
 
-def named_sound(path: Path) -> tuple[Path, float] | None:
+def find_named_sound(path: Path) -> tuple[Path, float] | None:
     """Return the path of the sound that a glTF file names, and where it begins, in seconds; None: it names none.
 
     Only paths from the folder of the file count; whether the sound is there is not looked at.
@@ -40,8 +45,8 @@ def named_sound(path: Path) -> tuple[Path, float] | None:
     json = json["scenes"][json.get("scene", 0)] if json.get("scenes") else json
     for key in ("extras", AUDIO):
         json = json.get(key) if isinstance(json, dict) else None
-    given = json if isinstance(json, dict) else {}
-    uri, start_s = given.get("uri"), given.get("start_s", 0.0)
+    stored = json if isinstance(json, dict) else {}
+    uri, start_s = stored.get("uri"), stored.get("start_s", 0.0)
     if not isinstance(uri, str) or not uri or not isinstance(start_s, int | float) or not abs(start_s) <= LATEST_S:
         return None
     name = unquote(uri)
@@ -58,10 +63,12 @@ VERTICES, INDICES = 34962, 34963
 class GltfBuffer:
     """Arrays so far, and their descriptions."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self, views: list[dict[str, Any]] | None = None, accessors: list[dict[str, Any]] | None = None
+    ) -> None:
         self.chunks: list[bytes] = []
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
+        self.views = [] if views is None else views
+        self.accessors = [] if accessors is None else accessors
         self.size = 0
 
     def add(self, values: NDArray[Any], kind: str, *, target: int | None = None, limits: bool = False) -> int:
@@ -92,8 +99,7 @@ class GltfBuffer:
         return number
 
     def add_few(self, values: NDArray[np.float64]) -> int:
-        """Add displacements [shape=(N, 3)] of which most are 0, as a sparse array; return the number of its
-        accessor."""
+        """Add displacements [shape=(N, 3)], most of them 0, as a sparse array; return the number of its accessor."""
         rows = np.flatnonzero(values.any(axis=1))
         if 2 * len(rows) > len(values):
             return self.add(values, "VEC3", target=VERTICES, limits=True)
@@ -120,13 +126,7 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
     Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene (``gltf_sound``).
     Raises ExportError: the file cannot be written.
     """
-    buffer = GltfBuffer()
-    document = _document(scene, buffer, shading_normals(scene.mesh, split=scene.split))
-    write_container(path, document, b"".join(buffer.chunks))
-
-
-def _document(scene: Scene, buffer: GltfBuffer, normals: ShadingNormals) -> dict[str, Any]:
-    """Return the JSON part; its arrays are added to the buffer."""
+    buffer, normals = GltfBuffer(), compute_shading_normals(scene.mesh, split=scene.split)
     mesh = scene.mesh
     moved = np.zeros(len(mesh.vertices), bool)
     for shape in mesh.shapes:
@@ -141,7 +141,7 @@ def _document(scene: Scene, buffer: GltfBuffer, normals: ShadingNormals) -> dict
         ("still", [part for part in shown if part not in moving], ()),
     ):
         if parts:
-            primitives = [_primitive(buffer, materials, scene, part, normals, shapes) for part in parts]
+            primitives = [_add_primitive(buffer, materials, scene, part, normals, shapes) for part in parts]
             meshes.append({"name": name, "primitives": primitives})
             nodes.append({"name": name, "mesh": len(meshes) - 1})
     if mesh.shapes:
@@ -159,12 +159,12 @@ def _document(scene: Scene, buffer: GltfBuffer, normals: ShadingNormals) -> dict
     if scene.turn is not None:
         _add_joints(document, buffer, scene.turn)
     if scene.weights is not None and len(scene.weights.values) and (mesh.shapes or scene.turn):
-        document["animations"] = [_animation(buffer, scene, len(nodes) - 1)]
+        document["animations"] = [_add_animation(buffer, scene, len(nodes) - 1)]
     arrays = {"buffers": [{"byteLength": buffer.size}], "bufferViews": buffer.views, "accessors": buffer.accessors}
-    return document | arrays
+    write_container(path, document | arrays, b"".join(buffer.chunks))
 
 
-def _primitive(
+def _add_primitive(
     buffer: GltfBuffer,
     materials: list[dict[str, Any]],
     scene: Scene,
@@ -180,7 +180,7 @@ def _primitive(
     }
     colour = np.array(part.material.colour) if mesh.colours is None else np.ones(3)
     if mesh.colours is not None:
-        attributes["COLOR_0"] = buffer.add(_linear(mesh.colours[rows]), "VEC3", target=VERTICES)
+        attributes["COLOR_0"] = buffer.add(decode_srgb(mesh.colours[rows]), "VEC3", target=VERTICES)
     if scene.turn is not None:
         share = scene.turn.share[rows]
         joints = np.zeros((len(share), 4), np.uint8)
@@ -203,7 +203,7 @@ def _primitive(
             moved[which] = 0.0
         targets.append(target)
     look = {
-        "baseColorFactor": [*_linear(colour).tolist(), 1.0],
+        "baseColorFactor": [*decode_srgb(colour).tolist(), 1.0],
         "metallicFactor": 0.0,
         "roughnessFactor": 1.0 - part.material.gloss,
     }
@@ -233,7 +233,7 @@ def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) ->
     document["skins"] = [{"joints": [first, first + 1], "skeleton": first, "inverseBindMatrices": matrices}]
 
 
-def _animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
+def _add_animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
     """Return the animation of the weights of node 0, and of the rotation of the node of the head."""
     time_s, table = scene.keys()
     frames_s = scene.weights.time_s if scene.weights else np.zeros(0)
@@ -255,6 +255,60 @@ def _animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
     }
 
 
-def _linear(colour: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the light of sRGB colours."""
-    return np.where(colour <= 0.04045, colour / 12.92, ((np.clip(colour, 0, 1) + 0.055) / 1.055) ** 2.4)
+def write_animated_gltf(
+    path: Path,
+    original: Path,
+    weights: Motion,
+    sound: str = "",
+    *,
+    sound_s: float = 0.0,
+    stepped: Collection[str] = (),
+    thinning: Thinning = EVERY_KEY,
+) -> bool:
+    """Write a ``.glb`` or ``.vrm`` again, with the weights of its morph targets as its first animation, ``speech``.
+
+    weights : channels by the names of the morph targets, in all meshes that have them
+    sound, sound_s, stepped, thinning : as of ``Scene``
+    Returns False, and writes nothing, where the file is no single ``.glb``, or a channel is none of its morph targets
+    (an expression of a VRM file is several of them).
+    Raises InputError: the original cannot be read. Raises ExportError: the file cannot be written.
+    """
+    document = read_gltf_document(original)
+    binary = document.buffers.get(0)
+    if binary is None or "uri" in document.items("buffers")[0] or len(document.buffers) > 1 or not len(weights.values):
+        return False
+    moved: dict[int, tuple[str, ...]] = {}  # the nodes whose mesh has morph targets that move, with all targets' names
+    for number, node in enumerate(document.items("nodes")):
+        names = name_mesh_targets(document, document.items("meshes")[node["mesh"]] if "mesh" in node else {})
+        if set(names) & set(weights.names):
+            moved[number] = names
+    if not set(weights.names) <= {name for names in moved.values() for name in names}:
+        return False
+    json, body = document.json, bytes(binary[: document.items("buffers")[0].get("byteLength", len(binary))])
+    buffer = GltfBuffer(json.setdefault("bufferViews", []), json.setdefault("accessors", []))
+    buffer.chunks = [body + b"\0" * (-len(body) % 4)]
+    buffer.size = len(buffer.chunks[0])
+    chosen = [name in stepped for name in weights.names]
+    time_s, rows = place_keys(weights.time_s, weights.values.astype(np.float64), chosen, thinning)
+    times = buffer.add(time_s, "SCALAR", limits=True)
+    samplers: dict[tuple[str, ...], dict[str, Any]] = {}
+    channels: list[dict[str, Any]] = []
+    for node_number, names in moved.items():
+        if names not in samplers:
+            document.budget.spend("morph targets", len(names))
+            table = np.zeros((len(rows), len(names)))
+            for column, name in enumerate(names):
+                if name in weights.names:
+                    table[:, column] = rows[:, weights.column(name)]
+            output = buffer.add(table.reshape(-1), "SCALAR")
+            samplers[names] = {"input": times, "output": output, "interpolation": "LINEAR"}
+        channels.append({"sampler": list(samplers).index(names), "target": {"node": node_number, "path": "weights"}})
+    animation = {"name": "speech", "channels": channels, "samplers": [*samplers.values()]}
+    json.setdefault("animations", []).insert(0, animation)
+    json["buffers"][0]["byteLength"] = buffer.size
+    if sound:
+        shown = json["scenes"][json.get("scene", 0)] if json.get("scenes") else json
+        extras = shown.get("extras")
+        shown["extras"] = (extras if isinstance(extras, dict) else {}) | sound_extras(sound, sound_s)
+    write_container(path, json, b"".join(buffer.chunks))
+    return True

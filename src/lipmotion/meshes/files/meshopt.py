@@ -23,7 +23,7 @@ FIFO = 16
 _DAMAGED = "its compressed data is damaged; export it again, without compression"
 
 
-def decoded_attributes(data: bytes, count: int, stride: int) -> Bytes:
+def decode_attributes(data: bytes, count: int, stride: int) -> Bytes:
     """Return the elements of a stream of vertex attributes [shape=(count, stride)].
 
     stride : bytes of an element, a multiple of 4 up to 256
@@ -42,7 +42,7 @@ def decoded_attributes(data: bytes, count: int, stride: int) -> Bytes:
     for first in range(0, count, rows):
         block = result[first : first + rows]
         for column in range(stride):
-            deltas, position = _unpacked(data, position, end, len(block))
+            deltas, position = _unpack(data, position, end, len(block))
             steps = (deltas >> 1) ^ (0 - (deltas & 1))
             block[:, column] = np.cumsum(steps, dtype=np.uint8) + baseline[column]
         baseline = block[-1].copy()
@@ -51,7 +51,7 @@ def decoded_attributes(data: bytes, count: int, stride: int) -> Bytes:
     return result
 
 
-def _unpacked(data: bytes, position: int, end: int, count: int) -> tuple[Bytes, int]:
+def _unpack(data: bytes, position: int, end: int, count: int) -> tuple[Bytes, int]:
     """Return the packed differences of one byte of a block [shape=(count,)], and where the data goes on."""
     groups = -(-count // GROUP)
     header = data[position : position + (groups + 3) // 4]
@@ -69,22 +69,21 @@ def _unpacked(data: bytes, position: int, end: int, count: int) -> tuple[Bytes, 
             bits = 2 * mode
             whole = int.from_bytes(data[position : position + 2 * bits], "big")
             position += 2 * bits
-            least = (1 << bits) - 1
-            row = [whole >> (bits * place) & least for place in range(GROUP - 1, -1, -1)]
-            if least in row:
-                for place, value in enumerate(row):
-                    if value == least:
-                        if position >= end:
-                            raise InputError(_DAMAGED)
-                        row[place] = data[position]
-                        position += 1
+            escape = (1 << bits) - 1  # stands for a whole byte, which follows
+            row = [whole >> (bits * place) & escape for place in range(GROUP - 1, -1, -1)]
+            for place, value in enumerate(row):
+                if value == escape:
+                    if position >= end:
+                        raise InputError(_DAMAGED)
+                    row[place] = data[position]
+                    position += 1
             values[group] = row
     if position > end:
         raise InputError(_DAMAGED)
     return values.reshape(-1)[:count], position
 
 
-def decoded_exponents(elements: Bytes) -> NDArray[np.float32]:
+def decode_exponents(elements: Bytes) -> NDArray[np.float32]:
     """Return the numbers of elements under the filter EXPONENTIAL: 24 bits of mantissa and 8 of exponent."""
     whole = np.ascontiguousarray(elements).view("<i4")
     exponents = whole >> 24
@@ -93,7 +92,7 @@ def decoded_exponents(elements: Bytes) -> NDArray[np.float32]:
         return np.ldexp(mantissas.astype(np.float32), exponents)
 
 
-def decoded_indices(data: bytes, count: int) -> NDArray[np.uint32]:
+def decode_indices(data: bytes, count: int) -> NDArray[np.uint32]:
     """Return the numbers of a stream of indices without triangles [shape=(count,)].
 
     Raises InputError: another version, or data that is too short.
@@ -206,7 +205,7 @@ class _Triangles:
         return a, b, c
 
 
-def decoded_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
+def decode_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
     """Return the vertices of a stream of triangles [shape=(count,)]; ``count`` is three times their number.
 
     Raises InputError: another version, or data that is too short.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.other_shapes import CLOSED
-from lipmotion.meshes.model.shape_names import ARKIT_52, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
+from lipmotion.meshes.model.shape_names import ARKIT_52, CLOSED, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.sources import is_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
@@ -28,7 +27,7 @@ from lipmotion.types.values import parse_number
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
 CONTROL = "control"
 """The unit of controls of a user's rig."""
-LARGEST_TABLE_BYTES, MOST_CONTROLS = 1 << 20, 2000
+LARGEST_TABLE_BYTES, MAX_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
 SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
 """The curves that blendshapes of a character may follow; besides, each what its own shape fits best: its own name."""
@@ -66,12 +65,12 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
-    found = table.plain_names
-    if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
-        raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
+    names = table.plain_names
+    if names[:2] != list(COLUMNS[:2]) or not set(names) <= set(COLUMNS):
+        raise InputError(f"{path}: the columns are {shortened(','.join(names))!r}, required {','.join(COLUMNS)}")
     rows = []
     for line, fields in lines:
-        texts = dict.fromkeys(COLUMNS, "") | dict(zip(found, map(from_field, map(str.strip, fields)), strict=False))
+        texts = dict.fromkeys(COLUMNS, "") | dict(zip(names, map(from_field, map(str.strip, fields)), strict=False))
         if texts["control"].startswith("#"):
             continue
         try:
@@ -88,8 +87,8 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
             rows.append(RigRow(texts["control"], texts["source"], **numbers))
         except ValueError as error:
             raise InputError(f"{path}: line {line}: {shortened(str(error))}") from error
-    if not rows or len(rows) > MOST_CONTROLS:
-        raise InputError(f"{path}: {len(rows)} rows, required 1 to {MOST_CONTROLS}")
+    if not rows or len(rows) > MAX_CONTROLS:
+        raise InputError(f"{path}: {len(rows)} rows, required 1 to {MAX_CONTROLS}")
     return tuple(rows)
 
 
@@ -105,7 +104,7 @@ def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
             )
 
 
-def nearest(name: str, names: Iterable[str]) -> str:
+def suggest_names(name: str, names: Iterable[str]) -> str:
     """Return what a message says where there is no such name: the nearest ones, or else the first ones."""
     known = list(dict.fromkeys(names))
     by_lower = {each.lower(): each for each in reversed(known)}
@@ -113,7 +112,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
     return f"nearest: {', '.join(near)}" if near else f"there are {shortened(', '.join(known)) or 'none'}"
 
 
-def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
+def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
     """Return the controls of a rig over time, in the order of the table.
 
     sources : curves by name, blendshapes of ARKit, visemes, channels of motion [each shape=(T,)]
@@ -125,7 +124,7 @@ def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float6
         if row.source and row.source not in sources:
             raise InputError(
                 f"the control {shortened(row.control)!r} follows {shortened(row.source)!r}, which is no curve; "
-                f"{nearest(row.source, sources)}"
+                f"{suggest_names(row.source, sources)}"
             )
         value = row.gain * sources[row.source] if row.source else np.zeros(len(next(iter(sources.values()))))
         curves[row.control] = curves.get(row.control, 0.0) + value + row.offset
@@ -157,27 +156,24 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
     path = table_path(character)
     if not is_file(path):
         return {}
-    found: dict[str, RigRow] = {}
+    table: dict[str, RigRow] = {}
     for row in read_rig_table(path):
         control, source = shortened(row.control), shortened(row.source)
         if row.control not in mesh.shape_names:
-            raise InputError(f"{path}: there is no blendshape {control!r}; {nearest(row.control, mesh.shape_names)}")
+            near = suggest_names(row.control, mesh.shape_names)
+            raise InputError(f"{path}: there is no blendshape {control!r}; {near}")
         if row.source not in {"", row.control, *SOURCES}:
             raise InputError(
-                f"{path}: {control!r} follows {source!r}, which is no curve; {nearest(row.source, SOURCES)}"
+                f"{path}: {control!r} follows {source!r}, which is no curve; {suggest_names(row.source, SOURCES)}"
             )
-        if row.control in found:
+        if row.control in table:
             raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")
-        found[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
-    return found
+        table[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
+    return table
 
 
 def with_sources(mesh: Mesh, table: Mapping[str, RigRow]) -> Mesh:
     """Return a mesh whose blendshapes follow the curves of a table; those without a row, what their names say."""
-    shapes = [
-        replace(shape, source=CLOSED_VISEME if table[shape.name].source == CLOSED else table[shape.name].source)
-        if shape.name in table
-        else shape
-        for shape in mesh.shapes
-    ]
+    sources = {name: CLOSED_VISEME if row.source == CLOSED else row.source for name, row in table.items()}
+    shapes = (replace(each, source=sources[each.name]) if each.name in sources else each for each in mesh.shapes)
     return replace(mesh, shapes=tuple(shapes))

@@ -60,7 +60,7 @@ def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
     return television if television and abs(television - hertz) <= off_hz else hertz
 
 
-def rate_in_step(rate_hz: float, frames: int, duration_s: float) -> float:
+def match_sound_rate(rate_hz: float, frames: int, duration_s: float) -> float:
     """Return the rate of motion that lasts as long as its sound but for 1001 / 1000, else the same rate.
 
     duration_s : of the sound
@@ -74,7 +74,7 @@ def rate_in_step(rate_hz: float, frames: int, duration_s: float) -> float:
     return rate_hz
 
 
-def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
+def even_out_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     """Return rows at a steady rate that begin at the first time, and the rate in hertz.
 
     time_s : increasing, seconds [shape=(N,)];  rows : one for each time [shape=(N, P)]
@@ -91,7 +91,8 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     passed_s = time_s - time_s[0]
     mean_hz = (len(time_s) - 1) / float(passed_s[-1])
     known_hz = [min(rates, key=lambda usual: abs(usual - mean_hz)) for rates in (USUAL_RATES_HZ, TELEVISION_RATES_HZ)]
-    off, *known_off = (_unevenness(passed_s, hertz) for hertz in (mean_hz, *known_hz))
+    rows_at = np.arange(len(passed_s))  # how far times are from an even grid at most, as a share of a step
+    off, *known_off = (float(np.abs(passed_s * hertz - rows_at).max()) for hertz in (mean_hz, *known_hz))
     if min(off, known_off[0]) <= EVEN_SHARE:
         fits = (hertz for hertz, each in zip(known_hz, known_off, strict=True) if each <= 2 * off + ROUNDING_SHARE)
         return rows, next(fits, round(mean_hz, 6))
@@ -109,23 +110,18 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     return np.stack([np.interp(grid_s, passed_s, column) for column in rows.T], axis=1), round(hertz, 6)
 
 
-def _unevenness(passed_s: Array, hertz: float) -> float:
-    """Return how far times are from an even grid at most, as a share of a step."""
-    return float(np.abs(passed_s * hertz - np.arange(len(passed_s))).max())
-
-
 def column_key(name: str) -> str:
     """Return the name of a column as it is compared: ``Time (ms)`` is ``timems``."""
     return re.sub(r"[\s_()\[\].-]+", "", name).lower()
 
 
-def tabulated(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], Array]:
+def tabulate_frames(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], Array]:
     """Return the names of all curves of some frames, and their values [shape=(N, P)]; NaN where a frame has none."""
     names = [name for name in dict.fromkeys(name for frame in frames for name in frame) if name != "_neutral"]
     return names, np.array([[frame.get(name, np.nan) for name in names] for frame in frames], float)
 
 
-def in_seconds(times: Array, key: str) -> Array:
+def times_to_seconds(times: Array, key: str) -> Array:
     """Return times in seconds; their size shows the unit where the name of their column (``column_key``) does not.
 
     Raises InputError: one is no number.
@@ -140,7 +136,7 @@ def in_seconds(times: Array, key: str) -> Array:
     return np.asarray(times / per_second)
 
 
-def motion_at_times(
+def resample_rows(
     names: Sequence[str], time_s: Array, values: Array, unit: str = WEIGHT
 ) -> tuple[Motion, NDArray[np.bool_]]:
     """Return curves at a steady rate from the first time on, and in which frames they were measured.
@@ -149,10 +145,10 @@ def motion_at_times(
     unit   : of curves that are neither blendshapes nor angles
     Before the first face and after the last one weights are 0 and other curves still; between faces is a straight line.
     Rows that are not later than all before are left out, frames that were lost and uneven times evened out
-    (``steady_rows``). A warning says how many rows each of this was.
+    (``even_out_rows``). A warning says how many rows each of this was.
     Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
     """
-    ordered = _in_order(time_s)
+    ordered = _find_ordered(time_s)
     time_s, values = time_s[ordered], values[ordered]
     measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
     if not measured.any():
@@ -163,14 +159,26 @@ def motion_at_times(
     names = [name for name, there in zip(names, measured, strict=True) if there]
     values = values[:, measured]
     channels = [_channel(name, unit) for name in names]
-    kept = strongest_columns([channel.name for channel in channels], values)
-    values, channels = values[:, kept], [channels[column] for column in kept]
+    columns = choose_columns([channel.name for channel in channels], values)
+    values, channels = values[:, columns], [channels[column] for column in columns]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     if not seen.all():
         if not seen.any():
             raise InputError("0 rows with values of all curves, required two or more")
-        _bridge(time_s, values, seen, np.array([channel.unit == WEIGHT for channel in channels]))
-    rows, rate_hz = steady_rows(time_s, np.concatenate([values, seen[:, None]], axis=1))
+        spans = [
+            f"{time_s[start] - time_s[0]:.2f}–{time_s[stop - 1] - time_s[0]:.2f} s" for start, stop in find_runs(~seen)
+        ]
+        more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
+        LOG.warning(
+            "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",
+            *(int((~seen).sum()), len(seen), ", ".join(spans[:4]), more),
+        )
+        for column in range(values.shape[1]):
+            values[:, column] = np.interp(time_s, time_s[seen], values[seen, column])
+        first, last = np.flatnonzero(seen)[[0, -1]]
+        weights = np.array([channel.unit == WEIGHT for channel in channels])
+        values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
+    rows, rate_hz = even_out_rows(time_s, np.concatenate([values, seen[:, None]], axis=1))
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
 
 
@@ -180,7 +188,7 @@ def _channel(name: str, unit: str) -> Channel:
     return Channel(arkit_name(name) or name, WEIGHT if is_known(name) else unit)
 
 
-def strongest_columns(names: Sequence[str], values: Array) -> list[int]:
+def choose_columns(names: Sequence[str], values: Array) -> list[int]:
     """Return one column of each name, in order: where several have it, the one that moves most, with a warning."""
     if len(set(names)) == len(names):
         return list(range(len(names)))
@@ -196,23 +204,7 @@ def strongest_columns(names: Sequence[str], values: Array) -> list[int]:
     return sorted(best.values())
 
 
-def _bridge(time_s: Array, values: Array, seen: NDArray[np.bool_], weights: NDArray[np.bool_]) -> None:
-    """Fill rows without a face: straight lines between faces, rest before the first and after the last one."""
-    spans = [
-        f"{time_s[first] - time_s[0]:.2f}–{time_s[last - 1] - time_s[0]:.2f} s" for first, last in find_runs(~seen)
-    ]
-    more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
-    LOG.warning(
-        "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",
-        *(int((~seen).sum()), len(seen), ", ".join(spans[:4]), more),
-    )
-    for column in range(values.shape[1]):
-        values[:, column] = np.interp(time_s, time_s[seen], values[seen, column])
-    first, last = np.flatnonzero(seen)[[0, -1]]
-    values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
-
-
-def _in_order(time_s: Array) -> NDArray[np.bool_]:
+def _find_ordered(time_s: Array) -> NDArray[np.bool_]:
     """Return which rows are later than all before them. Raises InputError: a row goes far back, or too many do."""
     latest = np.maximum.accumulate(time_s)
     back = latest - time_s

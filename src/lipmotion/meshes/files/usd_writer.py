@@ -5,17 +5,116 @@ Source: the schemas UsdSkel, UsdGeom, UsdShade and UsdMedia of OpenUSD.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.files.usd_text import asset, matrix, numbers, prim, prim_names, rows_of, tokens, triple, whole
+from lipmotion.errors import ExportError, shortened
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
-from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
-from lipmotion.meshes.model.textures import linear
-from lipmotion.storage.files import whole_file
+from lipmotion.meshes.model.scene import Scene, ShadingNormals, compute_shading_normals
+from lipmotion.meshes.model.textures import decode_srgb
+from lipmotion.printable import is_line
+from lipmotion.storage.files import as_text, whole_file
+
+INDENT = "    "
+_CONTROL = re.compile("[\x00-\x1f\x7f]")
+
+
+def prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str) -> Iterator[str]:
+    """Yield the lines of a prim.
+
+    schema  : ``Mesh``, for instance
+    name    : as of ``prim_names``
+    inside  : the lines of its attributes and of its own prims
+    schemas : API schemas that are applied to it
+    about   : further metadata, as ``kind``
+
+    >>> print("\\n".join(prim("Scope", "Looks", ["token purpose"], kind="group")))
+    def Scope "Looks" (
+        kind = "group"
+    )
+    {
+        token purpose
+    }
+    """
+    lines = [f'{INDENT}{key} = "{value}"' for key, value in about.items()]
+    if schemas:
+        lines.insert(0, f"{INDENT}prepend apiSchemas = {tokens(schemas)}")
+    yield f'def {schema} "{name}"' + (" (" if lines else "")
+    if lines:
+        yield from (*lines, ")")
+    yield "{"
+    yield from (INDENT + line for line in inside)
+    yield "}"
+
+
+def prim_names(names: Iterable[str]) -> list[str]:
+    """Return names of letters, digits and low lines, as prims need them, none twice.
+
+    >>> prim_names(["mouthSmile_L", "head.mouthSmile_L", "head mouthSmile_L", "2"])
+    ['mouthSmile_L', 'head_mouthSmile_L', 'head_mouthSmile_L_2', '_2']
+    """
+    taken: dict[str, None] = {}
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name) or "part"
+        plain = f"_{plain}" if plain[0].isdigit() else plain
+        number, found = 1, plain
+        while found in taken:
+            number += 1
+            found = f"{plain}_{number}"
+        taken[found] = None
+    return list(taken)
+
+
+def tokens(names: Iterable[str]) -> str:
+    """Return names as an array of tokens; control characters are escaped, surrogates as in Python.
+
+    >>> print(tokens(['a"b', "c\\nd"]))
+    ["a\\"b", "c\\x0ad"]
+    """
+    escaped = (as_text(name).replace("\\", "\\\\").replace('"', '\\"') for name in names)
+    plain = (_CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", name) for name in escaped)
+    return "[" + ", ".join(f'"{name}"' for name in plain) + "]"
+
+
+def asset(path: str) -> str:
+    """Return a path from the folder of the file, with slashes, as a reference to a file.
+
+    Raises ExportError: a name with a line end or another control character, which USD cannot refer to.
+
+    >>> asset("welcome.flac"), asset("../a@b.wav"), asset("a@@@b.wav")
+    ('@./welcome.flac@', '@@@../a@b.wav@@@', '@@@./a\\\\@@@b.wav@@@')
+    """
+    if not is_line(path):
+        raise ExportError(f"the name {shortened(path)!r} has a character that .usda cannot refer to; rename the file")
+    mark = "@@@" if "@" in path else "@"
+    absolute = path.startswith(("/", "../")) or ":" in path
+    return mark + ("" if absolute else "./") + path.replace("@@@", "\\@@@") + mark
+
+
+def _whole(values: NDArray[np.integer]) -> str:
+    return "[" + ", ".join(map(str, values.tolist())) + "]"
+
+
+def _numbers(values: NDArray[np.floating]) -> str:
+    """Return numbers as an array, or rows of three as an array of tuples, with the seven digits of single precision."""
+    if values.ndim == 1:
+        return "[" + ", ".join([f"{value:.7g}" for value in (values + 0.0).tolist()]) + "]"
+    return "[" + ", ".join([f"({x:.7g}, {y:.7g}, {z:.7g})" for x, y, z in (values + 0.0).tolist()]) + "]"
+
+
+def _tuple(values: NDArray[np.floating]) -> str:
+    return "(" + ", ".join([f"{value:.7g}" for value in (values + 0.0).tolist()]) + ")"
+
+
+def _matrix(values: NDArray[np.floating]) -> str:
+    """Return a matrix [shape=(4, 4)], its rows one after another; USD multiplies rows from the left."""
+    return "( " + ", ".join(map(_tuple, values)) + " )"
+
 
 ROOT = "Character"
 SKELETON, ANIMATION, LOOKS, FACE = f"/{ROOT}/Skeleton", f"/{ROOT}/Animation", f"/{ROOT}/Looks", f"/{ROOT}/Face"
@@ -34,33 +133,28 @@ def write_usda(path: Path, scene: Scene) -> None:
     Textures are not written.
     Raises ExportError: the file cannot be written.
     """
-    normals = shading_normals(scene.mesh, split=scene.split)
+    normals = compute_shading_normals(scene.mesh, split=scene.split)
+    rate, last, bound = f"{_codes_hz(scene):.9g}", f"{_last_code(scene):.9g}", ("SkelBindingAPI",)
+    character = chain(  # line by line: a long motion takes no memory for its text
+        prim("Skeleton", "Skeleton", _list_skeleton(scene), schemas=bound),
+        prim("SkelAnimation", "Animation", _list_animation(scene)),
+        prim("Mesh", "Face", _list_mesh(scene, normals), schemas=(*bound, "MaterialBindingAPI")),
+        prim("Scope", "Looks", _list_looks(scene.mesh)),
+        prim("SpatialAudio", "Sound", _list_sound(scene)) if scene.sound else (),
+    )
+    head = [
+        *("#usda 1.0", "(", f'    defaultPrim = "{ROOT}"', '    doc = "Written by lipmotion"'),
+        *(f"    endTimeCode = {last}", f"    framesPerSecond = {rate}", f"    metersPerUnit = {scene.metres:.9g}"),
+        *("    startTimeCode = 0", f"    timeCodesPerSecond = {rate}", '    upAxis = "Y"', ")", ""),
+    ]
     with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
-        for line in _lines(scene, normals):
-            file.write(line + "\n")
+        root = prim("SkelRoot", ROOT, character, schemas=bound, kind="component")
+        file.writelines(line + "\n" for line in chain(head, root))
 
 
-def _lines(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
-    rate = f"{_codes_hz(scene):.9g}"
-    yield from ("#usda 1.0", "(", f'    defaultPrim = "{ROOT}"', '    doc = "Written by lipmotion"')
-    yield from (f"    endTimeCode = {_last(scene):.9g}", f"    framesPerSecond = {rate}")
-    yield from (f"    metersPerUnit = {scene.metres:.9g}", "    startTimeCode = 0", f"    timeCodesPerSecond = {rate}")
-    yield from ('    upAxis = "Y"', ")", "")
-    yield from prim("SkelRoot", ROOT, _character(scene, normals), schemas=("SkelBindingAPI",), kind="component")
-
-
-def _character(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
-    yield from prim("Skeleton", "Skeleton", _skeleton(scene), schemas=("SkelBindingAPI",))
-    yield from prim("SkelAnimation", "Animation", _animation(scene))
-    yield from prim("Mesh", "Face", _mesh(scene, normals), schemas=("SkelBindingAPI", "MaterialBindingAPI"))
-    yield from prim("Scope", "Looks", _looks(scene.mesh))
-    if scene.sound:
-        yield from prim("SpatialAudio", "Sound", _sound(scene))
-
-
-def _sound(scene: Scene) -> Iterator[str]:
+def _list_sound(scene: Scene) -> Iterator[str]:
     yield 'uniform token auralMode = "nonSpatial"'
-    yield f"uniform timecode endTime = {_last(scene):.9g}"
+    yield f"uniform timecode endTime = {_last_code(scene):.9g}"
     yield f"uniform asset filePath = {asset(scene.sound)}"
     if scene.sound_s < 0:
         yield f"uniform double mediaOffset = {-scene.sound_s:.9g}"
@@ -68,114 +162,100 @@ def _sound(scene: Scene) -> Iterator[str]:
     yield f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _codes_hz(scene):.9g}"
 
 
-def _skeleton(scene: Scene) -> Iterator[str]:
+def _list_skeleton(scene: Scene) -> Iterator[str]:
     places = [np.eye(4), np.eye(4)][: len(_joints(scene))]
     if scene.turn is not None:
         places[1][3, :3] = scene.turn.pivot
-    matrices = ", ".join(map(matrix, places))
+    matrices = ", ".join(map(_matrix, places))
     yield f"uniform matrix4d[] bindTransforms = [{matrices}]"
     yield f"uniform token[] joints = {tokens(_joints(scene))}"
     yield f"uniform matrix4d[] restTransforms = [{matrices}]"
     yield f"rel skel:animationSource = <{ANIMATION}>"
 
 
-def _animation(scene: Scene) -> Iterator[str]:
+def _list_animation(scene: Scene) -> Iterator[str]:
     joints, (time_s, table) = _joints(scene), scene.keys()
     yield f"uniform token[] blendShapes = {tokens(scene.mesh.shape_names)}"
     if len(table):
-        yield from _samples("float[] blendShapeWeights", map(numbers, table), time_s * _codes_hz(scene))
+        yield from _list_samples("float[] blendShapeWeights", map(_numbers, table), time_s * _codes_hz(scene))
     else:
-        yield f"float[] blendShapeWeights = {numbers(np.zeros(len(scene.mesh.shapes)))}"
+        yield f"float[] blendShapeWeights = {_numbers(np.zeros(len(scene.mesh.shapes)))}"
     yield f"uniform token[] joints = {tokens(joints)}"
     if scene.turn is not None:
-        codes = _step(scene) * np.arange(len(scene.turn.rotations), dtype=np.float64)
-        yield from _samples("quatf[] rotations", _rotations(scene.turn), codes)
-        yield f"float3[] translations = [(0, 0, 0), {triple(scene.turn.pivot)}]"
+        rotations = (
+            f"[(1, 0, 0, 0), ({w:.7g}, {x:.7g}, {y:.7g}, {z:.7g})]" for x, y, z, w in scene.turn.rotations.tolist()
+        )
+        codes = _codes_per_key(scene) * np.arange(len(scene.turn.rotations), dtype=np.float64)
+        yield from _list_samples("quatf[] rotations", rotations, codes)
+        yield f"float3[] translations = [(0, 0, 0), {_tuple(scene.turn.pivot)}]"
     else:
         yield "quatf[] rotations = [(1, 0, 0, 0)]"
         yield "float3[] translations = [(0, 0, 0)]"
     yield f"half3[] scales = [{', '.join(['(1, 1, 1)'] * len(joints))}]"
 
 
-def _rotations(turn: HeadTurn) -> Iterator[str]:
-    for x, y, z, w in turn.rotations.tolist():
-        yield f"[(1, 0, 0, 0), ({w:.7g}, {x:.7g}, {y:.7g}, {z:.7g})]"
-
-
-def _samples(attribute: str, values: Iterable[str], codes: NDArray[np.float64]) -> Iterator[str]:
+def _list_samples(attribute: str, values: Iterable[str], codes: NDArray[np.float64]) -> Iterator[str]:
     """Yield the values of an attribute at time codes [shape=(K,)]."""
     yield f"{attribute}.timeSamples = {{"
     yield from (f"    {code:.9g}: {value}," for code, value in zip(codes.tolist(), values, strict=True))
     yield "}"
 
 
-def _mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
+def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
     mesh = scene.mesh
     names = prim_names(mesh.shape_names)
     yield "uniform bool doubleSided = 1"
     yield 'uniform token subdivisionScheme = "none"'
-    yield f"float3[] extent = {rows_of(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))}"
-    yield f"int[] faceVertexCounts = {whole(np.full(len(mesh.triangles), 3))}"
-    yield f"int[] faceVertexIndices = {whole(mesh.triangles.reshape(-1))}"
-    yield f"normal3f[] normals = {rows_of(normals.rest)} ({PER_VERTEX})"
-    yield f"point3f[] points = {rows_of(mesh.vertices)}"
+    yield f"float3[] extent = {_numbers(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))}"
+    yield f"int[] faceVertexCounts = {_whole(np.full(len(mesh.triangles), 3))}"
+    yield f"int[] faceVertexIndices = {_whole(mesh.triangles.reshape(-1))}"
+    yield f"normal3f[] normals = {_numbers(normals.rest)} ({PER_VERTEX})"
+    yield f"point3f[] points = {_numbers(mesh.vertices)}"
     if mesh.colours is not None:
-        yield f"color3f[] primvars:displayColor = {rows_of(linear(mesh.colours))} ({PER_VERTEX})"
-    yield from _binding(scene)
+        yield f"color3f[] primvars:displayColor = {_numbers(decode_srgb(mesh.colours))} ({PER_VERTEX})"
+    yield from _list_binding(scene)
     if names:
         yield f"uniform token[] skel:blendShapes = {tokens(mesh.shape_names)}"
         yield f"rel skel:blendShapeTargets = [{', '.join(f'<{FACE}/{name}>' for name in names)}]"
     yield f"rel skel:skeleton = <{SKELETON}>"
     yield 'uniform token subsetFamily:materialBind:familyType = "partition"'
     for name, shape, turned in zip(names, mesh.shapes, normals.turned, strict=True):
-        yield from prim("BlendShape", name, _blend_shape((shape.rows, shape.displacements), turned))
+        rows = np.union1d(shape.rows, turned[0])  # what is added to places, and to normals, of the same vertices
+        offsets = np.zeros((2, len(rows), 3))
+        for values, (of, added) in zip(offsets, ((shape.rows, shape.displacements), turned), strict=True):
+            values[np.searchsorted(rows, of)] = added
+        moved = [f"uniform vector3f[] offsets = {_numbers(offsets[0])}", f"uniform int[] pointIndices = {_whole(rows)}"]
+        yield from prim("BlendShape", name, [f"uniform vector3f[] normalOffsets = {_numbers(offsets[1])}", *moved])
     for name, part in _parts(mesh):
-        yield from prim("GeomSubset", f"{name}_faces", _subset(name, part), schemas=("MaterialBindingAPI",))
+        subset = [
+            'uniform token elementType = "face"',
+            'uniform token familyName = "materialBind"',
+            f"int[] indices = {_whole(np.arange(part.first, part.stop))}",
+            f"rel material:binding = <{LOOKS}/{name}>",
+        ]
+        yield from prim("GeomSubset", f"{name}_faces", subset, schemas=("MaterialBindingAPI",))
 
 
-def _binding(scene: Scene) -> Iterator[str]:
+def _list_binding(scene: Scene) -> Iterator[str]:
     """Yield which joints the vertices follow."""
     count, joints = len(scene.mesh.vertices), len(_joints(scene))
     share = np.zeros(count) if scene.turn is None else scene.turn.share
     weights = np.stack([1 - share, share], axis=1)[:, :joints]
     hints = f"(elementSize = {joints}\n            {PER_VERTEX})"
-    yield f"matrix4d primvars:skel:geomBindTransform = {matrix(np.eye(4))}"
-    yield f"int[] primvars:skel:jointIndices = {whole(np.tile(np.arange(joints), count))} {hints}"
-    yield f"float[] primvars:skel:jointWeights = {numbers(weights.reshape(-1))} {hints}"
+    yield f"matrix4d primvars:skel:geomBindTransform = {_matrix(np.eye(4))}"
+    yield f"int[] primvars:skel:jointIndices = {_whole(np.tile(np.arange(joints), count))} {hints}"
+    yield f"float[] primvars:skel:jointWeights = {_numbers(weights.reshape(-1))} {hints}"
 
 
-def _blend_shape(
-    moved: tuple[NDArray[np.int64], NDArray[np.float64]], turned: tuple[NDArray[np.int64], NDArray[np.float64]]
-) -> Iterator[str]:
-    """Yield a blendshape: what is added to places, and to normals; both are of the same vertices."""
-    both = np.union1d(moved[0], turned[0])
-    yield f"uniform vector3f[] normalOffsets = {rows_of(_spread(turned, both))}"
-    yield f"uniform vector3f[] offsets = {rows_of(_spread(moved, both))}"
-    yield f"uniform int[] pointIndices = {whole(both)}"
-
-
-def _spread(some: tuple[NDArray[np.int64], NDArray[np.float64]], rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    values = np.zeros((len(rows), 3))
-    values[np.searchsorted(rows, some[0])] = some[1]
-    return values
-
-
-def _subset(name: str, part: MeshPart) -> Iterator[str]:
-    yield 'uniform token elementType = "face"'
-    yield 'uniform token familyName = "materialBind"'
-    yield f"int[] indices = {whole(np.arange(part.first, part.stop))}"
-    yield f"rel material:binding = <{LOOKS}/{name}>"
-
-
-def _looks(mesh: Mesh) -> Iterator[str]:
+def _list_looks(mesh: Mesh) -> Iterator[str]:
     for name, part in _parts(mesh):
-        yield from prim("Material", name, _material(f"{LOOKS}/{name}", part, painted=mesh.colours is not None))
+        yield from prim("Material", name, _list_material(f"{LOOKS}/{name}", part, painted=mesh.colours is not None))
 
 
-def _material(place: str, part: MeshPart, *, painted: bool) -> Iterator[str]:
+def _list_material(place: str, part: MeshPart, *, painted: bool) -> Iterator[str]:
     """Yield a material: of one colour, or of the colours of the vertices."""
     material = part.material
-    colour = f" = {triple(linear(material.colour))}" if not painted else f".connect = <{place}/Colour.outputs:result>"
+    colour = f".connect = <{place}/Colour.outputs:result>" if painted else f" = {_tuple(decode_srgb(material.colour))}"
     surface = [
         'uniform token info:id = "UsdPreviewSurface"',
         f"color3f inputs:diffuseColor{colour}",
@@ -194,14 +274,14 @@ def _codes_hz(scene: Scene) -> float:
     return scene.weights.rate_hz if scene.weights and scene.weights.rate_hz <= FASTEST_HZ else USUAL_HZ
 
 
-def _step(scene: Scene) -> float:
+def _codes_per_key(scene: Scene) -> float:
     """Return how many time codes a key is after the one before."""
     return _codes_hz(scene) / scene.weights.rate_hz if scene.weights else 1.0
 
 
-def _last(scene: Scene) -> float:
+def _last_code(scene: Scene) -> float:
     """Return the time code of the last key."""
-    return max(len(scene.weights.values) - 1, 0) * _step(scene) if scene.weights else 0.0
+    return max(len(scene.weights.values) - 1, 0) * _codes_per_key(scene) if scene.weights else 0.0
 
 
 def _joints(scene: Scene) -> Sequence[str]:

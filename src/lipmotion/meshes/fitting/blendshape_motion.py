@@ -1,40 +1,154 @@
-"""Motion of blendshapes as motion of a mouth: distances, points and articulatory channels that follow from weights.
+"""A mouth of ARKit's blendshapes alone, and motion of blendshapes as motion of a mouth.
 
-Models that were trained on blendshapes, captures and edited curves have channels such as ``jawOpen`` and no
-``opening``. The mouth of ``reference_mouth`` has ARKit's blendshapes; moved by the weights, it has the distances and
-points that faces draw.
+The places of the mouth are those of the template, its shapes are formulas on them: what ARKit's documentation shows of
+each, in eye distances. docs/results/rig.md compares them with a scanned head's. Models that were trained on
+blendshapes, captures and edited curves have channels such as ``jawOpen`` and no ``opening``: weights that move this
+mouth give them the distances and points that faces draw.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import GAP, LEAST_GAP, opening_of
-from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_EDGE, RIGHT_CORNER, UPPER_EDGE, mouth_template
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.articulation.contact import GAP, LEAST_GAP, gap_to_opening
+from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, LOWER_EDGE, RIGHT_CORNER, UPPER_EDGE, mouth_template
 from lipmotion.meshes.model.face_shapes import FaceShapes
-from lipmotion.meshes.model.other_shapes import OPENS, as_arkit
-from lipmotion.meshes.model.shape_names import arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, OPENS, VOWELS, VRM_VOWELS, arkit_name, convert_to_arkit
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion
 
 Array = NDArray[np.float64]
+Real = NDArray[np.floating[Any]] | float
 
-LEAST_OPENING = 0.05
+HINGE = (-0.45, -0.75)
+"""The axis of the jaw: height and depth behind the eyes, in eye distances."""
+JAW_ANGLE_RAD = 0.44
+"""How far ``jawOpen`` turns the jaw: the lower lip goes down by about half an eye distance."""
+UPPER_PART = 0.08
+"""The share of the gap that the upper lip closes in ``mouthClose``; the lower lip closes the rest."""
+MIN_OPENING = 0.05
 """A blendshape that parts the lips by more, in eye distances, opens the mouth."""
 ARTICULATORY = {
-    "tongue": (("tongueOut", 3.0),),
-    "lip_tuck": (("mouthRollLower", 1.8),),
-    "protrusion": (("mouthPucker", 1.2), ("mouthFunnel", 0.9)),
-    "spread": (
-        ("mouthSmileLeft", 0.7),
-        ("mouthSmileRight", 0.7),
-        ("mouthStretchLeft", 0.7),
-        ("mouthStretchRight", 0.7),
-    ),
-    "lip_press": (("mouthPressLeft", 2.0), ("mouthPressRight", 2.0)),
+    "tongue": {"tongueOut": 3.0},
+    "lip_tuck": {"mouthRollLower": 1.8},
+    "protrusion": {"mouthPucker": 1.2, "mouthFunnel": 0.9},
+    "spread": dict.fromkeys(("mouthSmileLeft", "mouthSmileRight", "mouthStretchLeft", "mouthStretchRight"), 0.7),
+    "lip_press": {"mouthPressLeft": 2.0, "mouthPressRight": 2.0},
 }
 """What blendshapes say of the articulatory channels (docs/articulation.md): their weights, times these, added up."""
+
+
+@cache
+def arkit_mouth() -> FaceShapes:
+    """Return ARKit's blendshapes of the mouth as displacements of the lip and jaw points."""
+    moved = np.array([_displace_points(name) for name in ARKIT_MOUTH])
+    template = mouth_template()
+    facing = [(template.row(upper), template.row(lower)) for upper, lower in FACING[:3]]
+    gap = np.mean([moved[:, upper, 1] - moved[:, lower, 1] for upper, lower in facing], axis=0)
+    return FaceShapes(ARKIT_MOUTH, ARKIT_MOUTH, moved, gap, "arkit")
+
+
+@cache
+def vowel_mouth() -> FaceShapes:
+    """Return the vowels of VRM, made of ARKit's blendshapes (``VOWELS``), as displacements of points."""
+    mouth = arkit_mouth()
+    gains = np.zeros((len(VRM_VOWELS), len(mouth.known)))
+    for known, sources in VOWELS.items():
+        for vowel, gain in sources:
+            if vowel in VRM_VOWELS:
+                gains[VRM_VOWELS.index(vowel), mouth.known.index(known)] = gain
+    moved = np.einsum("vs,spd->vpd", gains, mouth.moved)
+    return FaceShapes(VRM_VOWELS, tuple(f"vowel_{name}" for name in VRM_VOWELS), moved, gains @ mouth.gap, "visemes")
+
+
+class _Regions:
+    """Where the points are: 1 in the middle of a region, 0 outside it [each shape=(52,)]."""
+
+    def __init__(self) -> None:
+        template = mouth_template()
+        self.places = template.places
+        self.across = np.clip(self.places[:, 0] / (template.width / 2), -1.0, 1.0)
+        middle = np.sqrt(1 - self.across**2)
+        self.lips = (~template.jaw).astype(float)
+        self.upper, self.lower = template.upper * middle, template.lower * middle
+        self.edge = (~template.inner).astype(float) * self.lips
+        self.corner = np.abs(self.across) ** 3 * self.lips
+        self.jaw = template.jaw.astype(float)
+        self.chin = self.jaw * np.exp(-((self.places[:, 0] / 0.3) ** 2))
+        self.left, self.right = (np.clip(0.5 + 1.5 * side * self.across, 0, 1) for side in (1, -1))
+
+
+def _displace_points(name: str) -> Array:
+    """Return how one blendshape moves the points at weight 1 [shape=(52, 3)]."""
+    regions = _Regions()
+    if name == "jawOpen":
+        return _open_jaw(regions)
+    if name == "mouthClose":
+        return _close_before_jaw(regions)
+    if name in {"jawLeft", "jawRight", "mouthLeft", "mouthRight"}:
+        way = 0.15 if name.endswith("Left") else -0.15
+        moving = regions.jaw + 0.6 * regions.lower if name.startswith("jaw") else regions.lips
+        return np.outer(moving, [way, 0, 0])
+    base = name.removesuffix("Left").removesuffix("Right")
+    moved = _FORMS[base](regions) if base in _FORMS else np.zeros_like(regions.places)
+    side = regions.left if name.endswith("Left") else regions.right
+    return moved if name == base else moved * side[:, None]
+
+
+def _open_jaw(regions: _Regions) -> Array:
+    """Return the jaw turned about its hinge; the lower lip follows wholly, corners by 0.45, the upper lip hardly."""
+    share = regions.jaw + regions.lips * (0.45 + 0.55 * regions.lower - 0.45 * regions.upper)
+    arm = regions.places[:, 1:] - HINGE
+    cosine, sine = np.cos(JAW_ANGLE_RAD), np.sin(JAW_ANGLE_RAD)
+    moved = np.zeros_like(regions.places)
+    moved[:, 1:] = share[:, None] * (arm @ np.array([[cosine, sine], [-sine, cosine]]) - arm)
+    moved[:, 0] = -0.06 * regions.across * (regions.lips - regions.upper) * (1 - regions.jaw)
+    return moved
+
+
+def _close_before_jaw(regions: _Regions) -> Array:
+    """Return the lips closed in front of the open jaw: the exact opposite of the gap that ``jawOpen`` makes."""
+    jaw, template = _open_jaw(regions), mouth_template()
+    where, gaps = [-1.0, 1.0], [0.0, 0.0]  # the gap from the right corner to the left
+    below = np.flatnonzero(template.lower & template.inner)
+    for row in np.flatnonzero(template.upper & template.inner):
+        other = below[np.abs(template.places[below, 0] - template.places[row, 0]).argmin()]
+        where.append(float(regions.across[row]))
+        gaps.append(float(jaw[row, 1] - jaw[other, 1]))
+    order = np.argsort(where, kind="stable")
+    gap = np.interp(regions.across, np.array(where)[order], np.array(gaps)[order])
+    lower, upper = template.lower.astype(float), template.upper.astype(float)
+    moved = np.zeros_like(jaw)
+    moved[:, 1] = gap * np.where(template.inner, 1.0, 0.9) * ((1 - UPPER_PART) * lower - UPPER_PART * upper)
+    moved[:, 2] = -0.9 * jaw[:, 2] * lower
+    return moved
+
+
+def _form(x: Real, y: Real, z: Real, regions: _Regions) -> Array:
+    return np.stack([value * regions.lips for value in (x, y, z)], axis=1)
+
+
+_FORMS: dict[str, Callable[[_Regions], Array]] = {
+    "jawForward": lambda r: np.outer(r.jaw + 0.7 * r.lower, [0, 0, 0.16]),
+    "mouthFunnel": lambda r: _form(-0.15 * r.across, 0.08 * r.upper - 0.12 * r.lower, 0.09 * (1 - r.corner), r),
+    "mouthPucker": lambda r: _form(-0.15 * r.across, -0.01 * r.upper + 0.01 * r.lower, 0.10 * (1 - 0.6 * r.corner), r),
+    "mouthSmile": lambda r: _form(0.14 * r.across, 0.14 * r.corner, -0.08 * r.corner, r),
+    "mouthFrown": lambda r: _form(0.02 * r.across, -0.07 * r.corner, -0.01 * r.corner, r),
+    "mouthDimple": lambda r: _form(0.06 * r.across, 0.01 * r.corner, -0.07 * r.corner, r),
+    "mouthStretch": lambda r: _form(0.10 * r.across, -0.03 * r.corner, -0.04 * r.corner, r),
+    "mouthRollLower": lambda r: _form(0, 0.07 * r.lower * r.edge, -0.11 * r.lower, r),
+    "mouthRollUpper": lambda r: _form(0, -0.07 * r.upper * r.edge, -0.11 * r.upper, r),
+    "mouthShrugLower": lambda r: _form(0, 0.09 * r.lower, 0.04 * r.lower, r) + np.outer(r.chin, [0, 0.12, 0.02]),
+    "mouthShrugUpper": lambda r: _form(0, 0.075 * r.upper, 0.045 * r.upper, r),
+    "mouthPress": lambda r: _form(0, 0.012 * r.lower - 0.012 * r.upper, -0.015 * (1 - r.corner), r),
+    "mouthLowerDown": lambda r: _form(0, -0.11 * r.lower, -0.01 * r.lower, r),
+    "mouthUpperUp": lambda r: _form(0, 0.12 * r.upper, 0.0, r),
+}
+"""The shapes that one formula gives; those of a side are weighted by how far a point is on it."""
 
 
 def is_of_blendshapes(motion: Motion) -> bool:
@@ -57,24 +171,16 @@ def with_mouth(motion: Motion) -> Motion:
     places = template.places + (rows @ mouth.moved.reshape(len(mouth.known), -1)).reshape(-1, *template.places.shape)
     gap = np.maximum(rows @ mouth.gap, 0.0)
     gap[gap < LEAST_GAP / 2] = 0.0
-    distances = {
-        "opening": opening_of(gap),
-        GAP: gap,
-        "width": _apart(places, LEFT_CORNER, RIGHT_CORNER),
-        "outer": _apart(places, UPPER_EDGE, LOWER_EDGE),
-    }
-    points = {
-        f"{axis}_{point}": places[:, row, column]
-        for row, point in enumerate(template.points)
-        for column, axis in enumerate("xyz")
-    }
-    said = {
-        name: np.clip(sum(gain * weights[source] for source, gain in sources if source in weights), 0, 1)
-        for name, sources in ARTICULATORY.items()
-        if any(source in weights for source, _ in sources)
-    }
-    added = {name: (curve, EYE_DISTANCE) for name, curve in (distances | points).items()}
-    added |= {name: (curve, WEIGHT) for name, curve in said.items()}
+    added = {"opening": (gap_to_opening(gap), EYE_DISTANCE), GAP: (gap, EYE_DISTANCE)}
+    for name, one, other in (("width", LEFT_CORNER, RIGHT_CORNER), ("outer", UPPER_EDGE, LOWER_EDGE)):
+        across = places[:, template.row(one), :2] - places[:, template.row(other), :2]
+        added[name] = np.linalg.norm(across, axis=1), EYE_DISTANCE
+    for row, point in enumerate(template.points):
+        added |= {f"{axis}_{point}": (places[:, row, column], EYE_DISTANCE) for column, axis in enumerate("xyz")}
+    for name, gains in ARTICULATORY.items():
+        if gains.keys() & weights.keys():
+            total = sum(gain * weights[source] for source, gain in gains.items() if source in weights)
+            added[name] = np.clip(total, 0, 1), WEIGHT
     added = {name: each for name, each in added.items() if name not in motion.names}
     values = np.concatenate([motion.values, np.stack([curve for curve, _ in added.values()], axis=1)], axis=1)
     channels = (*motion.channels, *(Channel(name, unit) for name, (_, unit) in added.items()))
@@ -85,35 +191,29 @@ def arkit_weights(motion: Motion) -> dict[str, Array]:
     """Return the curves of a motion that are blendshapes, by ARKit's names, 0 to 1 [each shape=(T,)].
 
     Names are understood as files spell them; of two spellings of one, the first. Blendshapes of other sets are
-    converted (``other_shapes``).
+    converted (``convert_to_arkit``).
     """
-    found: dict[str, Array] = {}
+    weights: dict[str, Array] = {}
     for name in motion.names:
         known = arkit_name(name)
         if known is not None:
-            found.setdefault(known, np.clip(motion[name].astype(np.float64), 0, 1))
-    if OPENS not in found:
-        found |= {name: np.clip(curve, 0, 1) for name, curve in as_arkit(motion).items()}
-    return found
+            weights.setdefault(known, np.clip(motion[name].astype(np.float64), 0, 1))
+    if OPENS not in weights:
+        weights |= {name: np.clip(curve, 0, 1) for name, curve in convert_to_arkit(motion).items()}
+    return weights
 
 
-def given_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
+def find_own_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
     """Return the weights that a motion has for the blendshapes of a mesh, by the mesh's names; None: it has none.
 
     A blendshape is found by its own name, or else by ARKit's; at least one of those that are found must open the mouth.
     Blendshapes that the motion does not have stay 0.
     """
+    weights = arkit_weights(motion)
     by_name = {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in shapes.names if name in motion.names}
-    by_known = arkit_weights(motion)
-    curves = [by_name.get(name, by_known.get(known)) for name, known in zip(shapes.names, shapes.known, strict=True)]
-    if not any(curve is not None and gap > LEAST_OPENING for curve, gap in zip(curves, shapes.gap, strict=True)):
+    curves = [by_name.get(name, weights.get(known)) for name, known in zip(shapes.names, shapes.known, strict=True)]
+    if not any(curve is not None and gap > MIN_OPENING for curve, gap in zip(curves, shapes.gap, strict=True)):
         return None
     nothing = np.zeros(len(motion.values))
     values = np.stack([nothing if curve is None else curve for curve in curves], axis=1)
     return Motion(values, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
-
-
-def _apart(places: Array, one: int, other: int) -> Array:
-    """Return the distance of two points in the picture [shape=(T,)]."""
-    template = mouth_template()
-    return np.linalg.norm(places[:, template.row(one), :2] - places[:, template.row(other), :2], axis=1)

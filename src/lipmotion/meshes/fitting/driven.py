@@ -11,32 +11,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import LEAST_GAP, in_pictures
-from lipmotion.articulation.expression import moods_shown
+from lipmotion.articulation.contact import LEAST_GAP, sample_pictures
+from lipmotion.articulation.expression import read_moods
 from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.rig_tables import RigRow, read_character_table, table_path, with_sources
-from lipmotion.meshes.fitting.facial_animation import expression_weights
+from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_character_table, table_path, with_sources
 from lipmotion.meshes.fitting.lip_placement import (
     LipPlacement,
-    opening_shape,
-    placed_by_points,
-    placed_by_shape,
-    surface_of_named,
+    find_opening_shape,
+    part_named_lips,
+    place_lips_by_points,
+    place_lips_by_shape,
 )
-from lipmotion.meshes.fitting.own_curves import OwnCurves, own_curves, plain_row, rows_found
-from lipmotion.meshes.fitting.point_motion import point_motion
-from lipmotion.meshes.fitting.shape_weights import shape_weights
-from lipmotion.meshes.model.binding import ControlBinding, bind, painted
+from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights, with_gap
+from lipmotion.meshes.model.binding import ControlBinding, bind, paint_weights
 from lipmotion.meshes.model.bones import JAW
-from lipmotion.meshes.model.face_shapes import FaceShapes, face_shapes, numbers_by_name
+from lipmotion.meshes.model.face_shapes import FaceShapes, find_face_shapes, measure_lip_parting, numbers_by_name
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name
-from lipmotion.meshes.model.surface import mesh_surface
-from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name, spoken_name
+from lipmotion.meshes.model.surface import build_surface
+from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
+
+Array = NDArray[np.float64]
+
 
 JAW_OPEN = "jawOpen"
 WIDEST_RAD = np.radians(22.0)
@@ -50,25 +51,80 @@ def with_jaw(mesh: Mesh) -> Mesh:
     way. A mesh that has a blendshape that opens the mouth, or no jaw bone, is returned as it is.
     """
     bone = next((bone for bone in mesh.bones if bone.kind == JAW), None)
-    if bone is None or _opens(mesh):
+    if bone is None:
         return mesh
-    away = mesh.vertices[bone.rows] - bone.place
-    cosine, sine = np.cos(WIDEST_RAD), np.sin(WIDEST_RAD)
-    turned = away @ np.array([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
-    shape = Blendshape(JAW_OPEN, bone.rows, bone.shares[:, None] * (turned - away))
-    others = tuple(each for each in mesh.shapes if each.name != JAW_OPEN)
-    return replace(mesh, shapes=(*others, shape))
-
-
-def _opens(mesh: Mesh) -> bool:
     try:
-        opening_shape(mesh)
+        find_opening_shape(mesh)
     except InputError:
-        return False
-    return True
+        away = mesh.vertices[bone.rows] - bone.place
+        cosine, sine = np.cos(WIDEST_RAD), np.sin(WIDEST_RAD)
+        turned = away @ np.array([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
+        shape = Blendshape(JAW_OPEN, bone.rows, bone.shares[:, None] * (turned - away))
+        return replace(mesh, shapes=(*(each for each in mesh.shapes if each.name != JAW_OPEN), shape))
+    return mesh
 
 
-Array = NDArray[np.float64]
+def _solve_with_table(
+    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, rows: Sequence[RigRow], parted: Array
+) -> Motion:
+    """Return the weights of all blendshapes of a mouth, ``offset + gain · solved``, within their limits.
+
+    rows   : of a table, one a blendshape; the source is the name of the solved shape (``FaceShapes.names``)
+    parted : how far each blendshape parts the lips at weight 1, eye distances [shape=(R,)]
+    Where the lips touch in solved weights they touch with these gains, too; elsewhere they are as far apart as the
+    gains make them. What the offsets do to the lips, they do in every frame. Weights that the motion has for
+    blendshapes by the mesh's names are such weights already, and stay.
+    """
+    parting = np.zeros(len(shapes.names))
+    for row, parts in zip(rows, parted.tolist(), strict=True):
+        parting[shapes.names.index(row.source)] += row.gain * parts
+    scaled, own = replace(shapes, gap=parting), dict[str, Array]()
+    for row in rows:
+        if row.control in motion.names and row.gain and row.source not in own:
+            own[row.source] = (motion[row.control].astype(np.float64) - row.offset) / row.gain
+    if own:
+        kept = [name for name in motion.names if name not in {*own, *(row.control for row in rows)}]
+        values = np.stack([*(motion[name] for name in kept), *own.values()], axis=1)
+        channels = [motion.channels[motion.column(name)] for name in kept] + [Channel(name, WEIGHT) for name in own]
+        solved = solve_shape_weights(Motion(values, motion.rate_hz, tuple(channels)), units, scaled)
+    else:
+        solved = solve_shape_weights(motion, units, shapes)
+    weights, gains = solved.values.astype(np.float64), [row.gain for row in rows]
+    if not own and set(gains) != {1}:
+        before, after = weights @ shapes.gap, weights @ parting
+        share = np.clip(after / np.maximum(before, 1e-9), min(gains), max(gains))
+        # Closed after the gains where they closed the lips before.
+        wanted = np.maximum(share * before, np.minimum(before, LEAST_GAP))
+        weights = with_gap(weights, scaled, np.where(before > 0, wanted, before))
+    moved = apply_rig(rows, dict(zip(shapes.names, weights.T, strict=True)), solved.rate_hz)
+    return replace(moved, channels=tuple(Channel(name, WEIGHT) for name in moved.names))
+
+
+def plain_row(control: str, source: str) -> RigRow:
+    """Return the row of a blendshape that follows a curve as it is."""
+    return RigRow(control, source, low=0.0, high=1.0)
+
+
+def list_rows(mesh: Mesh, shapes: FaceShapes | None, others: Mapping[str, str]) -> Iterator[RigRow]:
+    """Yield the rows of a table that change nothing: every blendshape of a mesh, with the curve that moves it.
+
+    shapes : of its mouth;  others : the curves of eyes and brows by blendshapes
+    Blendshapes that nothing moves have an empty source.
+    """
+    for shape in mesh.shapes:
+        solved = None if shapes is None else _find_solved_name(shape, shapes)
+        source = others.get(shape.name, "")
+        if solved is not None and shapes is not None:
+            source = shapes.known[shapes.names.index(solved)].removeprefix("vowel_") or shape.name
+        yield plain_row(shape.name, source)
+
+
+def _find_solved_name(shape: Blendshape, shapes: FaceShapes) -> str | None:
+    """Return the name of the solved shape that a blendshape is, or is one of; None: it is none of the mouth."""
+    if shape.name in shapes.names:
+        return shape.name
+    known = {arkit_name(shape.called), spoken_name(shape.called)} - {None} if shape.source else set()
+    return next((name for name, each in zip(shapes.names, shapes.known, strict=True) if each in known), None)
 
 
 class DrivenPose(NamedTuple):
@@ -102,57 +158,55 @@ class DrivenCharacter:
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
 
-        Raises InputError: the character has no blendshapes of the mouth, or as ``shape_weights``.
+        Raises InputError: the character has no blendshapes of the mouth, or as ``solve_shape_weights``.
         """
         if self.shapes is None:
             raise InputError(
                 "the character is moved by control points and has no weights of blendshapes; write a video, or the "
                 "motion without --character"
             )
-        if self._own_curves is None:
-            return shape_weights(motion, units, self.shapes)
-        return self._own_curves.weights(motion, units, self.shapes)
+        if not self.table:
+            return solve_shape_weights(motion, units, self.shapes)
+        return _solve_with_table(motion, units, self.shapes, *self._mouth_rows)
 
     def poses(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
     ) -> list[DrivenPose]:
-        """Return the pose at some times in seconds, evenly spaced, for ``posed``.
+        """Return the pose at some times in seconds, evenly spaced, for ``place_vertices``.
 
         others : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
                  not have are left out; None: they stay at rest
-        A closure between two times is shown at the nearer one (``articulation.contact.shown_contact``).
-        Raises InputError: as ``point_motion``.
+        A closure between two times is shown at the nearer one (``articulation.contact.show_contact``).
+        Raises InputError: as ``move_points``.
         """
-        points = point_motion(motion, units)
-        count = len(time_s)
-        columns = [*self.beside(others or {}, count).values(), *(np.zeros(count) for _ in self._expressions)]
-        beside = np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+        points = move_points(motion, units)
+        other_rows = np.zeros((len(time_s), len(self._other_names)))
+        for column, curve in enumerate(self.weigh_others(others or {}, len(time_s)).values()):
+            other_rows[:, column] = curve
         moved, contact = points.expressed, points.mouth.contact
         if self.shapes is not None:
             moved = self.weights(motion, units).values.astype(np.float64)
-        rows = in_pictures(moved, contact, motion.rate_hz, time_s)
+        rows = sample_pictures(moved, contact, motion.rate_hz, time_s)
         moods = self.expressions(motion, points.mouth)
         if moods:
             table = np.stack([moods.get(name, np.zeros(len(contact))) for name in self._expressions.values()], axis=1)
-            beside[:, len(self._other_rows) :] = in_pictures(table, contact, motion.rate_hz, time_s)
-        return list(map(DrivenPose, rows, beside))
+            other_rows[:, len(self._other_rows) :] = sample_pictures(table, contact, motion.rate_hz, time_s)
+        return list(map(DrivenPose, rows, other_rows))
 
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
         """Return the weights of whole expressions that stand for moods, by the mesh's names [each shape=(T,)].
 
         None, where the character has finer shapes, or no expressions. Those that part the lips vanish in p, b and m.
         """
-        found = expression_weights(moods_shown(motion)) if self._expressions else {}
-        shown = [(name, own) for name, own in self._expressions.items() if name in found]
-        curves = {own: self.table.get(own, plain_row(own, name)).alone(found[name]) for name, own in shown}
-        return {
-            own: curve * mouth.free if self._parted_by(own) > LEAST_GAP / 2 else curve for own, curve in curves.items()
-        }
-
-    def _parted_by(self, name: str) -> float:
-        """Return how far a blendshape parts the middle of the lips, in eye distances."""
-        moved = self.placement.to_motion(self.mesh.displacements(self.placement.vertices, (name,)))[0]
-        return float(moved[self.placement.row(UPPER_MIDDLE), 1] - moved[self.placement.row(LOWER_MIDDLE), 1])
+        moods = expression_weights(read_moods(motion)) if self._expressions else {}
+        upper, lower = (self.placement.vertices[self.placement.row(point)] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
+        curves = {}
+        for name, own in self._expressions.items():
+            if name in moods:
+                curve = self.table.get(own, plain_row(own, name)).alone(moods[name])
+                moved = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (own,)))[0]
+                curves[own] = curve * mouth.free if moved[0, 1] - moved[1, 1] > LEAST_GAP / 2 else curve
+        return curves
 
     @cached_property
     def _expressions(self) -> dict[str, str]:
@@ -166,31 +220,29 @@ class DrivenCharacter:
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
     ) -> Iterator[Array]:
         """Yield the vertices at some times [each shape=(V, 3)], as of ``poses``."""
-        return map(self.posed, self.poses(motion, units, time_s, others))
+        return map(self.place_vertices, self.poses(motion, units, time_s, others))
 
-    def posed(self, pose: DrivenPose) -> Array:
-        """Return the vertices in a pose [shape=(V, 3)]."""
+    def place_vertices(self, pose: DrivenPose) -> Array:
+        """Return the vertices in a pose [shape=(V, 3)].
+
+        Raises InputError: the character has neither blendshapes of the mouth nor a binding.
+        """
+        of_mouth, of_others = self._displacements
         if self.shapes is not None:
             vertices = self.mesh.vertices.copy()
-            vertices[self.moving] += (pose.mouth @ self._displacements).reshape(-1, 3)
-            if pose.others.any():
-                vertices[self.moving] += (pose.others @ self._others).reshape(-1, 3)
-            return vertices
-        vertices = self._binding.moved(self.mesh, pose.mouth)
-        vertices[self.moving] += (pose.others @ self._others).reshape(-1, 3)
-        return vertices
-
-    @property
-    def _binding(self) -> ControlBinding:
-        """The weights of control points. Raises InputError: blendshapes move the character, and none of the mouth."""
-        if self.binding is None:
+            vertices[self.moving] += (pose.mouth @ of_mouth).reshape(-1, 3)
+        elif self.binding is None:
             raise InputError("the character has neither blendshapes of the mouth nor a binding; give it a binding")
-        return self.binding
+        else:
+            vertices = self.binding.moved(self.mesh, pose.mouth)
+        if pose.others.any():
+            vertices[self.moving] += (pose.others @ of_others).reshape(-1, 3)
+        return vertices
 
     @cached_property
     def moving(self) -> NDArray[np.int64]:
         """The vertices that ever move, but for the turning of the head, ascending [shape=(N,)]."""
-        names = {*self._mouth_names, *(row.control for row in self._other_rows), *self._expressions.values()}
+        names = {*self._mouth_names, *self._other_names}
         rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
         if self.binding is not None:
             rows.append(self.binding.rows)
@@ -201,7 +253,7 @@ class DrivenCharacter:
         others = (row.source for row in self._other_rows)
         return known in others or (self.shapes is not None and known in self.shapes.known)
 
-    def beside(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
+    def weigh_others(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
         """Return the weights of the blendshapes of eyes and brows over time, by the mesh's names [each shape=(T,)].
 
         others : weights of ARKit's blendshapes [each shape=(T,)]; those that are missing are 0;  count : of frames
@@ -211,12 +263,10 @@ class DrivenCharacter:
 
     def table_rows(self) -> tuple[RigRow, ...]:
         """Return the table of the character: the rows that it has, and for other blendshapes what moves them now."""
-        beside = {
-            shape.name: shape.called.lower() for shape in self.mesh.shapes if shape.called.lower() in VRM_EMOTIONS
-        }
-        beside |= {row.control: row.source for row in self._other_rows}
-        found = rows_found(self.mesh, self.shapes, beside)
-        return tuple(self.table.get(row.control, row) for row in found)
+        known = {shape.name: shape.called.lower() for shape in self.mesh.shapes}
+        others = {name: called for name, called in known.items() if called in VRM_EMOTIONS}
+        others |= {row.control: row.source for row in self._other_rows}
+        return tuple(self.table.get(row.control, row) for row in list_rows(self.mesh, self.shapes, others))
 
     @property
     def table_file(self) -> Path:
@@ -226,14 +276,21 @@ class DrivenCharacter:
         return table_path(self.file)
 
     @cached_property
-    def _own_curves(self) -> OwnCurves | None:
-        return own_curves(self.mesh, self.placement, self.shapes, self.table) if self.shapes else None
+    def _mouth_rows(self) -> tuple[tuple[RigRow, ...], Array]:
+        """The rows that move the mouth, by solved names, and how far each parts the lips [shape=(R,)]."""
+        parted, rows, numbers = measure_lip_parting(self.mesh, self.placement), list[RigRow](), list[int]()
+        for number, shape in enumerate(self.mesh.shapes):
+            solved = _find_solved_name(shape, self.shapes) if self.shapes else None
+            if solved is not None:
+                rows.append(replace(self.table.get(shape.name, plain_row(shape.name, shape.name)), source=solved))
+                numbers.append(number)
+        return tuple(rows), parted[numbers]
 
     @cached_property
     def _mouth_names(self) -> tuple[str, ...]:
-        if self._own_curves is not None:
-            return tuple(dict.fromkeys(row.control for row in self._own_curves.rows))
-        return self.shapes.names if self.shapes else ()
+        if self.shapes is None:
+            return ()
+        return tuple(dict.fromkeys(row.control for row in self._mouth_rows[0])) if self.table else self.shapes.names
 
     @cached_property
     def _other_rows(self) -> tuple[RigRow, ...]:
@@ -247,20 +304,20 @@ class DrivenCharacter:
         )
 
     @cached_property
-    def _displacements(self) -> Array:
-        """What every blendshape of the mouth does to the moving vertices [shape=(S, N · 3)]."""
-        return self._moved(self._mouth_names)
+    def _other_names(self) -> tuple[str, ...]:
+        return (*(row.control for row in self._other_rows), *self._expressions.values())
 
     @cached_property
-    def _others(self) -> Array:
-        """What the blendshapes of eyes and brows do to the moving vertices [shape=(S, N · 3)]."""
-        return self._moved((*(row.control for row in self._other_rows), *self._expressions.values()))
+    def _displacements(self) -> tuple[Array, Array]:
+        """What blendshapes of the mouth, and all others, do to the moving vertices [shape=(S, N · 3), both]."""
+        mouth, others = (
+            self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
+            for names in (self._mouth_names, self._other_names)
+        )
+        return mouth, others
 
-    def _moved(self, names: Sequence[str]) -> Array:
-        return self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
 
-
-def driven_character(
+def load_character(
     path: str | Path, *, points: Path | None = None, binding: Path | None = None, by_points: bool = False
 ) -> DrivenCharacter:
     """Return a character from its files, ready to be moved; with the table beside it, if there is one.
@@ -275,23 +332,22 @@ def driven_character(
     path, mesh = Path(path), with_jaw(read_character(path))
     table = read_character_table(path, mesh)
     mesh = with_sources(mesh, table)
-    is_stored = binding is not None and binding.suffix.lower() == BINDING_SUFFIX
     try:
-        if is_stored and binding is not None:
+        if binding is not None and binding.suffix.lower() == BINDING_SUFFIX:
             stored = load_binding(binding, mesh)
             return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
         if points is not None:
             named = read_points(points)
-            surface = surface_of_named(mesh, named)
-            placement = placed_by_points(mesh, surface, named)
+            surface = part_named_lips(mesh, named)
+            placement = place_lips_by_points(mesh, surface, named)
         else:
-            surface = mesh_surface(mesh)
-            placement = placed_by_shape(mesh, surface)
+            surface = build_surface(mesh)
+            placement = place_lips_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement), None, path, table)
+            return DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None, path, table)
         bound = bind(mesh, surface, placement)
         if binding is not None:
-            bound = painted(bound, mesh, read_weights(binding))
+            bound = paint_weights(bound, mesh, read_weights(binding))
         return DrivenCharacter(mesh, placement, None, bound, path, table)
     except InputError as error:
         text = str(error)

@@ -12,12 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.liveliness import GAZE_COUNTER_SHARE, Liveliness
+from lipmotion.articulation.liveliness import GAZE_COUNTER_SHARE, Liveliness, compute_liveliness
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights
-from lipmotion.meshes.model.head_angles import ANGLES
-from lipmotion.meshes.model.other_shapes import SIDES
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS
-from lipmotion.types import Motion
+from lipmotion.meshes.model.bones import ANGLES
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, SIDES
+from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
+from lipmotion.types.motion import RADIAN, WEIGHT
+from lipmotion.types.staging import Staging
 
 Array = NDArray[np.float64]
 
@@ -52,10 +53,8 @@ SPOKEN_SMILE, FULL_SMILE = 0.3, 0.75
 CORNERS = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthFrown") for side in SIDES)
 
 
-def given_movements(motion: Motion, time_s: Array) -> dict[str, Array]:
-    """Return what a motion says of eyes, brows, cheeks, nose, head and corners of the lips, at some times.
-
-    Each has the shape (len(time_s),).
+def find_movements(motion: Motion, time_s: Array) -> dict[str, Array]:
+    """Return what a motion says of eyes, brows, cheeks, nose, head and corners of the lips [each shape=(len(time_s),)].
 
     Blendshapes have ARKit's names, 0 to 1; angles of the head those of ``ANGLES``, in radians. Groups that never move
     are left out: exporters write curves that nothing was captured for as 0.
@@ -75,7 +74,7 @@ def moves_by_itself(part: str, given: Mapping[str, Array]) -> bool:
     return not {*MOVED_BY[part]} & {*given}
 
 
-def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
+def with_movements(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
     """Return movements of moods, and of what a face moves by itself, with those that are given.
 
     Faces that move both sides alike show the mean of both.
@@ -97,7 +96,7 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
         turn = np.stack([given.get(name, none) for name in ANGLES], axis=1)
         gaze = gaze - np.clip(GAZE_COUNTER_SHARE * turn[:, :2], -LARGEST_COUNTER_RAD, LARGEST_COUNTER_RAD)
     if not moves_by_itself("gaze", given):
-        gaze = given_gaze(given)
+        gaze = weights_to_gaze(given)
     of_mood = eye_and_brow_weights(moved)
     added = {unit: np.clip(moved.unit(unit) + units.get(unit, 0), 0, 1) for unit in {*moved.units, *units}}
     return replace(
@@ -115,7 +114,7 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
     )
 
 
-def given_gaze(given: Mapping[str, Array]) -> Array:
+def weights_to_gaze(given: Mapping[str, Array]) -> Array:
     """Return where both eyes look in the mean, to the character's left and upwards, in radians [shape=(F, 2)].
 
     given : the weights of ARKit's blendshapes that turn the eyes, all of them [each shape=(F,)]
@@ -126,7 +125,7 @@ def given_gaze(given: Mapping[str, Array]) -> Array:
     return FULL_LOOK_RAD / 2 * np.stack([across, upwards], axis=1)
 
 
-def gaze_weights(gaze: Array) -> dict[str, Array]:
+def gaze_to_weights(gaze: Array) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes that turn the eyes, 0 to 1 [each shape=(F,)].
 
     gaze : of both eyes, to the character's left and upwards, in radians [shape=(F, 2)]
@@ -141,7 +140,7 @@ def gaze_weights(gaze: Array) -> dict[str, Array]:
 
 def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(F,)]; given ones as they are."""
-    gaze, raised = gaze_weights(moved.gaze), np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
+    gaze, raised = gaze_to_weights(moved.gaze), np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
     moods: dict[str, Array] = {}  # of both sides alike
     if moved.units:
         moods = {name: moved.unit(number) for number, name in GIVEN_UNITS.items() if name != "mouthFrown"}
@@ -154,3 +153,41 @@ def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
         weights |= {f"{name}{side}": curve for name, curve in moods.items()}
     weights["browInnerUp"] = np.clip(raised + moved.unit(1), 0, 1)
     return weights | {**moved.given}
+
+
+def compute_living_curves(
+    motion: Motion,
+    units: Timeline[Unit],
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+    frames: slice = slice(None),
+) -> Motion:
+    """Return blinks, gaze, brows and the head's angles at the frames of a motion, by ARKit's names.
+
+    motion  : needs ``opening`` where the prosody is not known
+    staging : seed, and what moves on its own; None: everything moves
+    prosody : of the speech, for accents of brows and head; None: they follow the opening
+    frames  : those that are wanted
+    They are those of all faces with the same seed. Channels are blendshapes (weights), and ``ANGLES`` in radians.
+    """
+    moved = stage_liveliness(motion.time_s[frames], motion, units, staging, prosody)
+    curves = eye_and_brow_weights(moved) | dict(zip(ANGLES, moved.turn.T, strict=True))
+    channels = tuple(Channel(name, RADIAN if name in ANGLES else WEIGHT) for name in curves)
+    return Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
+
+
+def stage_liveliness(
+    time_s: NDArray[np.float64],
+    motion: Motion,
+    units: Timeline[Unit],
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Liveliness:
+    """Return what moves beside the mouth at some times, as a staging asks for it; None: everything moves.
+
+    motion, units, prosody : as of ``articulation.liveliness``; blinks, gaze, brows and angles of the head that the
+                             motion itself has take the place of what would move on its own
+    """
+    chosen, given = staging or Staging(), find_movements(motion, time_s)
+    moving = {part: getattr(chosen, part) and moves_by_itself(part, given) for part in MOVED_BY}
+    return with_movements(compute_liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving), given)

@@ -10,18 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import (
-    LEFT_CORNER,
-    LOWER_MIDDLE,
-    RIGHT_CORNER,
-    UPPER_MIDDLE,
-    MouthTemplate,
-    mouth_template,
-)
+from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE, mouth_template
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import arkit_name, viseme_name, vowel_name
-from lipmotion.meshes.model.surface import MeshSurface, mesh_surface
+from lipmotion.meshes.model.surface import MeshSurface, build_surface
 
 Rows = NDArray[np.int64]
 Places = NDArray[np.float64]
@@ -42,7 +35,7 @@ DEPTH_WEIGHT = 0.35
 """Distances in depth count so much where a point is looked for, for lips protrude differently."""
 EYE_CORNERS = (33, 263)
 """The outer corners of the eyes, right and left; in a list of named points they give the upright direction."""
-MOST_PAIRS, MOST_DISTANCES = 1_000_000, 1 << 30
+MAX_PAIRS, MAX_DISTANCES = 1_000_000, 1 << 30
 """Pairs of vertices that are compared, about, and distances that are looked at for it: of meshes that are so dense
 around the mouth, only some vertices are compared."""
 DISTANCES_AT_ONCE = 1 << 22
@@ -78,14 +71,14 @@ class LipPlacement:
         return displacements @ self.axes / self.scale
 
 
-def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
+def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     """Return where the lip points are, from the blendshape that opens the mouth.
 
     The lips meet where neighbours go apart as the mouth opens; the ends of that line are the inner corners. The
     character must stand upright and look along +z, as files of OBJ and glTF have it.
     Raises InputError: no blendshape opens the mouth, or the lips are not found.
     """
-    shape = opening_shape(mesh)
+    shape = find_opening_shape(mesh)
     drop = np.zeros(len(mesh.vertices))
     drop[shape.rows] = -shape.displacements[:, 1]
     still, moved = drop < 0.1 * drop.max(initial=0.0), drop > 0.5 * drop.max(initial=0.0)
@@ -93,7 +86,7 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     counts = [np.bincount(surface.pieces[chosen], minlength=count) for chosen in (still, moved)]
     skin = surface.pieces == int(np.minimum(*counts).argmax())
     drop = np.where(skin, drop, 0.0) / max(float(drop[skin].max(initial=0.0)), 1e-12)
-    middle = _slit(mesh.vertices, surface, drop, skin)
+    middle = _find_slit(mesh.vertices, surface, drop, skin)
     if len(middle) < 3:
         raise InputError(
             f"the blendshape {shortened(shape.name)!r} parts no lips; name the lip points by their vertices "
@@ -103,33 +96,38 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     right, left = middle[middle[:, 0].argmin()], middle[middle[:, 0].argmax()]
     scale = float(left[0] - right[0]) / template.inner_width
     order = np.argsort(middle[:, 0], kind="stable")
-    targets = _targets(template, scale, (right + left) / 2, middle[order])
+    targets = _aim(scale, (right + left) / 2, middle[order])
     rows = np.flatnonzero(skin)
     near = _tree(mesh.vertices[rows]).query(middle, k=min(12, len(rows)))[1].reshape(len(middle), -1)
     share = (drop[rows][near].max(axis=1) + drop[rows][near].min(axis=1)) / 2
     upper = drop < share[_tree(middle).query(mesh.vertices)[1]]
-    vertices = _nearest(mesh, surface, template, targets, skin, upper)
+    vertices = _choose_vertices(mesh.vertices, surface.normals[:, 2], targets, skin, upper)
     return LipPlacement(template.points, vertices, scale, np.eye(3))
 
 
-def placed_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int]) -> LipPlacement:
+def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int]) -> LipPlacement:
     """Return where the lip points are, from some that are named; the others are the nearest to the template.
 
-    named : vertex of each point; the corners (61, 291) and the middles of the inner lips (13, 14) are required.
-            With the
-            eye corners (33, 263) the head may be turned any way; without them it must stand upright and look along +z
+    named : vertex of each point; the corners (61, 291) and the middles of the inner lips (13, 14) are required. With
+            the eye corners (33, 263) the head may be turned any way; without, it must stand upright and look along +z
     Raises InputError: a required point is missing, a vertex does not exist, or the lips are one surface without a slit.
     """
     template = mouth_template()
-    _check_named(named, len(mesh.vertices), template)
+    _check_named(named, len(mesh.vertices))
     place = {point: mesh.vertices[vertex] for point, vertex in named.items()}
     centre = (place[RIGHT_CORNER] + place[LEFT_CORNER]) / 2
-    axes = _axes(place, centre)
+    axes = np.eye(3)
+    if all(point in place for point in EYE_CORNERS):  # x, y and z of the head as columns
+        right_eye, left_eye = (place[point] for point in EYE_CORNERS)
+        left = (left_eye - right_eye) / np.linalg.norm(left_eye - right_eye)
+        up = (right_eye + left_eye) / 2 - centre
+        up = up - left * (up @ left)
+        up = up / np.linalg.norm(up)
+        axes = np.stack([left, up, np.cross(left, up)], axis=1)
     scale = float(np.linalg.norm(place[LEFT_CORNER] - place[RIGHT_CORNER])) / template.width
-    upright = Mesh(mesh.vertices @ axes, mesh.triangles)
     lips = [place[point] @ axes for point in (RIGHT_CORNER, LEFT_CORNER)]
     lips.append((place[UPPER_MIDDLE] + place[LOWER_MIDDLE]) / 2 @ axes)
-    middle = np.array(sorted(lips, key=lambda p: float(p[0])))
+    middle = np.array(sorted(lips, key=lambda place: float(place[0])))
     apart = surface.distances(np.array([named[UPPER_MIDDLE], named[LOWER_MIDDLE]]), np.inf)
     if apart[0, named[LOWER_MIDDLE]] < 0.2 * scale * template.width:
         raise InputError(
@@ -138,21 +136,21 @@ def placed_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int])
         )
     skin = surface.pieces == surface.pieces[named[RIGHT_CORNER]]
     skin |= surface.pieces == surface.pieces[named[LOWER_MIDDLE]]
-    targets = _targets(template, scale, centre @ axes, middle)
-    vertices = _nearest(upright, surface, template, targets, skin, apart[0] < apart[1], axes)
+    targets = _aim(scale, centre @ axes, middle)
+    vertices = _choose_vertices(mesh.vertices @ axes, surface.normals @ axes[:, 2], targets, skin, apart[0] < apart[1])
     for point, vertex in named.items():
         if point in template.points:
             vertices[template.row(point)] = vertex
     return LipPlacement(template.points, vertices, scale, axes)
 
 
-def surface_of_named(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
+def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
     """Return how a mesh hangs together whose lip points are named: its lips are apart, also where they touch.
 
-    Raises InputError: as ``placed_by_points``.
+    Raises InputError: as ``place_lips_by_points``.
     """
-    _check_named(named, len(mesh.vertices), mouth_template())
-    surface = mesh_surface(mesh)
+    _check_named(named, len(mesh.vertices))
+    surface = build_surface(mesh)
     if surface.places[named[UPPER_MIDDLE]] != surface.places[named[LOWER_MIDDLE]]:
         return surface
     right, left = mesh.vertices[named[RIGHT_CORNER]], mesh.vertices[named[LEFT_CORNER]]
@@ -164,10 +162,10 @@ def surface_of_named(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
     off = from_middle - across[:, None] * along
     bend = (1 - np.square(np.clip(2 * across / max(width, 1e-12), -1, 1)))[:, None] * (lips - (lips @ along) * along)
     split = (np.abs(across) < 0.499 * width) & (np.linalg.norm(off - bend, axis=1) < LIP_LINE * width)
-    return mesh_surface(mesh, split)
+    return build_surface(mesh, split)
 
 
-def opening_shape(mesh: Mesh) -> Blendshape:
+def find_opening_shape(mesh: Mesh) -> Blendshape:
     """Return the blendshape that opens the mouth most plainly. Raises InputError: there is none.
 
     ARKit's ``jawOpen``, else the vowel or viseme ``aa``, else another whose name says so.
@@ -179,9 +177,9 @@ def opening_shape(mesh: Mesh) -> Blendshape:
         lambda name: "open" in name.lower() and ("mouth" in name.lower() or "jaw" in name.lower()),
     )
     for test in tests:
-        found = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.called)), None)
-        if found is not None:
-            return found
+        shape = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.called)), None)
+        if shape is not None:
+            return shape
     names = shortened(", ".join(mesh.shape_names)) or "none"
     raise InputError(
         f"no blendshape opens the mouth, required jawOpen, viseme_aa or aa; the mesh has: {names}. Say which one "
@@ -189,7 +187,7 @@ def opening_shape(mesh: Mesh) -> Blendshape:
     )
 
 
-def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np.bool_]) -> Places:
+def _find_slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np.bool_]) -> Places:
     """Return points along the line where the lips meet: middles of pairs that go apart [shape=(N, 3)]."""
     moved = vertices[skin & (drop > 0.5)]
     reach = SLIT_REACH * float(np.ptp(moved[:, 0])) if len(moved) else 0.0
@@ -198,12 +196,12 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
         return np.zeros((0, 3))
     tree = _tree(vertices[high])
     count = int(tree.count_neighbors(_tree(vertices[low]), reach))
-    crowd = 1 + max(count // MOST_PAIRS, len(low) * len(vertices) // MOST_DISTANCES)
+    crowd = 1 + max(count // MAX_PAIRS, len(low) * len(vertices) // MAX_DISTANCES)
     if crowd > 1:
         low = np.sort(np.random.default_rng(0).choice(low, -(-len(low) // crowd), replace=False))
-    found = tree.query_ball_point(vertices[low], reach)
-    near = np.fromiter(chain.from_iterable(found), np.int64)
-    pairs = np.stack([np.repeat(low, [len(each) for each in found]), high[near]], axis=1)
+    near = tree.query_ball_point(vertices[low], reach)
+    others = high[np.fromiter(chain.from_iterable(near), np.int64)]
+    pairs = np.stack([np.repeat(low, [len(each) for each in near]), others], axis=1)
     pairs = pairs[drop[pairs[:, 0]] - drop[pairs[:, 1]] > SLIT_STEP]
     far = np.zeros(len(pairs), bool)
     straight = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
@@ -216,10 +214,10 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
         far[here] = along[number[here] - first, pairs[here, 1]] > longest[here]
     pairs = pairs[far]
     middle = (vertices[pairs[:, 0]] + vertices[pairs[:, 1]]) / 2
-    return middle[middle[:, 2] > _foremost(middle, reach / 4) - FRONT_SHARE * reach / SLIT_REACH]
+    return middle[middle[:, 2] > _max_depths(middle, reach / 4) - FRONT_SHARE * reach / SLIT_REACH]
 
 
-def _foremost(places: Places, reach: float) -> Places:
+def _max_depths(places: Places, reach: float) -> Places:
     """Return the largest z of all places whose x is within a reach of that of each [shape=(N,)]."""
     order = np.argsort(places[:, 0], kind="stable")
     across = places[order, 0]
@@ -235,9 +233,9 @@ def _foremost(places: Places, reach: float) -> Places:
     return largest
 
 
-def _targets(template: MouthTemplate, scale: float, centre: Places, middle: Places) -> Places:
-    """Return where the points should be on a mouth whose lips meet along ``middle``, from right to left [shape=(52,
-    3)]."""
+def _aim(scale: float, centre: Places, middle: Places) -> Places:
+    """Return where the points should be where lips meet along ``middle``, right to left [shape=(52, 3)]."""
+    template = mouth_template()
     targets = centre + scale * (template.places - template.centre)
     seam = np.interp(targets[:, 0], middle[:, 0], middle[:, 1])
     depth = np.interp(targets[:, 0], middle[:, 0], middle[:, 2])
@@ -248,46 +246,26 @@ def _targets(template: MouthTemplate, scale: float, centre: Places, middle: Plac
     return targets
 
 
-def _nearest(
-    mesh: Mesh,
-    surface: MeshSurface,
-    template: MouthTemplate,
-    targets: Places,
-    skin: NDArray[np.bool_],
-    upper: NDArray[np.bool_],
-    axes: Places | None = None,
+def _choose_vertices(
+    places: Places, forward: Places, targets: Places, skin: NDArray[np.bool_], upper: NDArray[np.bool_]
 ) -> Rows:
     """Return the vertex of each point: the nearest one of the skin on its side of the lips that faces forwards."""
-    stretch = np.array([1.0, 1.0, DEPTH_WEIGHT])
-    forward = surface.normals[:, 2] if axes is None else surface.normals @ axes[:, 2]
+    template, stretch = mouth_template(), np.array([1.0, 1.0, DEPTH_WEIGHT])
     facing = skin & (forward > 0.0)
-    found = np.zeros(len(targets), np.int64)
+    chosen = np.zeros(len(targets), np.int64)
     sides = ((template.upper, upper), (template.lower | template.jaw, ~upper), (template.corner, np.ones_like(upper)))
-    for chosen, side in sides:
+    for of_side, side in sides:
         for edge, candidates in ((template.inner, skin & side), (~template.inner, facing & side)):
-            rows = np.flatnonzero(candidates)
-            if (chosen & edge).any():
+            points, rows = of_side & edge, np.flatnonzero(candidates)
+            if points.any():
                 if not len(rows):
                     raise InputError("no vertices are on one side of the lips; name the lip points by their vertices")
-                tree = _tree(mesh.vertices[rows] * stretch)
-                found[chosen & edge] = rows[tree.query(targets[chosen & edge] * stretch)[1]]
-    return found
+                chosen[points] = rows[_tree(places[rows] * stretch).query(targets[points] * stretch)[1]]
+    return chosen
 
 
-def _axes(place: Mapping[int, Places], centre: Places) -> Places:
-    """Return x, y and z of the head as columns, from the eye corners; without them, those of the mesh."""
-    if not all(point in place for point in EYE_CORNERS):
-        return np.eye(3)
-    eyes = (place[EYE_CORNERS[0]] + place[EYE_CORNERS[1]]) / 2
-    left = place[EYE_CORNERS[1]] - place[EYE_CORNERS[0]]
-    left = left / np.linalg.norm(left)
-    up = eyes - centre
-    up = up - left * (up @ left)
-    up = up / np.linalg.norm(up)
-    return np.stack([left, up, np.cross(left, up)], axis=1)
-
-
-def _check_named(named: Mapping[int, int], vertices: int, template: MouthTemplate) -> None:
+def _check_named(named: Mapping[int, int], vertices: int) -> None:
+    points = mouth_template().points
     missing = [point for point in NEEDED if point not in named]
     if missing:
         raise InputError(
@@ -295,8 +273,8 @@ def _check_named(named: Mapping[int, int], vertices: int, template: MouthTemplat
             "13 and 14 (middles of the upper and lower inner lip)"
         )
     for point, vertex in named.items():
-        if point not in template.points and point not in EYE_CORNERS:
-            raise InputError(f"{point} is no lip or jaw point, required one of {', '.join(map(str, template.points))}")
+        if point not in points and point not in EYE_CORNERS:
+            raise InputError(f"{point} is no lip or jaw point, required one of {', '.join(map(str, points))}")
         if not 0 <= vertex < vertices:
             raise InputError(f"the point {point} is vertex {vertex}, required 0 to {vertices - 1}")
     if len({named[point] for point in NEEDED}) < len(NEEDED):

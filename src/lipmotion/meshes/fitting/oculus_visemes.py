@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.crossfade import phone_weights
+from lipmotion.articulation.crossfade import crossfade_phones
 from lipmotion.articulation.mouth import SpokenMouth
-from lipmotion.articulation.pauses import without_short_pauses
+from lipmotion.articulation.pauses import share_short_pauses
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
@@ -36,40 +36,33 @@ NEAREST_VOWEL = {
     **{"aa": "aa", "ih": "ih", "oh": "oh", "ou": "ou"},
 }
 """The vowel of VRM for each viseme that opens the mouth."""
-
-
 LAX = "E"
 """The viseme of parted lips in a pause."""
-MOST_CLOSED_WEIGHT = 0.85
+MAX_CLOSED_WEIGHT = 0.85
 """Largest sum of the visemes of closed lips where the lips are parted."""
 CLOSED_GAPS, PARTED_GAPS = (0.0, 0.04), (0.06, 0.16)
 """Gaps between which the least, and the largest, sum of the visemes of closed lips falls to 0, in eye distances."""
-LEAST_WEIGHT = 1e-6
+MIN_WEIGHT = 1e-6
 
 
-def viseme_of(phone: str) -> str:
-    """Return the viseme of a phone; ``sil`` of an empty or unknown one."""
-    return VISEME_OF_PHONE.get(phone, "sil")
-
-
-def viseme_motion(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
+def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
     """Return the weights of the 15 visemes over time, channels ``viseme_sil``, ``viseme_PP``, ...; 0 to 1.
 
     units : phones in time;  mouth : that they move
     At every time the weights add up to 1. The visemes of closed lips, ``viseme_sil`` and ``viseme_PP``, add up to 1
-    where the lips of the mouth touch, and to at most ``MOST_CLOSED_WEIGHT`` where they do not.
+    where the lips of the mouth touch, and to at most ``MAX_CLOSED_WEIGHT`` where they do not.
     """
-    said = viseme_curves(units, np.arange(len(mouth.gap)) / mouth.rate_hz)
-    asked = said["sil"] + said["PP"]
-    least, most = (
-        MOST_CLOSED_WEIGHT * np.clip((far - mouth.gap) / (far - near), 0, 1) for near, far in (CLOSED_GAPS, PARTED_GAPS)
+    phones = viseme_curves(units, np.arange(len(mouth.gap)) / mouth.rate_hz)
+    wanted = phones["sil"] + phones["PP"]
+    low, high = (
+        MAX_CLOSED_WEIGHT * np.clip((far - mouth.gap) / (far - near), 0, 1) for near, far in (CLOSED_GAPS, PARTED_GAPS)
     )
-    closed = np.where(mouth.contact, 1.0, np.maximum(least, np.minimum(asked, most)))
-    silent = np.divide(said["sil"], asked, out=np.zeros_like(asked), where=asked > LEAST_WEIGHT)
-    spoken = np.divide(1 - closed, 1 - asked, out=np.zeros_like(asked), where=asked < 1 - LEAST_WEIGHT)
-    curves = {name: spoken * curve for name, curve in said.items()}
+    closed = np.where(mouth.contact, 1.0, np.maximum(low, np.minimum(wanted, high)))
+    silent = np.divide(phones["sil"], wanted, out=np.zeros_like(wanted), where=wanted > MIN_WEIGHT)
+    spoken = np.divide(1 - closed, 1 - wanted, out=np.zeros_like(wanted), where=wanted < 1 - MIN_WEIGHT)
+    curves = {name: spoken * curve for name, curve in phones.items()}
     curves |= {"sil": closed * silent, "PP": closed * (1 - silent)}
-    curves[LAX] += np.where(asked < 1 - LEAST_WEIGHT, 0.0, 1 - closed)
+    curves[LAX] += np.where(wanted < 1 - MIN_WEIGHT, 0.0, 1 - closed)
     values = np.stack([np.clip(curves[name], 0, 1) for name in VISEMES_15], axis=1)
     return Motion(values, mouth.rate_hz, tuple(Channel(name, WEIGHT) for name in VISEME_CHANNELS))
 
@@ -79,5 +72,5 @@ def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[st
 
     Pauses in which the mouth goes on (``articulation.pauses``) belong to the phones beside them.
     """
-    said = phone_weights(without_short_pauses(units), time_s, viseme_of)
-    return {name: np.clip(said.get(name, np.zeros(len(time_s))), 0.0, 1.0) for name in VISEMES_15}
+    weights = crossfade_phones(share_short_pauses(units), time_s, lambda phone: VISEME_OF_PHONE.get(phone, "sil"))
+    return {name: np.clip(weights.get(name, np.zeros(len(time_s))), 0.0, 1.0) for name in VISEMES_15}

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.articulation.mouth import LEAST_CHIN_DROP_SHARE, SpokenMouth, jaw_drop, spoken_mouth, upper_share
-from lipmotion.articulation.rest import rest_frames
+from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.types import Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
-LEAST_PROTRUSION = 0.03
+MIN_PROTRUSION = 0.03
 """Protruded lips are at least so far in front of their rest pose, in eye distances."""
 CORNER_RISE, CORNER_FALL = 0.1, 0.07
 """How far points of the corners rise in a full smile, and fall where a mood pulls them down, in eye distances."""
@@ -46,11 +46,11 @@ class PointMotion:
         return moved
 
 
-def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
+def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     """Return the motion of lip and jaw points away from the rest pose, which is that of the silences.
 
     Motion that has points is taken as it is; of motion with distances alone (``opening``, perhaps ``width``, ``outer``)
-    the points are made up, as mouths usually move. Motion of blendshapes alone moves the mouth of ``reference_mouth``.
+    the points are made up, as mouths usually move. Motion of blendshapes alone moves ``blendshape_motion.arkit_mouth``.
     Gap, width and protrusion are those of the mouth (``articulation.mouth.spoken_mouth``).
     units : phones in time
     Raises InputError: as ``spoken_mouth``, or values that are not finite.
@@ -59,37 +59,27 @@ def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     mouth = spoken_mouth(motion, units)
     if not np.isfinite(motion.values).all():
         raise InputError("the motion has values that are not finite; interpolate the missing frames first")
-    rest, template = rest_frames(motion, units), mouth_template()
+    rest, template = find_rest_frames(motion, units), mouth_template()
     names = [[f"{axis}_{point}" for axis in "xyz"] for point in template.points]
     if all(name in motion.names for row in names for name in row):
         places = np.stack([np.stack([motion[name] for name in row], axis=1) for row in names], axis=1)
         moved = places.astype(np.float64) - np.median(places[rest], axis=0)
     else:
-        moved = _made_up(motion, rest, mouth)
-    return PointMotion(_as_spoken(moved, mouth), mouth)
-
-
-def _as_spoken(displacements: Array, mouth: SpokenMouth) -> Array:
-    """Return displacements with gap, width and protrusion of the mouth [shape=(T, 52, 3)].
-
-    The lips of a person at rest are not wholly closed; both lips share the correction of the gap.
-    """
-    template = mouth_template()
-    moved = displacements.copy()
-    lips, half = ~template.jaw, template.width / 2
-    across = np.clip(template.places[:, 0] / half, -1, 1)
-    right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
+        moved = _invent_points(motion, rest, mouth)
+    # now with gap, width and protrusion of the mouth: the lips of a person at rest are not wholly closed
+    across = np.clip(template.places[:, 0] / (template.width / 2), -1, 1)
+    lips, right, left = ~template.jaw, template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
     wider = (mouth.width - 1) * template.width - (moved[:, left, 0] - moved[:, right, 0])
     moved[:, lips, 0] += np.outer(wider / 2, across[lips])
-    forward = np.maximum(LEAST_PROTRUSION * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
+    forward = np.maximum(MIN_PROTRUSION * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
     moved[:, lips, 2] += forward[:, None]
-    moved[:, :, 1] += _parting(moved[:, :, 1], across, mouth.gap)
+    moved[:, :, 1] += _part_lips(moved[:, :, 1], across, mouth.gap)
     higher = moved[:, template.row(CHIN), 1] + LEAST_CHIN_DROP_SHARE * jaw_drop(mouth.gap) * (1 - mouth.tuck)
     moved[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
-    return moved
+    return PointMotion(moved, mouth)
 
 
-def _parting(heights: Array, across: Array, gap: Array) -> Array:
+def _part_lips(heights: Array, across: Array, gap: Array) -> Array:
     """Return how the points of both lips move up or down for a gap between their middles [shape=(T, 52)].
 
     heights : displacements of all points [shape=(T, 52)];  across : where they are, -1 to 1 [shape=(52,)]
@@ -99,11 +89,11 @@ def _parting(heights: Array, across: Array, gap: Array) -> Array:
     pairs = np.array([(template.row(upper), template.row(lower)) for upper, lower in FACING])
     pairs = pairs[np.argsort(across[pairs[:, 0]], kind="stable")]
     places, half = across[pairs[:, 0]], len(pairs) // 2
-    own = heights[:, pairs[:, 0]] - heights[:, pairs[:, 1]]
-    middle = own[:, [half]]
+    apart = heights[:, pairs[:, 0]] - heights[:, pairs[:, 1]]
+    middle = apart[:, [half]]
     known = np.clip(middle / KNOWN_GAP, 0, 1)
-    shape = known * own / np.maximum(middle, KNOWN_GAP / 10) + (1 - known) * np.sqrt(1 - places**2)
-    lacking = np.clip(shape, 0, 1.2) * gap[:, None] - own
+    shape = known * apart / np.maximum(middle, KNOWN_GAP / 10) + (1 - known) * np.sqrt(1 - places**2)
+    lacking = np.clip(shape, 0, 1.2) * gap[:, None] - apart
     lacking[:, half] = gap - middle[:, 0]
     lacking, places = np.pad(lacking, ((0, 0), (1, 1))), np.concatenate([[-1.0], places, [1.0]])
     lips = np.flatnonzero(template.upper | template.lower)
@@ -116,7 +106,7 @@ def _parting(heights: Array, across: Array, gap: Array) -> Array:
     return moved
 
 
-def _made_up(motion: Motion, rest: NDArray[np.bool_], mouth: SpokenMouth) -> Array:
+def _invent_points(motion: Motion, rest: NDArray[np.bool_], mouth: SpokenMouth) -> Array:
     """Return displacements of the points from distances alone [shape=(T, 52, 3)]."""
     template = mouth_template()
     across = np.clip(template.places[:, 0] / (template.width / 2), -1, 1)

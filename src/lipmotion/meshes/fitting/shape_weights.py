@@ -2,70 +2,84 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import LEAST_GAP, gap_in
+from lipmotion.articulation.contact import LEAST_GAP, read_gap
 from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.articulation.mouth import SpokenMouth
-from lipmotion.meshes.fitting.blendshape_motion import given_weights, with_mouth
-from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
-from lipmotion.meshes.fitting.facial_animation import mood_weights
+from lipmotion.errors import InputError
+from lipmotion.meshes.fitting.blendshape_motion import find_own_weights, with_mouth
 from lipmotion.meshes.fitting.oculus_visemes import NEAREST_VOWEL, viseme_curves
-from lipmotion.meshes.fitting.point_motion import PointMotion, point_motion
+from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
+from lipmotion.meshes.model.shape_names import SIDES
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
-PUCKER, FUNNEL = 0.5, 0.3
-"""Least weights of ``mouthPucker`` and ``mouthFunnel`` in a phone of roundness 1."""
+LARGEST_EIGENVALUE = 16.0
+"""The largest eigenvalue of the squared second difference."""
+MAX_STEPS, TOLERANCE = 2000, 1e-5
+"""Iteration stops after so many steps, or when no weight changes by more than the second number in one."""
+SIDED_SHAPES = {
+    "mouthSmile": ("smile", 0.75),
+    "mouthFrown": ("frown", 0.9),
+    "mouthStretch": ("stretched", 0.7),
+    "mouthUpperUp": ("upper_raise", 0.6),
+    "mouthPress": ("tight", 0.5),
+}
+"""By blendshapes of both sides: the curve of the spoken mouth that they show, and their weight where it is 1."""
+MIDDLE_SHAPES = {"mouthShrugLower": ("chin_raise", 0.5), "mouthRollUpper": ("tight", 0.15)}
+"""The same of blendshapes that have no sides."""
+MOOD_SHAPES = {f"{name}{side}": row for name, row in SIDED_SHAPES.items() for side in SIDES} | MIDDLE_SHAPES
+EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
+    "happy": (("happy", 1.0),),
+    "sad": (("sad", 1.0),),
+    "angry": (("angry", 1.0),),
+    "surprised": (("surprised", 1.0),),
+    "afraid": (("surprised", 0.5), ("sad", 0.5)),
+    "disgusted": (("angry", 0.6), ("sad", 0.3)),
+    "tense": (("angry", 0.4),),
+    "tired": (("sad", 0.3), ("relaxed", 0.4)),
+}
+"""The expressions of VRM that stand for a mood, with their weights, on characters without finer shapes."""
+ROUNDING = {"mouthPucker": 0.5, "mouthFunnel": 0.3}
+"""Least weights in a phone of roundness 1."""
 NARROWING = 0.11
 """Both together make the mouth narrower by this, in eye distances; there is less, or more, of them for it."""
 SHARES = (0.6, 1.4)
 """The least and the largest share of them that there is then."""
-SPREADING = tuple(
-    f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mouthDimple") for side in ("Left", "Right")
-)
+SPREADING = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mouthDimple") for side in SIDES)
 """Shapes that draw the corners apart: they vanish in round phones."""
-
-
-def rounded_weights(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
-    """Return weights of blendshapes with lips at least as round as they are protruded [shape=(T, S)].
-
-    weights : as solved from the points [shape=(T, S)];  protrusion : 0 to 1 [shape=(T,)]
-    """
-    result = weights.copy()
-    template = mouth_template()
-    right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
-    wanted = [(shapes.row(name), most) for name, most in (("mouthPucker", PUCKER), ("mouthFunnel", FUNNEL))]
-    present = [(row, most) for row, most in wanted if row is not None]
-    narrower = sum(most * float(shapes.moved[row, right, 0] - shapes.moved[row, left, 0]) for row, most in present)
-    share = float(np.clip(NARROWING / narrower, *SHARES)) if narrower > 0 else 1.0
-    for row, most in present:
-        result[:, row] = np.maximum(result[:, row], share * most * protrusion)
-    rows = [row for row in map(shapes.row, SPREADING) if row is not None]
-    result[:, rows] *= (1 - protrusion)[:, None]
-    return result
-
-
 DEPTH_WEIGHT, JAW_WEIGHT, CORNER_WEIGHT, GAP_WEIGHT = 0.4, 0.5, 4.0, 2.0
-"""Weights of distances in depth, of the jaw, of the corners across, and of the gap between the lips, beside 1 for
-lips."""
+"""Weights of depth, of the jaw, of the corners across, and of the gap between the lips, where lips have 1."""
 PAIR_WEIGHT = 0.15
 """Weight of the difference between the left and the right of a pair."""
 VISEME_WEIGHT = 0.2
 """Weight of the visemes that the phones say, beside what the points say."""
 PRESS_DEPTH = 0.01
 """In p, b and m the lips are closed this much further than to touch, in eye distances: no light between them."""
-LEAST_PARTING = 0.004
+MIN_PARTING = 0.004
 """Shapes that part the lips by less than this, in eye distances, are not used to part or to close them."""
 PRESS_WEIGHT, UPPER_ROLL_WEIGHT, LOWER_ROLL_WEIGHT, TONGUE_WEIGHT = 0.2, 0.1, 0.55, 0.3
 """Weights of ARKit's blendshapes for what lip points do not show: lips that are pressed together (``mouthPressLeft``,
 ``mouthPressRight``, ``mouthRollUpper``), a lower lip on the teeth, a tongue between the teeth."""
+
+
+@dataclass(frozen=True)
+class CurveCosts:
+    """What curves cost beside their distance from the targets.
+
+    ridge  : of the squared weights themselves, against shapes that move much to change little
+    smooth : of their squared second differences in time
+    """
+
+    ridge: float = 1e-3
+    smooth: float = 1e-1
 
 
 @dataclass(frozen=True)
@@ -80,7 +94,7 @@ class SolverOptions:
     gestures: bool = True
 
 
-def shape_weights(
+def solve_shape_weights(
     motion: Motion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions | None = None
 ) -> Motion:
     """Return the weights of blendshapes over time: one channel a blendshape, by the mesh's names, 0 to 1.
@@ -91,62 +105,199 @@ def shape_weights(
     The lips are together where the spoken mouth has them together, and nowhere else: with ``mouthClose``, where the
     mesh has it, the jaw may stay open behind closed lips. ``mouthClose`` is never more than ``jawOpen`` in solved
     weights.
-    Raises InputError: as ``point_motion``.
+    Raises InputError: as ``move_points``.
     """
     options = options or SolverOptions()
-    points = point_motion(motion, units)
-    given, mood = given_weights(motion, shapes), mood_weights(points.mouth, shapes)
-    if given is not None:
-        weights = _closed_as_spoken(given.values.astype(np.float64), with_mouth(motion), points.mouth, shapes, mood)
+    points = move_points(motion, units)
+    mouth, channels = points.mouth, tuple(Channel(name, WEIGHT) for name in shapes.names)
+    own, mood = find_own_weights(motion, shapes), mood_weights(mouth, shapes)
+    if own is not None:
+        weights = _close_own_weights(own.values.astype(np.float64), with_mouth(motion), mouth, shapes, mood)
+        return Motion(weights, motion.rate_hz, channels)
+    matrix = _weigh_rows(shapes.moved, shapes.gap)
+    if shapes.style == "visemes":
+        spoken = np.zeros((len(mouth.gap), len(shapes.names)))
+        for viseme, curve in viseme_curves(units, np.arange(len(spoken)) / mouth.rate_hz).items():
+            row = shapes.row(f"viseme_{viseme}")
+            row = shapes.row(f"vowel_{NEAREST_VOWEL.get(viseme)}") if row is None else row
+            if row is not None:
+                spoken[:, row] += curve
+        targets = np.concatenate([_weigh_rows(points.displacements, mouth.gap), VISEME_WEIGHT * spoken], axis=1)
+        matrix = np.concatenate([matrix, VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
+        weights = fit_bounded_curves(matrix, targets, options.costs)
     else:
-        if shapes.style == "visemes":
-            time_s = np.arange(len(points.mouth.gap)) / points.mouth.rate_hz
-            said = np.zeros((len(time_s), len(shapes.names)))
-            for viseme, curve in viseme_curves(units, time_s).items():
-                vowel = NEAREST_VOWEL.get(viseme)
-                row = shapes.row(f"viseme_{viseme}")
-                if row is None and vowel is not None:
-                    row = shapes.row(f"vowel_{vowel}")
-                if row is not None:
-                    said[:, row] += curve
-            matrix = np.concatenate([_rows(shapes), VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
-            targets = np.concatenate([_targets(points), VISEME_WEIGHT * said], axis=1)
-            weights = bounded_curves(matrix, targets, options.costs)
+        displacements = points.displacements.copy()
+        if mood is not None:  # what the shapes of a mood do to the width of the mouth is theirs
+            displacements[..., 0] -= mood @ shapes.moved[..., 0]
+        weights = _solve_free_weights(_weigh_rows(displacements, mouth.gap), matrix, mouth, shapes, options)
+        weights = _add_mood(weights, mood)
+    weights = with_gap(weights, shapes, mouth.gap - PRESS_DEPTH * mouth.closing)
+    return Motion(weights, motion.rate_hz, channels)
+
+
+def fit_bounded_curves(
+    matrix: Array, targets: Array, costs: CurveCosts | None = None, ties: Array | None = None
+) -> Array:
+    """Return weights w between 0 and 1 that minimise the distance of ``w @ matrix`` from targets [shape=(T, S)].
+
+    matrix  : what each of S shapes adds at weight 1 [shape=(S, D)]
+    targets : one row a frame [shape=(T, D)]
+    ties    : further rows that should be 0, as left weight − right weight [shape=(R, S)]
+    Minimises Σ_t ‖w_t M − d_t‖² + ridge ‖w_t‖² + ‖ties w_t‖² + smooth ‖w_{t−1} − 2 w_t + w_{t+1}‖², 0 ≤ w ≤ 1.
+    Raises InputError: shapes of arrays that do not fit, or values that are not finite.
+    Source: Beck & Teboulle 2009 (FISTA), with the restart of O'Donoghue & Candès 2015 and a diagonal preconditioner.
+    Cost: O(T·S²) a step; some hundred steps.
+    """
+    costs = costs or CurveCosts()
+    if matrix.ndim != 2 or targets.ndim != 2 or matrix.shape[1] != targets.shape[1]:
+        raise InputError(f"shapes {matrix.shape} and targets {targets.shape} do not fit, required (S, D) and (T, D)")
+    if not (np.isfinite(matrix).all() and np.isfinite(targets).all()):
+        raise InputError("shapes or targets have values that are not finite")
+    square = matrix @ matrix.T + costs.ridge * np.eye(len(matrix))
+    if ties is not None:
+        square = square + ties.T @ ties
+    scale = np.sqrt(np.diag(square))
+    wanted = targets @ matrix.T / scale
+    square = square / np.outer(scale, scale)
+    smooth = costs.smooth / scale**2
+    step = 1 / (np.linalg.eigvalsh(square)[-1] + LARGEST_EIGENVALUE * float(smooth.max(initial=0.0)))
+    decay, pull, stiffness = np.eye(len(square)) - step * square, step * wanted, step * smooth
+    current = ahead = np.clip(wanted, 0, scale)
+    momentum, seconds = 1.0, np.zeros((len(targets) + 2, len(matrix)))  # its first and last two rows stay 0
+    for _ in range(MAX_STEPS):
+        following = ahead @ decay  # a step along the gradient, in place: most time goes into the calls of NumPy
+        following += pull
+        if len(ahead) > 2:
+            inner = seconds[2:-2]
+            np.subtract(ahead[:-2], ahead[1:-1], out=inner)
+            inner -= ahead[1:-1]
+            inner += ahead[2:]
+        fourths = seconds[2:] - seconds[1:-1]
+        fourths -= seconds[1:-1]
+        fourths += seconds[:-2]
+        fourths *= stiffness
+        following -= fourths
+        np.clip(following, 0, scale, out=following)
+        change = following - current
+        if np.vdot(ahead - following, change) > 0:
+            momentum, ahead = 1.0, following
         else:
-            free = points
-            if mood is not None:  # what the shapes of a mood do to the width of the mouth is theirs
-                displacements = points.displacements.copy()
-                displacements[..., 0] -= mood @ shapes.moved[..., 0]
-                free = replace(points, displacements=displacements)
-            weights = _with_mood(_free_weights(free, shapes, options), mood)
-        weights = with_gap(weights, shapes, points.mouth.gap - PRESS_DEPTH * points.mouth.closing)
-    return Motion(weights, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
+            faster = (1 + np.sqrt(1 + 4 * momentum * momentum)) / 2
+            ahead = following + (momentum - 1) / faster * change
+            momentum = faster
+        current = following
+        if np.abs(change / scale).max(initial=0.0) < TOLERANCE * step:
+            break
+    return np.clip(current / scale, 0, 1)
 
 
-def _with_mood(weights: Array, mood: Array | None) -> Array:
+def _weigh_rows(displacements: Array, gap: Array) -> Array:
+    """Return displacements of the points [shape=(N, 52, 3)] and gaps as rows of the least squares problem."""
+    template = mouth_template()
+    weights = np.where(template.jaw[:, None], JAW_WEIGHT, 1.0) * np.array([1.0, 1.0, DEPTH_WEIGHT])
+    weights[template.corner, 0] *= CORNER_WEIGHT
+    inner = [template.row(point) for pair in FACING[:3] for point in pair]
+    weights[inner, 1] *= 0.5  # the gap says it
+    flat = (displacements * weights).reshape(len(displacements), -1)
+    return np.concatenate([flat, GAP_WEIGHT * gap[:, None]], axis=1)
+
+
+def _solve_free_weights(
+    targets: Array, matrix: Array, mouth: SpokenMouth, shapes: FaceShapes, options: SolverOptions
+) -> Array:
+    """Return the weights of ARKit's or a mesh's own shapes [shape=(T, S)]; some follow the phones, not the points."""
+    fixed = np.zeros((len(mouth.gap), len(shapes.names)))
+    if options.gestures:
+        for name, curve in {
+            **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS_WEIGHT * mouth.closing),
+            "mouthRollUpper": UPPER_ROLL_WEIGHT * mouth.closing,
+            "mouthRollLower": LOWER_ROLL_WEIGHT * mouth.tuck,
+            "tongueOut": TONGUE_WEIGHT * mouth.between_teeth,
+        }.items():
+            if name in shapes.known:
+                fixed[:, shapes.known.index(name)] = curve
+    free = np.array([name not in NOT_FROM_POINTS for name in shapes.known])
+    targets = targets - fixed @ matrix
+    jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
+    if jaw is not None and close is not None:
+        matrix[close] += matrix[jaw]  # as one: the jaw opens behind closed lips
+    weights = fixed.copy()
+    weights[:, free] += fit_bounded_curves(matrix[free], targets, options.costs, PAIR_WEIGHT * shapes.pairs()[:, free])
+    if jaw is not None and close is not None:
+        weights[:, jaw] += weights[:, close]
+    if options.gestures:
+        weights = round_lips(weights, shapes, mouth.protrusion)
+    return np.clip(weights, 0.0, 1.0)
+
+
+def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
+    """Return weights of blendshapes with lips at least as round as they are protruded [shape=(T, S)].
+
+    weights : as solved from the points [shape=(T, S)];  protrusion : 0 to 1 [shape=(T,)]
+    """
+    result, template = weights.copy(), mouth_template()
+    right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
+    present = {row: full for name, full in ROUNDING.items() if (row := shapes.row(name)) is not None}
+    narrower = sum(
+        full * float(shapes.moved[row, right, 0] - shapes.moved[row, left, 0]) for row, full in present.items()
+    )
+    share = float(np.clip(NARROWING / narrower, *SHARES)) if narrower > 0 else 1.0
+    for row, full in present.items():
+        result[:, row] = np.maximum(result[:, row], share * full * protrusion)
+    result[:, np.isin(shapes.known, SPREADING)] *= (1 - protrusion)[:, None]
+    return result
+
+
+def mood_weights(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:
+    """Return the weights of ARKit's blendshapes of the mouth in a mood, 0 to 1 [shape=(T, S)]; None: in none.
+
+    They leave the lips as free as the phones need (``articulation.mouth``); the distance between the lips is set
+    afterwards (``with_gap``).
+    """
+    weights = np.zeros((len(mouth.gap), len(shapes.names)))
+    for name, (curve, full) in MOOD_SHAPES.items():
+        row = shapes.row(name)
+        if row is not None:
+            weights[:, row] = full * getattr(mouth, curve)
+    return weights if weights.any() else None
+
+
+def _add_mood(weights: Array, mood: Array | None) -> Array:
     """Return weights with those of a mood: what a shape has already is not added again [shape=(T, S)]."""
     return weights if mood is None else np.clip(weights + mood * (1 - weights), 0.0, 1.0)
 
 
-def _closed_as_spoken(
+def expression_weights(moods: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the weights of VRM's expressions, 0 to 1, by their names [each shape=(T,)].
+
+    moods : how strong each mood is, 0 to 1 [each shape=(T,)]
+    """
+    weights: dict[str, Array] = {}
+    for mood, strength in moods.items():
+        for name, full in EXPRESSIONS[mood]:
+            weights[name] = np.clip(weights.get(name, 0.0) + full * strength, 0, 1)
+    return weights
+
+
+def _close_own_weights(
     weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes, mood: Array | None
 ) -> Array:
-    """Return given weights with the lips of the mesh in contact where the spoken mouth has it [shape=(T, S)].
+    """Return weights that a motion has with the lips of the mesh in contact where the mouth's are [shape=(T, S)].
 
     motion : with the channels of ``with_mouth``
     mood   : weights that a mood adds [shape=(T, S)], by which the lips are no further apart than it parts them
     Frames in which the lips of the mesh touch as they should, and that no closure is near, stay as they are.
     """
-    own, said = weights @ shapes.gap, gap_in(motion)
-    share = np.clip(mouth.gap / np.maximum(said, 1e-9), 0, 1)
-    wanted = np.where(said > LEAST_GAP, share * own, own)
-    touching, contact = own < LEAST_GAP / 2, mouth.contact
-    wanted = np.where(contact, np.where(touching, own, 0.0), np.where(touching, LEAST_GAP, wanted))
+    gap, motion_gap = weights @ shapes.gap, read_gap(motion)
+    share = np.clip(mouth.gap / np.maximum(motion_gap, 1e-9), 0, 1)
+    wanted = np.where(motion_gap > LEAST_GAP, share * gap, gap)
+    touching, contact = gap < LEAST_GAP / 2, mouth.contact
+    wanted = np.where(contact, np.where(touching, gap, 0.0), np.where(touching, LEAST_GAP, wanted))
     if mood is not None:
-        wanted = np.where(contact, wanted, wanted + np.maximum(mouth.gap - np.maximum(said, LEAST_GAP), 0))
-        weights = _with_mood(weights, mood)
-        own = weights @ shapes.gap
-    changed = np.abs(wanted - own) > 1e-9
+        wanted = np.where(contact, wanted, wanted + np.maximum(mouth.gap - np.maximum(motion_gap, LEAST_GAP), 0))
+        weights = _add_mood(weights, mood)
+        gap = weights @ shapes.gap
+    changed = np.abs(wanted - gap) > 1e-9
     result = weights.copy()
     result[changed] = with_gap(weights[changed], shapes, wanted[changed])
     return result
@@ -167,9 +318,9 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array, kept: Collection[st
     if jaw is not None and close is not None:  # until the end: the jaw with the lips, and behind closed lips
         weights[:, jaw] -= weights[:, close]
         apart[close] += apart[jaw]
-    still = (np.abs(apart) < LEAST_PARTING) | np.isin(shapes.known, list(kept))
+    still = (np.abs(apart) < MIN_PARTING) | np.isin(shapes.known, list(kept))
     way = np.where(still, 0.0, apart)
-    low, high = np.full(len(weights), -1 / LEAST_PARTING), np.full(len(weights), 1 / LEAST_PARTING)
+    low, high = np.full(len(weights), -1 / MIN_PARTING), np.full(len(weights), 1 / MIN_PARTING)
     for _ in range(60):
         middle = (low + high) / 2
         wide = np.clip(weights - middle[:, None] * way, 0.0, 1.0) @ apart > gap
@@ -178,53 +329,3 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array, kept: Collection[st
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     return np.clip(weights, 0.0, 1.0)
-
-
-def _free_weights(points: PointMotion, shapes: FaceShapes, options: SolverOptions) -> Array:
-    """Return the weights of shapes that the points decide on [shape=(T, S)]."""
-    mouth = points.mouth
-    fixed = np.zeros((len(mouth.gap), len(shapes.names)))
-    if options.gestures:
-        for name, curve in {
-            **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS_WEIGHT * mouth.closing),
-            "mouthRollUpper": UPPER_ROLL_WEIGHT * mouth.closing,
-            "mouthRollLower": LOWER_ROLL_WEIGHT * mouth.tuck,
-            "tongueOut": TONGUE_WEIGHT * mouth.between_teeth,
-        }.items():
-            if name in shapes.known:
-                fixed[:, shapes.known.index(name)] = curve
-    free = np.array([name not in NOT_FROM_POINTS for name in shapes.known])
-    matrix, targets = _rows(shapes), _targets(points)
-    jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
-    if jaw is not None and close is not None:
-        matrix[close] += matrix[jaw]  # as one: the jaw opens behind closed lips
-    ties = PAIR_WEIGHT * shapes.pairs()[:, free]
-    solved = bounded_curves(matrix[free], targets - fixed @ _rows(shapes), options.costs, ties)
-    weights = fixed.copy()
-    weights[:, free] += solved
-    if jaw is not None and close is not None:
-        weights[:, jaw] += weights[:, close]
-    if options.gestures:
-        weights = rounded_weights(weights, shapes, mouth.protrusion)
-    return np.clip(weights, 0.0, 1.0)
-
-
-def _rows(shapes: FaceShapes) -> Array:
-    """Return the displacements of the shapes as weighted rows of a least squares problem [shape=(S, D)]."""
-    return _weighted(shapes.moved, shapes.gap)
-
-
-def _targets(points: PointMotion) -> Array:
-    """Return the displacements of the points, and the gap, as such rows [shape=(T, D)]."""
-    return _weighted(points.displacements, points.mouth.gap)
-
-
-def _weighted(displacements: Array, gap: Array) -> Array:
-    template = mouth_template()
-    weights = np.where(template.jaw[:, None], JAW_WEIGHT, 1.0) * np.array([1.0, 1.0, DEPTH_WEIGHT])
-    weights[template.corner, 0] *= CORNER_WEIGHT
-    inner = np.zeros(len(template.points), bool)
-    inner[[template.row(point) for pair in FACING[:3] for point in pair]] = True
-    weights[inner, 1] *= 0.5  # the gap says it
-    flat = (displacements * weights).reshape(len(displacements), -1)
-    return np.concatenate([flat, GAP_WEIGHT * gap[:, None]], axis=1)

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 
-def skinned(weights: csr_array, matrices: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def skin_vertices(
+    weights: csr_array, matrices: NDArray[np.float64], vertices: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the vertices under the blended transformations of the control points [shape=(N, 3)].
 
     weights  : of each control point on each vertex [shape=(N, C), sparse rows]; a row of sum below 1 leaves the rest of
@@ -32,8 +34,7 @@ def skinned(weights: csr_array, matrices: NDArray[np.float64], vertices: NDArray
     beyond the mouth stands still.
     Cost: O(12 · (number of weights) + 12 N).
     """
-    still = np.eye(3, 4)
-    blended = (weights @ (matrices - still).reshape(len(matrices), 12)).reshape(-1, 3, 4)
+    blended = (weights @ (matrices - np.eye(3, 4)).reshape(len(matrices), 12)).reshape(-1, 3, 4)
     moved = blended[:, :, 0] * vertices[:, :1]
     moved += blended[:, :, 1] * vertices[:, 1:2]
     moved += blended[:, :, 2] * vertices[:, 2:]
@@ -48,9 +49,9 @@ Rows = NDArray[np.int64]
 UPPER_REACH, LOWER_REACH, JAW_REACH = 0.32, 0.45, 0.65
 """How far a control point of the upper lip and the corners, of the lower lip, of the jaw reaches along the surface, in
 eye distances."""
-MOST_WEIGHTS = 8
+MAX_WEIGHTS = 8
 """Most control points that a vertex follows."""
-LEAST_WEIGHT = 1e-3
+MIN_WEIGHT = 1e-3
 VERTICES_AT_ONCE = 1 << 13
 SOFTNESS = 0.03
 """Added to all distances, in eye distances: without it every control point would stick out of its surroundings."""
@@ -104,7 +105,7 @@ class ControlBinding:
         Source: Hofer 2008, Eq. 12.
         """
         vertices = mesh.vertices.copy()
-        vertices[self.rows] = skinned(self.matrix, matrices, mesh.vertices[self.rows])
+        vertices[self.rows] = skin_vertices(self.matrix, matrices, mesh.vertices[self.rows])
         return vertices
 
 
@@ -120,7 +121,19 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
     reach = np.where(template.jaw, JAW_REACH, np.where(template.lower, LOWER_REACH, UPPER_REACH))[:, None]
     limit = float(reach.max()) * placement.scale
     distances = surface.place_distances(placement.vertices, limit)
-    inside = _inside(mesh, surface, placement)
+    # pieces that lie inside the mouth, below where the lips meet: lower teeth, tongue
+    places = mesh.vertices @ placement.axes / placement.scale
+    lips = places[placement.vertices[~template.jaw]]
+    centre, front = lips.mean(axis=0), float(lips[:, 2].max())
+    across, up, _ = (places - centre).T
+    within = (np.abs(across) < 0.6 * float(np.ptp(lips[:, 0]))) & (np.abs(up) < _CAVITY_REACH)
+    within &= (places[:, 2] < front) & (places[:, 2] > front - 2 * _CAVITY_REACH)
+    count = int(surface.pieces.max(initial=-1)) + 1
+    sizes = np.bincount(surface.pieces, minlength=count)
+    heights = np.bincount(surface.pieces, places[:, 1], count) / np.maximum(sizes, 1)
+    covered = (np.bincount(surface.pieces[within], minlength=count) == sizes) & (heights < centre[1])
+    covered[surface.pieces[placement.vertices]] = False
+    inside = covered[surface.pieces]
     followers = np.array([placement.row(point) for point in JAW_FOLLOWERS])
     parts = []
     for first in range(0, len(mesh.vertices), VERTICES_AT_ONCE):
@@ -132,11 +145,11 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
         weights = (pulls / np.maximum(pulls.sum(axis=0), 1e-12) * held).T
         weights[inside[rows]] = 0.0
         weights[np.ix_(np.flatnonzero(inside[rows]), followers)] = 1 / len(JAW_FOLLOWERS)
-        parts.append(_strongest(weights, first))
+        parts.append(_choose_strongest(weights, first))
     return ControlBinding(placement, *map(np.concatenate, zip(*parts, strict=True)))
 
 
-def painted(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int, float]]) -> ControlBinding:
+def paint_weights(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int, float]]) -> ControlBinding:
     """Return a binding with the weights of some vertices replaced.
 
     paint : for each vertex the weight of each point, 0 to 1; weights that add up to more than 1 are scaled down to 1
@@ -144,13 +157,13 @@ def painted(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int
     """
     weights = np.zeros((len(mesh.vertices), len(binding.placement.points)))
     weights[binding.rows] = binding.matrix.toarray()
-    for vertex, given in paint.items():
+    for vertex, painted in paint.items():
         if not 0 <= vertex < len(mesh.vertices):
             raise InputError(f"the vertex {vertex} does not exist, required 0 to {len(mesh.vertices) - 1}")
-        if sum(value > 0 for value in given.values()) > MOST_WEIGHTS:
-            raise InputError(f"the vertex {vertex} follows {len(given)} points, required at most {MOST_WEIGHTS}")
+        if sum(value > 0 for value in painted.values()) > MAX_WEIGHTS:
+            raise InputError(f"the vertex {vertex} follows {len(painted)} points, required at most {MAX_WEIGHTS}")
         weights[vertex] = 0.0
-        for point, value in given.items():
+        for point, value in painted.items():
             if point not in binding.placement.points:
                 raise InputError(
                     f"{point} is no control point, required one of {', '.join(map(str, binding.placement.points))}"
@@ -159,42 +172,15 @@ def painted(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int
                 raise InputError(f"the weight of point {point} on vertex {vertex} is {value:g}, required 0 to 1")
             weights[vertex, binding.placement.row(point)] = value
         weights[vertex] /= max(float(weights[vertex].sum()), 1.0)
-    return ControlBinding(binding.placement, *_strongest(weights))
+    return ControlBinding(binding.placement, *_choose_strongest(weights))
 
 
-def _strongest(weights: Array, first: int = 0) -> tuple[Rows, Rows, Array]:
-    """Return the rows, controls and weights of a binding: the largest weights of each vertex [shape=(N, C)].
-
-    first : the number of the first vertex
-    What is left out goes to those that are kept.
-    """
+def _choose_strongest(weights: Array, first: int = 0) -> tuple[Rows, Rows, Array]:
+    """Return rows from the first vertex on, controls and weights: the largest of each vertex [shape=(N, C)]."""
     total = weights.sum(axis=1)
-    rows = np.flatnonzero(total > LEAST_WEIGHT)
-    controls = np.argsort(-weights[rows], axis=1, kind="stable")[:, :MOST_WEIGHTS]
+    rows = np.flatnonzero(total > MIN_WEIGHT)
+    controls = np.argsort(-weights[rows], axis=1, kind="stable")[:, :MAX_WEIGHTS]
     controls.sort(axis=1)
-    kept = np.take_along_axis(weights[rows], controls, axis=1)
-    kept *= (total[rows] / np.maximum(kept.sum(axis=1), 1e-12))[:, None]
-    return first + rows, controls.astype(np.int64), np.minimum(kept, 1.0)
-
-
-def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArray[np.bool_]:
-    """Return the vertices of pieces that lie inside the mouth, below where the lips meet: lower teeth, tongue
-    [shape=(V,)]."""
-    template = mouth_template()
-    places = mesh.vertices @ placement.axes / placement.scale
-    lips = places[placement.vertices[~template.jaw]]
-    centre, front = lips.mean(axis=0), float(lips[:, 2].max())
-    half = float(np.ptp(lips[:, 0])) / 2
-    within = (
-        (np.abs(places[:, 0] - centre[0]) < 1.2 * half)
-        & (places[:, 2] < front)
-        & (places[:, 2] > front - 2 * _CAVITY_REACH)
-    )
-    within &= np.abs(places[:, 1] - centre[1]) < _CAVITY_REACH
-    count = int(surface.pieces.max(initial=-1)) + 1
-    sizes = np.bincount(surface.pieces, minlength=count)
-    heights = np.bincount(surface.pieces, places[:, 1], count) / np.maximum(sizes, 1)
-    covered = np.bincount(surface.pieces[within], minlength=count) == sizes
-    chosen = covered & (heights < centre[1])
-    chosen[surface.pieces[placement.vertices]] = False
-    return np.asarray(chosen[surface.pieces])
+    strongest = np.take_along_axis(weights[rows], controls, axis=1)
+    strongest *= (total[rows] / np.maximum(strongest.sum(axis=1), 1e-12))[:, None]  # they get what is left out
+    return first + rows, controls.astype(np.int64), np.minimum(strongest, 1.0)

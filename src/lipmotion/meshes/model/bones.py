@@ -1,4 +1,7 @@
-"""Bones that move a head: which vertices follow the head, the neck, the jaw and the eyes of a character."""
+"""Bones that move a head, which vertices follow them, and the angles of a head as rotations.
+
+Axes are those of glTF: x to the character's left, y up, z out of the face.
+"""
 
 from __future__ import annotations
 
@@ -46,16 +49,42 @@ def bone_kind(name: str) -> str | None:
     return next((kind for kind in (JAW, HEAD, NECK) if kind in plain), None)
 
 
-def merged_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
+def merge_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
     """Return one bone of each kind: its vertices are those of all bones of this kind, its place that of the first."""
-    found: dict[str, list[Bone]] = {}
+    by_kind: dict[str, list[Bone]] = {}
     for bone in bones:
         if len(bone.rows):
-            found.setdefault(bone.kind, []).append(bone)
+            by_kind.setdefault(bone.kind, []).append(bone)
     merged = []
-    for kind, same in found.items():
+    for kind, same in by_kind.items():
         rows, inverse = np.unique(np.concatenate([bone.rows for bone in same]), return_inverse=True)
         shares = np.zeros(len(rows))
         np.maximum.at(shares, inverse.reshape(-1), np.concatenate([bone.shares for bone in same]))
         merged.append(Bone(kind, same[0].place, rows, shares))
     return tuple(merged)
+
+
+Array = NDArray[np.float64]
+ANGLES = ("headYaw", "headPitch", "headRoll")
+"""Channels of motion, in radians: to the character's left, up, and to its left shoulder."""
+SIGNS = np.array([1.0, -1.0, -1.0])
+ORDER = "YXZ"
+
+
+def head_quaternions(angles: Array) -> Array:
+    """Return rotations of a head as quaternions x, y, z, w [shape=(T, 4)]; neighbours are less than half a turn apart.
+
+    angles : of ``ANGLES`` [shape=(T, 3)]
+    """
+    from scipy.spatial.transform import Rotation
+
+    turned = Rotation.from_euler(ORDER, angles * SIGNS).as_quat()
+    same = np.einsum("tq,tq->t", turned[1:], turned[:-1]) >= 0
+    return np.asarray(turned * np.concatenate([[1.0], np.cumprod(np.where(same, 1.0, -1.0))])[:, None])
+
+
+def head_angles(quaternions: Array) -> Array:
+    """Return the angles of a head from rotations, as of ``head_quaternions`` [shape=(T, 3)]."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(quaternions).as_euler(ORDER) * SIGNS)

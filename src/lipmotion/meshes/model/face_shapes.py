@@ -20,9 +20,9 @@ NOT_FROM_POINTS = {"tongueOut", "jawLeft", "jawRight", "mouthLeft", "mouthRight"
 NOT_FROM_POINTS |= {"mouthDimpleRight", "jawForward", "mouthFrownLeft", "mouthFrownRight", "mouthPressLeft"}
 NOT_FROM_POINTS |= {"mouthPressRight"}
 """Blendshapes of ARKit that speech hardly uses, or that points do not show; they stay 0, but for gestures."""
-LEAST_DISPLACEMENT = 0.02
+MIN_DISPLACEMENT = 0.02
 """A blendshape that moves no lip point by this many eye distances is none of the mouth."""
-MOST_SHAPES = 200
+MAX_SHAPES = 200
 EYES_M, HEAD_M = 0.09, (0.18, 0.3)
 """People's distance between the outer corners of the eyes, and the range of heights from the chin to the top of a head
 with its hair, in metres."""
@@ -73,7 +73,7 @@ def life_scale(mesh: Mesh, placement: LipPlacement) -> float:
     return float(EYES_M * unit) if height / unit <= HEAD_M[1] else placement.scale
 
 
-def face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
+def find_face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     """Return the blendshapes of a mesh that move the mouth.
 
     Visemes and vowels, where a table says what follows them; ARKit's, where the mesh has ``jawOpen`` and five more of
@@ -83,28 +83,28 @@ def face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     Raises InputError: none moves the mouth, or a table lets some follow visemes and others ``jawOpen``.
     """
     moved = placement.to_motion(mesh.displacements(placement.vertices))
-    strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > LEAST_DISPLACEMENT
-    found, style = _mouth(mesh, strong)
-    if not found:
+    strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > MIN_DISPLACEMENT
+    shapes, style = _choose_mouth(mesh, strong)
+    if not shapes:
         there = shortened(", ".join(mesh.shape_names)) or "none"
         raise InputError(f"no blendshape moves the mouth; the mesh has {there}. Drive it by control points")
-    if len(found) > MOST_SHAPES:
+    if len(shapes) > MAX_SHAPES:
         raise InputError(
-            f"{len(found)} blendshapes move the mouth, required at most {MOST_SHAPES}; leave some empty in its table "
+            f"{len(shapes)} blendshapes move the mouth, required at most {MAX_SHAPES}; leave some empty in its table "
             "(docs/meshes.md)"
         )
-    names = tuple(mesh.shape_names[numbers[0]] for _, numbers in found)
-    gap = parted_lips(mesh, placement)
+    names = tuple(mesh.shape_names[numbers[0]] for _, numbers in shapes)
+    gap = measure_lip_parting(mesh, placement)
     return FaceShapes(
         names,
-        tuple(known for known, _ in found),
-        np.stack([moved[numbers].sum(axis=0) for _, numbers in found]),
-        np.array([gap[numbers].sum() for _, numbers in found]),
+        tuple(known for known, _ in shapes),
+        np.stack([moved[numbers].sum(axis=0) for _, numbers in shapes]),
+        np.array([gap[numbers].sum() for _, numbers in shapes]),
         style,
     )
 
 
-def parted_lips(mesh: Mesh, placement: LipPlacement) -> Array:
+def measure_lip_parting(mesh: Mesh, placement: LipPlacement) -> Array:
     """Return how far each blendshape of a mesh parts the middle of the inner lips, eye distances [shape=(S,)]."""
     rows = [[placement.vertices[placement.row(point)] for point in pair] for pair in FACING[:3]]
     moved = placement.to_motion(mesh.displacements(np.ravel(rows))).reshape(len(mesh.shapes), -1, 2, 3)
@@ -117,35 +117,41 @@ def numbers_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str,
 
     Those that a table says, all of one name; else the first of one name that moves something.
     """
-    found: dict[str, list[int]] = {}
+    numbers: dict[str, list[int]] = {}
     for number, shape in enumerate(mesh.shapes):
         known = named(shape.called)
         if known is not None:
-            found.setdefault(known, []).append(number)
-    told = {known: [each for each in found[known] if mesh.shapes[each].source] for known in found}
-    first = {known: min(numbers, key=lambda each: not len(mesh.shapes[each].rows)) for known, numbers in found.items()}
-    return {known: told[known] or [first[known]] for known in found}
+            numbers.setdefault(known, []).append(number)
+    stated = {known: [each for each in same if mesh.shapes[each].source] for known, same in numbers.items()}
+    first = {known: min(same, key=lambda each: not len(mesh.shapes[each].rows)) for known, same in numbers.items()}
+    return {known: stated[known] or [first[known]] for known in numbers}
 
 
-def _mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str, list[int]]], str]:
+def _choose_mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str, list[int]]], str]:
     """Return the known names of the shapes of the mouth with their blendshapes, and their style."""
     spoken = numbers_by_name(mesh, spoken_name)
-    arkit = {known: numbers for known, numbers in numbers_by_name(mesh, arkit_name).items() if known in ARKIT_MOUTH}
-    arkit = {known: numbers for known, numbers in arkit.items() if len(mesh.shapes[numbers[0]].rows)}
+    arkit = {
+        known: numbers
+        for known, numbers in numbers_by_name(mesh, arkit_name).items()
+        if known in ARKIT_MOUTH and len(mesh.shapes[numbers[0]].rows)
+    }
     jaw = arkit.get("jawOpen", [])
-    told = [known for known, numbers in spoken.items() if mesh.shapes[numbers[0]].source]
-    if told and any(mesh.shapes[number].source for number in jaw):
+    stated = [known for known, numbers in spoken.items() if mesh.shapes[numbers[0]].source]
+    if stated and any(mesh.shapes[number].source for number in jaw):
         raise InputError(
-            f"its table has jawOpen and {told[0].removeprefix('vowel_')}; leave the sources of one kind empty"
+            f"its table has jawOpen and {stated[0].removeprefix('vowel_')}; leave the sources of one kind empty"
         )
-    if told:
-        return [(known, spoken[known]) for known in told], "visemes"
+    if stated:
+        return [(known, spoken[known]) for known in stated], "visemes"
     if strong[jaw].any() and len(arkit) > 5:
         return list(arkit.items()), "arkit"
-    for kind, least in (("viseme_", 8), ("vowel_", 3)):
-        those = {known: numbers for known, numbers in spoken.items() if known.startswith(kind)}
-        those = {known: numbers for known, numbers in those.items() if strong[numbers].any() or known == "viseme_PP"}
-        if len(those) >= least:
+    for kind, enough in (("viseme_", 8), ("vowel_", 3)):
+        those = {
+            known: numbers
+            for known, numbers in spoken.items()
+            if known.startswith(kind) and (strong[numbers].any() or known == "viseme_PP")
+        }
+        if len(those) >= enough:
             return list(those.items()), "visemes"
     own = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
     named = {number for _, numbers in own for number in numbers}

@@ -25,8 +25,8 @@ class Thinning:
     tolerance: float = 0.0
     closed_s: tuple[float, ...] = ()
 
-    def kept(self, time_s: Array, rows: Array) -> NDArray[np.intp]:
-        """Return the numbers of the keys that are kept, rising, the first and the last among them.
+    def choose(self, time_s: Array, rows: Array) -> NDArray[np.intp]:
+        """Return the numbers of the keys that stay, rising, the first and the last among them.
 
         time_s : seconds, rising [shape=(K,)]; rows : of curves [shape=(K, N)]
         Source: Ramer 1972; Douglas & Peucker 1973. Deviations: the distance is that of the values, not of the points;
@@ -45,7 +45,10 @@ class Thinning:
             first, last = open_ends.pop()
             if last - first < 2:
                 continue
-            errors = _distances(time_s[first : last + 1], rows[first : last + 1])
+            those_s, those = time_s[first : last + 1], rows[first : last + 1]
+            share = (those_s - those_s[0]) / (those_s[-1] - those_s[0])
+            errors = np.abs(those - those[0] - share[:, None] * (those[-1] - those[0])).max(axis=1, initial=0.0)
+            errors[[0, -1]] = 0.0
             if errors.max() > self.tolerance:
                 middle = first + int(errors.argmax())
                 is_kept[middle] = True
@@ -55,14 +58,6 @@ class Thinning:
 
 EVERY_KEY = Thinning()
 """None is left out."""
-
-
-def _distances(time_s: Array, rows: Array) -> Array:
-    """Return the largest distance of any curve from the line between the ends, at every key [shape=(K,)]."""
-    share = (time_s - time_s[0]) / (time_s[-1] - time_s[0])
-    distances: Array = np.abs(rows - rows[0] - share[:, None] * (rows[-1] - rows[0])).max(axis=1, initial=0.0)
-    distances[[0, -1]] = 0.0
-    return distances
 
 
 def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Array, Array]:
@@ -82,11 +77,11 @@ def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Arr
     return np.insert(time_s, changed, time_s[changed] - early_s), np.insert(rows, changed, before, axis=0)
 
 
-def keys_of(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
+def place_keys(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
     """Return the keys of evenly spaced rows, with straight lines between them: times and values.
 
     time_s : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : as of ``with_jumps``
     """
     all_s, all_rows = with_jumps(time_s, rows, stepped)
-    kept = thinning.kept(all_s, all_rows)
-    return all_s[kept], all_rows[kept]
+    chosen = thinning.choose(all_s, all_rows)
+    return all_s[chosen], all_rows[chosen]

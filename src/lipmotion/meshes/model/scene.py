@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
+from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.single_sided import single_sided
-from lipmotion.meshes.model.surface import mesh_surface, normals_of
+from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion.types import Motion
 
 Array = NDArray[np.float64]
@@ -92,7 +91,7 @@ class Scene:
         Between two keys weights lie on a straight line: where some are stepped, there is a key just before a change.
         """
         time_s = self.weights.time_s if self.weights else np.zeros(0)
-        return keys_of(time_s, self.table(), [name in self.stepped for name in self.mesh.shape_names], self.thinning)
+        return place_keys(time_s, self.table(), [name in self.stepped for name in self.mesh.shape_names], self.thinning)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +105,10 @@ class ShadingNormals:
     turned: tuple[tuple[NDArray[np.int64], Array], ...]
 
 
-def shading_normals(mesh: Mesh, *, split: bool = True) -> ShadingNormals:
+def compute_shading_normals(mesh: Mesh, *, split: bool = True) -> ShadingNormals:
     """Return smooth normals of a mesh and of its blendshapes; ``split`` as of ``Scene``."""
-    mesh = single_sided(mesh)
-    joined = mesh_surface(mesh).places if split else np.arange(len(mesh.vertices))
+    mesh = drop_back_sides(mesh)
+    joined = build_surface(mesh).places if split else np.arange(len(mesh.vertices))
     triangles = joined[mesh.triangles].astype(np.int32)
     count = int(joined.max(initial=-1)) + 1
     rest = _joined_normals(mesh.vertices, triangles, joined, count)
@@ -132,4 +131,4 @@ def shading_normals(mesh: Mesh, *, split: bool = True) -> ShadingNormals:
 def _joined_normals(vertices: Array, triangles: NDArray[np.int32], joined: NDArray[np.int64], count: int) -> Array:
     places = np.zeros((count, 3))
     places[joined] = vertices
-    return np.asarray(normals_of(places, triangles)[joined])
+    return np.asarray(compute_normals(places, triangles)[joined])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,7 +58,7 @@ class MeshSurface:
         return np.asarray(dijkstra(self.edges, directed=False, indices=self.places[sources], limit=limit))
 
 
-def mesh_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurface:
+def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurface:
     """Return how the vertices of a mesh hang together.
 
     split : vertices that are places of their own, even where others are at the same place, as along closed lips that no
@@ -68,7 +68,7 @@ def mesh_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurf
     from scipy.sparse.csgraph import connected_components
 
     normals = vertex_normals(mesh.vertices, mesh.triangles)
-    places = _places(mesh, normals)
+    places = _number_places(mesh, normals)
     if split is not None:
         places = np.unique(np.where(split, len(places) + np.arange(len(places)), places), return_inverse=True)[1]
         places = places.reshape(-1).astype(np.int64)
@@ -100,7 +100,7 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
     return normals / np.where(lengths > 0, lengths, 1.0)
 
 
-def normals_of(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+def compute_normals(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Return the normal of every vertex, the mean of its triangles weighted by their area [shape=(V, 3)], of length 1.
 
     A vertex without triangles gets (0, 0, 1).
@@ -110,10 +110,16 @@ def normals_of(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDA
     return np.where(length > 0, total / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
 
 
-def _places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:
+def _number_places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:
     """Return the number of each vertex's place: the same for vertices at one place that move alike and face alike."""
     size = float(np.ptp(mesh.vertices, axis=0).max(initial=0.0)) or 1.0
-    keys = [np.rint(mesh.vertices / (SAME_PLACE_SHARE * size)), *_movements(mesh)]
+    # where they are, and two numbers that differ where blendshapes move vertices differently
+    keys, sums, largest = [np.rint(mesh.vertices / (SAME_PLACE_SHARE * size))], np.zeros((len(mesh.vertices), 2)), 0.0
+    weights = np.random.default_rng(0).normal(size=(len(mesh.shapes), 3, 2))
+    for shape, weight in zip(mesh.shapes, weights, strict=True):
+        sums[shape.rows] += shape.displacements @ weight
+        largest = max(largest, float(np.abs(shape.displacements).max(initial=0.0)))
+    keys.append(np.rint(sums / (SAME_MOTION_SHARE * (largest or 1.0))))
     together = np.zeros(len(mesh.vertices), np.int64)
     for column in np.concatenate(keys, axis=1).T:  # one after another: many times faster than rows at once
         _, ranks = np.unique(column, return_inverse=True)
@@ -127,14 +133,34 @@ def _places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:
     return places.reshape(-1).astype(np.int64)
 
 
-def _movements(mesh: Mesh) -> list[NDArray[np.float64]]:
-    """Return two numbers of each vertex that differ where blendshapes move vertices differently [shape=(V, 2)]."""
-    if not mesh.shapes:
-        return []
-    sums = np.zeros((len(mesh.vertices), 2))
-    weights = np.random.default_rng(0).normal(size=(len(mesh.shapes), 3, 2))
-    largest = 0.0
-    for shape, weight in zip(mesh.shapes, weights, strict=True):
-        sums[shape.rows] += shape.displacements @ weight
-        largest = max(largest, float(np.abs(shape.displacements).max(initial=0.0)))
-    return [np.rint(sums / (SAME_MOTION_SHARE * (largest or 1.0)))]
+def drop_back_sides(mesh: Mesh) -> Mesh:
+    """Return a mesh whose parts that hold every triangle twice, turned round, hold it once, seen from both sides.
+
+    Lashes and leaves are often made so. The normals of the two sides would cancel out. The vertices stay as they are;
+    so do parts of which some triangles alone are there twice.
+    """
+    corners = mesh.triangles.astype(np.int64)
+    low, middle, high = np.sort(corners, axis=1).T
+    _, of_pair = np.unique(low * len(mesh.vertices) + middle, return_inverse=True)
+    _, same = np.unique(of_pair.reshape(-1) * len(mesh.vertices) + high, return_inverse=True)
+    same = same.reshape(-1)
+    first = np.full(int(same.max(initial=-1)) + 1, -1, np.int64)
+    first[same[::-1]] = np.arange(len(corners))[::-1]
+    partner = first[same]
+    turned = (corners[:, 0] > corners[:, 1]) ^ (corners[:, 1] > corners[:, 2]) ^ (corners[:, 0] > corners[:, 2])
+    back = turned != turned[partner]
+    dropped = np.zeros(len(corners), bool)
+    for part in mesh.parts:
+        mine = slice(part.first, part.stop)
+        backs = back[mine] & (partner[mine] >= part.first)
+        if part.stop > part.first and 2 * backs.sum() == part.stop - part.first:
+            dropped[mine] = backs
+    if not dropped.any():
+        return mesh
+    before, parts = np.concatenate([[0], np.cumsum(~dropped)]).tolist(), []
+    for part in mesh.parts:
+        two_sided = part.material.two_sided or bool(dropped[part.first : part.stop].any())
+        material = replace(part.material, two_sided=two_sided)
+        parts.append(replace(part, first=before[part.first], stop=before[part.stop], material=material))
+    uv = None if mesh.uv is None else mesh.uv[~dropped]
+    return replace(mesh, triangles=mesh.triangles[~dropped], parts=tuple(parts), uv=uv)

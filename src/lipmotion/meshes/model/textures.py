@@ -6,7 +6,6 @@ import io
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +13,14 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.file_limits import Budget
 
-if TYPE_CHECKING:
-    from PIL import Image
-
-MOST_BYTES = 400_000_000
+MAX_BYTES = 400_000_000
 """Most bytes that decoding a picture may take: a larger one is not looked at."""
-MOST_SCANS = 100
+MAX_SCANS = 100
 """Most passes over a JPEG; each takes as long as a picture."""
 DIRECT = {"RGB", "L"}
 """Modes of pictures that are reduced as they are; all others get an opacity first."""
 PICTURES = ("PNG", "JPEG", "WEBP")
-MOST_COLUMNS = 1024
+MAX_COLUMNS = 1024
 """Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
 FULL_SCALE = 65535
 
@@ -86,7 +82,7 @@ class Texture:
 
 
 def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> Texture | None:
-    """Return the texture in the bytes of a picture, reduced to ``MOST_COLUMNS`` pixels across.
+    """Return the texture in the bytes of a picture, reduced to ``MAX_COLUMNS`` pixels across.
 
     budget : counts its pixels before they are decoded; None: of this picture alone
     None: the picture is damaged, too large, or of another format than PNG, JPEG and WebP.
@@ -99,36 +95,21 @@ def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> T
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
                 pixels = picture.width * picture.height
-                picture.draft("RGB", (MOST_COLUMNS, MOST_COLUMNS))
-                if _bytes_to_decode(picture, pixels) > MOST_BYTES or _scans(picture, content) > MOST_SCANS:
+                picture.draft("RGB", (MAX_COLUMNS, MAX_COLUMNS))  # a JPEG is reduced as it is decoded
+                direct = picture.mode in DIRECT and "transparency" not in picture.info
+                coefficients = 2 * len(picture.getbands()) * pixels if "progressive" in picture.info else 0
+                size = coefficients + (4 if direct else 9) * picture.width * picture.height
+                scans = bytes(content).count(b"\xff\xda") if picture.format == "JPEG" else 1
+                if (20 * pixels if picture.format == "WEBP" else size) > MAX_BYTES or scans > MAX_SCANS:
                     return None
                 (budget or Budget()).spend("pixels of pictures", pixels)
-                small = picture if _is_direct(picture) else picture.convert("RGBA")
-                small.thumbnail((MOST_COLUMNS, MOST_COLUMNS))
+                small = picture if direct else picture.convert("RGBA")
+                small.thumbnail((MAX_COLUMNS, MAX_COLUMNS))
                 return Texture(np.asarray(small.convert("RGBA")))
     except InputError:
         raise
     except (OSError, ValueError, SyntaxError, MemoryError, Image.DecompressionBombError):
         return None
-
-
-def _is_direct(picture: Image.Image) -> bool:
-    return picture.mode in DIRECT and "transparency" not in picture.info
-
-
-def _scans(picture: Image.Image, content: bytes | memoryview) -> int:
-    return bytes(content).count(b"\xff\xda") if picture.format == "JPEG" else 1
-
-
-def _bytes_to_decode(picture: Image.Image, pixels: int) -> int:
-    """Return about how many bytes it takes to decode and to reduce a picture that is open.
-
-    pixels : in the file; those of the picture are fewer where a JPEG is reduced as it is decoded
-    """
-    if picture.format == "WEBP":
-        return 20 * pixels
-    coefficients = 2 * len(picture.getbands()) * pixels if "progressive" in picture.info else 0
-    return coefficients + (4 if _is_direct(picture) else 9) * picture.width * picture.height
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +144,11 @@ def texture_table(textures: Sequence[Texture]) -> TextureTable:
     texels: list[NDArray[np.uint16]] = []
     levels: list[tuple[int, int, int]] = []
     first: list[int] = []
-    count = 0
+    count, reflected = 0, decode_srgb(np.arange(256) / 255).astype(np.float32)
     for texture in textures:
         first.append(len(levels))
-        image = _reflected(texture.pixels)
+        image = reflected[texture.pixels]
+        image[..., 3] = texture.pixels[..., 3] / np.float32(255)
         while True:
             height, width = image.shape[:2]
             levels.append((count, width, height))
@@ -174,22 +156,13 @@ def texture_table(textures: Sequence[Texture]) -> TextureTable:
             count += height * width
             if height == width == 1:
                 break
-            image = _halved(image)
+            image = _halve(image)
     if not levels:
         texels, levels = [np.full((1, 4), FULL_SCALE, np.uint16)], [(0, 1, 1)]
     return TextureTable(np.concatenate(texels), np.array(levels, np.int64), tuple(first))
 
 
-def _reflected(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return sRGB as reflected light, and opacity, 0 to 1 [shape=(H, W, 4)]."""
-    grey = np.arange(256) / 255
-    table = np.where(grey <= 0.04045, grey / 12.92, ((grey + 0.055) / 1.055) ** 2.4).astype(np.float32)
-    image = table[pixels]
-    image[..., 3] = pixels[..., 3] / np.float32(255)
-    return image
-
-
-def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
+def _halve(image: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a picture of half the height and width, at least 1 [shape=(max(H // 2, 1), max(W // 2, 1), 4)]."""
     height, width = (max(size // 2, 1) for size in image.shape[:2])
     weighted = image.copy()
@@ -206,7 +179,12 @@ def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.concatenate([np.minimum(colour, 1), alpha], axis=2)
 
 
-def linear(colour: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+def decode_srgb(colour: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     """Return sRGB colours, 0 to 1, as diffuse reflection; the shape stays."""
     values = np.asarray(colour, float)
     return np.asarray(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4))
+
+
+def encode_srgb(light: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return diffuse reflection as sRGB colours, 0 to 1; the shape stays."""
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from lipmotion.formats.web_page import coloured
+from lipmotion.formats.web_page import colour_code
 from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.marks import APPROVE, Mark, is_due
@@ -49,7 +49,7 @@ def write_reports(
     order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
     table, page = out / CSV_REPORT, out / HTML_REPORT
     marks = marks or {}
-    page_text = coloured(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
+    page_text = colour_code(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
     page_text = page_text.replace(BASIS, _digest(marks))
     before, _, after = page_text.partition(ROWS)
     with ExitStack() as stack:

@@ -13,7 +13,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import installed_version, provided
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
-from lipmotion.formats.label_files import LABEL_SUFFIXES, label_files_beside
+from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files
 from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job
@@ -125,7 +125,7 @@ def _changed_ns(status: os.stat_result) -> int:
 def input_paths(line: BatchLine) -> list[Path]:
     """Return the files that are read for a line: its recording and, if the row has no words, its label files."""
     recording = Path(line.recording)
-    return [recording] + ([] if line.transcript else label_files_beside(recording))
+    return [recording] + ([] if line.transcript else find_label_files(recording))
 
 
 def input_files(line: BatchLine) -> list[InputFile]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, shortened
-from lipmotion.meshes.files.rig_tables import RigRow, nearest
+from lipmotion.meshes.files.rig_tables import RigRow, suggest_names
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
 from lipmotion.pipeline.outputs.curve_sets import rig_sources
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
@@ -41,7 +41,7 @@ def calibrated(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Ma
     lines = {}
     for control in dict.fromkeys(name for given in stated.values() for name in given):
         if control not in values:
-            raise InputError(f"the table has no {shortened(control)!r}; {nearest(control, values)}")
+            raise InputError(f"the table has no {shortened(control)!r}; {suggest_names(control, values)}")
         now = values[control]
         wanted = {number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})}
         if len(wanted) == 1:
@@ -71,7 +71,7 @@ def posed_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sou
         return {name: curve[frames].tolist() for name, curve in found.items()}
     if curves.shapes is None:
         raise InputError("the character is moved by control points, which have no weights to calibrate")
-    solved = shape_weights(motion, units, curves.shapes)
+    solved = solve_shape_weights(motion, units, curves.shapes)
     by_name = {name: solved[name][frames].tolist() for name in solved.names}
     return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}
 

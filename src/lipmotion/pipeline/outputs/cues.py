@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.cue_sheets import CUES_FPS, CueSheet, choose_cues
-from lipmotion.articulation.delivery import Delivery, moved_in_time
+from lipmotion.articulation.delivery import Delivery, shift_in_time
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.cues import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
@@ -58,7 +58,7 @@ def cues(
     if chosen.hold_ms:
         hold_frames = max(hold_frames or 1, chosen.hold_frames(fps))
     generation = replace(generation, motion=with_mouth(generation.motion))
-    return choose_cues(moved_in_time(generation, chosen), fps, hold_frames, shapes.upper(), intensity=chosen.intensity)
+    return choose_cues(shift_in_time(generation, chosen), fps, hold_frames, shapes.upper(), intensity=chosen.intensity)
 
 
 def write_cues(

@@ -9,21 +9,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.curve_edits import with_edited_curves
-from lipmotion.articulation.expression import moods_shown
+from lipmotion.articulation.curve_edits import apply_curve_edits
+from lipmotion.articulation.expression import read_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, rig_motion
-from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.formats.fap import PARAMETERS, move_faps
+from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_rig_table
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.facial_animation import PARAMETERS, expression_weights, fap_motion
-from lipmotion.meshes.fitting.living_curves import living_curves
-from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS, viseme_motion
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
-from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
+from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS, weigh_visemes
+from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.other_shapes import CLOSED
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, arkit_name
 from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Timeline, Unit
 from lipmotion.types.staging import Staging
 
@@ -68,7 +66,7 @@ def curves_of(
     Motion of blendshapes keeps its weights.
     curves : ``arkit``, ``face``, ``visemes``, ``vowels``, ``fap``, a table of a rig's controls (``.csv``), or a
              character with blendshapes
-    staging, prosody : of the eyes, brows and head of ``face`` and ``vowels``, as of ``living_curves``
+    staging, prosody : of the eyes, brows and head of ``face`` and ``vowels``, as of ``compute_living_curves``
     edits  : pins and gains of curves; controls of a rig also follow those of the curves that they are made of
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
@@ -76,11 +74,11 @@ def curves_of(
         return edited_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
     check_curve_set(curves)
     if curves in SHAPE_SETS:
-        return with_edited_curves(_curves_of(motion, units, str(curves), staging, prosody), units, edits)
+        return apply_curve_edits(_curves_of(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
     sources = rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
     own = [edit for edit in edits if edit.channel not in sources]
-    return with_edited_curves(rig_motion(rows, sources, motion.rate_hz), units, own)
+    return apply_curve_edits(apply_rig(rows, sources, motion.rate_hz), units, own)
 
 
 def rig_sources(
@@ -99,7 +97,7 @@ def rig_sources(
     """
 
     def plain(name: str) -> Motion:
-        return with_edited_curves(_curves_of(motion, units, name, staging, prosody), units, edits)
+        return apply_curve_edits(_curves_of(motion, units, name, staging, prosody), units, edits)
 
     sets = [with_mouth(motion), plain(ARKIT), plain("visemes")]
     if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
@@ -118,7 +116,7 @@ def edited_weights(
     named = {other: name for other, name in (known or {}).items() if name in weights.names}
     named |= {name: name for name in weights.names}
     ours = [replace(edit, channel=named[edit.channel]) for edit in edits if edit.channel in named]
-    return with_edited_curves(weights, units, ours)
+    return apply_curve_edits(weights, units, ours)
 
 
 def known_names(mesh: Mesh) -> dict[str, str]:
@@ -131,14 +129,14 @@ def _curves_of(
 ) -> Motion:
     """Return the curves of one of ``SHAPE_SETS``."""
     if name == ARKIT:
-        return shape_weights(motion, units, arkit_mouth())
+        return solve_shape_weights(motion, units, arkit_mouth())
     motion = with_mouth(motion)
     if name == WHOLE_FACE:
-        mouth = shape_weights(motion, units, arkit_mouth())
-        return beside(mouth, living_curves(motion, units, staging, prosody))
+        mouth = solve_shape_weights(motion, units, arkit_mouth())
+        return beside(mouth, compute_living_curves(motion, units, staging, prosody))
     if name == VOWELS:
-        return beside(_vowel_motion(motion, units), living_curves(motion, units, staging, prosody))
-    return viseme_motion(units, spoken_mouth(motion, units)) if name == "visemes" else fap_motion(motion, units)
+        return beside(_vowel_motion(motion, units), compute_living_curves(motion, units, staging, prosody))
+    return weigh_visemes(units, spoken_mouth(motion, units)) if name == "visemes" else move_faps(motion, units)
 
 
 def _vowel_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
@@ -146,12 +144,12 @@ def _vowel_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
 
     Expressions vanish where the lips are pressed: whether one parts them, the model alone knows.
     """
-    mouth, shown = spoken_mouth(motion, units), expression_weights(moods_shown(motion))
+    mouth, shown = spoken_mouth(motion, units), expression_weights(read_moods(motion))
     curves = {CLOSED: mouth.closing if CLOSED not in motion.names else motion[CLOSED]}
     curves |= {name: curve * mouth.free for name, curve in shown.items()}
     channels = tuple(Channel(name, WEIGHT) for name in curves)
     added = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
-    return beside(shape_weights(motion, units, vowel_mouth()), added)
+    return beside(solve_shape_weights(motion, units, vowel_mouth()), added)
 
 
 def beside(first: Motion, second: Motion) -> Motion:

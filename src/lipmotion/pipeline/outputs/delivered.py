@@ -9,14 +9,14 @@ from typing import Final
 
 import numpy as np
 
-from lipmotion.articulation.curve_edits import with_gain
+from lipmotion.articulation.curve_edits import apply_gain
 from lipmotion.articulation.delivery import (
     Delivery,
-    closed_on_grid,
-    closed_times,
-    held,
-    intensified,
-    moved_in_time,
+    close_on_frame_grid,
+    find_closed_times,
+    hold_poses,
+    intensify,
+    shift_in_time,
 )
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.articulation.phone_targets import with_gestures
@@ -64,12 +64,12 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
     for key, stop_s in ((key, later.time_s) for key, later in pairwise((*manners, last))):
         factor = 1 + key.strength * (FACTORS[key.mood] - 1)
         if factor != 1 and key.time_s < stop_s:
-            generation = with_gain(generation, Gain(key.time_s, stop_s, factor))
+            generation = apply_gain(generation, Gain(key.time_s, stop_s, factor))
     return generation
 
 
 def delivered(generation: Generation, delivery: Delivery) -> Generation:
-    """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``held``).
+    """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``hold_poses``).
 
     Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
     without any, motion keeps the moods that it has. So do manners of speaking. Where none is asked for, those that are
@@ -81,7 +81,7 @@ def delivered(generation: Generation, delivery: Delivery) -> Generation:
     if not all(key.is_manner for key in keys):
         moods = with_moods(larger.motion, keys)
         larger = larger.selected(tuple(n for n in larger.motion.names if not is_mood(n))).with_motion(moods)
-    return moved_in_time(larger, delivery)
+    return shift_in_time(larger, delivery)
 
 
 def shown(
@@ -101,7 +101,7 @@ def shown(
     if not frames:
         return moved
     moved = moved.with_motion(with_gestures(moved.motion, moved.units))
-    closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
+    closed_s, moved = find_closed_times(moved), close_on_frame_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
     return held_mouth(moved.resampled(fps), frames, closed_s)
@@ -115,7 +115,7 @@ def with_drawn_channels(generation: Generation) -> Generation:
 
 
 def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
-    """Return a generation whose mouth is held (``held``); eyes, brows, cheeks and head move as before.
+    """Return a generation whose mouth is held (``hold_poses``); eyes, brows, cheeks and head move as before.
 
     frames : 0: everything moves as before; 1: every frame is a pose, which formats that can say so hold
     """
@@ -127,7 +127,7 @@ def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     )
     if not frames or not names:
         return generation
-    mouth = replace(held(generation.selected(names), frames, closed_s), stepped=names)
+    mouth = replace(hold_poses(generation.selected(names), frames, closed_s), stepped=names)
     if names == motion.names:
         return mouth
     columns = [motion.column(name) for name in names]
@@ -141,4 +141,4 @@ def _larger(generation: Generation, intensity: float) -> Generation:
         return generation
     motion = generation.motion
     opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
-    return intensified(generation, intensity, opening)
+    return intensify(generation, intensity, opening)

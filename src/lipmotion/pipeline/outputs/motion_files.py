@@ -10,19 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.articulation.contact import in_pictures
-from lipmotion.articulation.curve_edits import with_edited_curves
-from lipmotion.articulation.delivery import closed_on_grid, closed_times
+from lipmotion.articulation.contact import sample_pictures
+from lipmotion.articulation.curve_edits import apply_curve_edits
+from lipmotion.articulation.delivery import close_on_frame_grid, find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
+from lipmotion.formats.fap import FAP
 from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.fitting.living_curves import living_curves
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves
@@ -69,7 +69,7 @@ class MotionOutput(Output):
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
         held = held_mouth(held, frames, performance.cached(_closed_s))
         if motion_format(self.path).keyed and settings.delivery.key_tolerance:
-            held = thinned(held, Thinning(settings.delivery.key_tolerance, tuple(closed_times(held))))
+            held = thinned(held, Thinning(settings.delivery.key_tolerance, tuple(find_closed_times(held))))
         check_motion(self.path, held.motion)
         return partial(self._write, held, performance)
 
@@ -98,7 +98,7 @@ def thinned(held: Generation, thinning: Thinning) -> Generation:
         if channel.unit != WEIGHT or np.abs(curve).max(initial=0.0) > thinning.tolerance:
             kept.append(channel.name)
         if channel.unit == WEIGHT and channel.name not in held.stepped:
-            keys = thinning.kept(motion.time_s, curve[:, None])
+            keys = thinning.choose(motion.time_s, curve[:, None])
             values[:, column] = np.interp(motion.time_s, motion.time_s[keys], curve[keys])
     return replace(held, motion=replace(motion, values=values)).selected(kept)
 
@@ -113,7 +113,7 @@ def _delivered(performance: Performance) -> Generation:
 
 def _closed_s(performance: Performance) -> list[float]:
     """Return the times of p, b and m that held poses show; none, where poses are not held."""
-    return closed_times(performance.cached(_delivered)) if performance.settings.delivery.hold_ms else []
+    return find_closed_times(performance.cached(_delivered)) if performance.settings.delivery.hold_ms else []
 
 
 def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[str]]:
@@ -121,7 +121,7 @@ def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[
     settings, spoken = performance.settings, performance.cached(_delivered)
     rate_hz, curves, channels = settings.outputs.rate_hz, settings.curves, settings.outputs.channels or None
     if rate_hz is not None and (performance.cached(_closed_s) or rate_hz < spoken.motion.rate_hz):
-        spoken = closed_on_grid(spoken, rate_hz)
+        spoken = close_on_frame_grid(spoken, rate_hz)
     asked: Sequence[str] = channels or ()
     names: Sequence[str] | None = channels
     if curves is not None:
@@ -173,7 +173,7 @@ def in_format(
     others = form.other_curves and not whole and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
         curves = _curves(generation, form.curves, staging, prosody)
-        curves = with_edited_curves(curves, generation.units, generation.curve_edits)
+        curves = apply_curve_edits(curves, generation.units, generation.curve_edits)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
         own = [name for name in channels or () if name in curves.names]
         held = held.selected(own) if own else held
@@ -197,7 +197,7 @@ def resampled_curves(held: Generation, generation: Generation, rate_hz: float) -
     if OPENING not in shown.names or len(held.motion.values) != len(shown.values):
         return resampled
     contact = spoken_mouth(shown, generation.units).contact
-    rows = in_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
+    rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 
@@ -232,7 +232,7 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
         own = _closed(own, curves_of(beside(own, generation.selected(moods).motion) if moods else own, units, ARKIT))
     if name != WHOLE_FACE:
         return own
-    living = living_curves(with_mouth(motion), units, staging, prosody)
+    living = compute_living_curves(with_mouth(motion), units, staging, prosody)
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
     return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
@@ -241,7 +241,7 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
 def _closed(own: Motion, mouth: Motion) -> Motion:
     """Return blendshapes with those of the mouth as another motion has them, and those that this one has in addition.
 
-    mouth : the same weights, but where lips close that would not (``shape_weights``)
+    mouth : the same weights, but where lips close that would not (``solve_shape_weights``)
     """
     curves = {name: own[name] for name in own.names}
     curves |= {name: mouth[name] for name in mouth.names if name in curves or mouth[name].any()}

@@ -12,7 +12,7 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
 from lipmotion.formats.cues import read_cue_motion
-from lipmotion.meshes.files.steady_rate import rate_in_step
+from lipmotion.meshes.files.steady_rate import match_sound_rate
 from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.pipeline.understand.read_request import read_units
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace, Timeline, Unit
@@ -67,8 +67,8 @@ def read_generation(
 
 
 def in_step(motion: Motion, duration_s: float, advice: str = "") -> Motion:
-    """Return motion at the rate that its sound shows, where it is off by 1001 / 1000 (``rate_in_step``); a warning."""
-    rate_hz = rate_in_step(motion.rate_hz, len(motion.values), duration_s)
+    """Return motion at the rate of its sound, where it is off by 1001 / 1000 (``match_sound_rate``); a warning."""
+    rate_hz = match_sound_rate(motion.rate_hz, len(motion.values), duration_s)
     if rate_hz != motion.rate_hz:
         lasts_s = len(motion.values) / motion.rate_hz
         what = (

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lipmotion.articulation.delivery import Delivery, sound_units
+from lipmotion.articulation.delivery import Delivery, delay_units
 from lipmotion.errors import ExportError
 from lipmotion.extensions import provided
 from lipmotion.formats.label_files import LABEL_SUFFIXES, write_labels
@@ -36,7 +36,7 @@ class LabelOutput(Output):
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         generation = performance.generation
         end_s = float(generation.motion.time_s[-1])
-        return partial(write_labels, self.path, sound_units(generation.units, self.settings.delivery, end_s))
+        return partial(write_labels, self.path, delay_units(generation.units, self.settings.delivery, end_s))
 
 
 class SoundOutput(Output):

@@ -17,7 +17,7 @@ import numpy as np
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shortened
-from lipmotion.formats.label_files import labels_beside
+from lipmotion.formats.label_files import find_labels
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.understand.transcribe import phones_in_time
@@ -134,7 +134,7 @@ def recorded_sentences(
         name = "-".join(path.relative_to(root).with_suffix("").parts)
         speaker = _speaker(name, path.relative_to(root), speakers or {})
         try:
-            words = labels_beside(path).words
+            words = find_labels(path).words
             if words is not None:
                 is_any_transcribed = True
                 _check_language(words, lexicon)

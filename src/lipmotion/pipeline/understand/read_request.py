@@ -41,9 +41,9 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
     if isinstance(units, Path):
         units = read_units(units, request.tier, spoken_by)
     if words_beside and transcript is None and units is None and isinstance(request.recording, Path):
-        from lipmotion.formats.label_files import labels_beside
+        from lipmotion.formats.label_files import find_labels
 
-        labels = labels_beside(request.recording)
+        labels = find_labels(request.recording)
         if labels is not None:
             transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
     return replace(

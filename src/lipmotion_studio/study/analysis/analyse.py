@@ -15,7 +15,7 @@ from lipmotion_studio.study.analysis.ratings import difference_components, ratin
 from lipmotion_studio.study.analysis.screening import counts, screen
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, Answer, read_answers
 
-MOST_RATERS = 1000
+MAX_RATERS = 1000
 """No search goes beyond."""
 DIFFERENCES = {MOS: (0.1, 0.2, 0.3, 0.5, 1.0)}
 """Differences of means whose numbers of raters are given; on the scale of rankings, ``RANK_DIFFERENCES``."""
@@ -25,7 +25,7 @@ SHARES = (0.55, 0.6, 0.65, 0.7, 0.75)
 USUAL_POWER = 0.8
 DRAWS, SEED = 1000, 0
 """Simulated studies of a size."""
-MOST_DEGREES = 1e6
+MAX_DEGREES = 1e6
 """Degrees of freedom from which on Student's t is normal."""
 Figures = dict[str, Any]
 
@@ -47,7 +47,7 @@ def power_of(components: Components, difference: float, raters: int, sentences: 
     noise = rest * of_rest
     found = [np.maximum((part + rest) * draw - noise, 0) for part, draw in ((rater, of_rater), (sentence, of_sentence))]
     variance, degrees = variance_of_mean(found[0], found[1], noise, free)
-    limit = stdtrit(np.minimum(degrees, MOST_DEGREES), (1 + CONFIDENCE) / 2) * np.sqrt(variance)
+    limit = stdtrit(np.minimum(degrees, MAX_DEGREES), (1 + CONFIDENCE) / 2) * np.sqrt(variance)
     truth = np.sqrt(rater + sentence + rest)
     return float((ndtr((difference - limit) / truth) + ndtr((-difference - limit) / truth)).mean())
 
@@ -55,18 +55,18 @@ def power_of(components: Components, difference: float, raters: int, sentences: 
 def raters_needed(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
     """Return the smallest number of raters that tells a difference with some power.
 
-    None: even ``MOST_RATERS`` do not; then the sentences are too few.
+    None: even ``MAX_RATERS`` do not; then the sentences are too few.
     """
     low, high = 1, 2  # the power grows with the raters; one rater is no panel
     while power_of(components, difference, high, sentences) < power:
         low, high = high, 2 * high
-        if low >= MOST_RATERS:
+        if low >= MAX_RATERS:
             return None
     while high - low > 1:
         middle = (low + high) // 2
         reached = power_of(components, difference, middle, sentences) >= power
         low, high = (low, middle) if reached else (middle, high)
-    return high if high <= MOST_RATERS else None
+    return high if high <= MAX_RATERS else None
 
 
 def rating_power(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
@@ -151,25 +151,23 @@ def _parts(answers: Sequence[Answer], baseline: str | None, power: float, senten
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
-        found = _compared(mine, power, sentences) if kind == PAIRED else _rated(mine, baseline, power, sentences)
-        asked: Figures = {"kind": kind, "question": question, "answers": len(mine)}
-        asked |= {"raters": len({each.rater for each in mine}), "sentences": len({each.sentence for each in mine})}
-        parts.append(asked | found)
+        if kind == PAIRED:
+            figures = _comparison_figures(mine, power, sentences)
+        else:
+            table = rating_table(mine)
+            components, planned = difference_components(table), sentences or table.values.shape[2]
+            figures = rating_figures(table, baseline) | {
+                "variance": components._asdict() if components else None,
+                "planned_sentences": planned,
+                "raters_needed": rating_power(components, kind, planned, power),
+            }
+        part: Figures = {"kind": kind, "question": question, "answers": len(mine)}
+        part |= {"raters": len({each.rater for each in mine}), "sentences": len({each.sentence for each in mine})}
+        parts.append(part | figures)
     return parts
 
 
-def _rated(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> Figures:
-    table = rating_table(answers)
-    components = difference_components(table)
-    planned = sentences or table.values.shape[2]
-    return rating_figures(table, baseline) | {
-        "variance": components._asdict() if components else None,
-        "planned_sentences": planned,
-        "raters_needed": rating_power(components, answers[0].kind, planned, power),
-    }
-
-
-def _compared(answers: Sequence[Answer], power: float, sentences: int | None) -> Figures:
+def _comparison_figures(answers: Sequence[Answer], power: float, sentences: int | None) -> Figures:
     """Return the figures of paired comparisons but those with the anchor, which only screen."""
     mine = [each for each in answers if ANCHOR not in (each.condition, each.other)]
     if not mine:

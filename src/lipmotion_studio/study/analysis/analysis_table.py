@@ -31,7 +31,14 @@ def analysis_table(figures: Figures) -> str:
         lines += ["", f"{title}{part['sentences']} sentences"]
         unscreened = everybody if everybody["raters"] > part["raters"] else None
         lines += (_paired_lines if part["kind"] == PAIRED else _rating_lines)(part, unscreened)
-        lines += _power_lines(part, figures["power"])
+        if part.get("raters_needed"):
+            needed = []
+            for row in part["raters_needed"]:
+                size = f"{row['share']:.0%}" if "share" in row else f"{row['difference']:g}"
+                needed.append(f"{size}: {row['raters'] or 'more sentences'}")
+            what = "a preference" if part["kind"] == PAIRED else "a difference"
+            planned = f"{part['planned_sentences']} sentences, power {figures['power']:.0%}"
+            lines.append(f"  raters to tell {what} ({planned}): {', '.join(needed)}")
     return "\n".join(map(printable, lines))
 
 
@@ -50,7 +57,7 @@ def _rating_lines(part: Figures, everybody: Figures | None) -> list[str]:
         [f"{row['condition']} - {row['other']}", _number(row["difference"], "+.2f"), _limits(row, "+.2f"), *_tests(row)]
         for row in part["pairs"]
     ]
-    return [*_aligned(_without_last(rows, bool(before))), *_scope_lines(part["conditions"]), *_aligned(pairs)]
+    return [*_align(_without_last(rows, bool(before))), *_scope_lines(part["conditions"]), *_align(pairs)]
 
 
 def _paired_lines(part: Figures, everybody: Figures | None) -> list[str]:
@@ -72,32 +79,17 @@ def _paired_lines(part: Figures, everybody: Figures | None) -> list[str]:
     first, both = part["first_preferred"], part["consistency"]
     orders = f"  the first was preferred in {_number(first['share'], '.1%')} ({_limits(first, '.1%')}); "
     orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_number(both['share'], '.1%')})"
-    lines = [*_aligned(scores), *_aligned(_without_last(pairs, bool(before))), *_scope_lines(part["pairs"]), orders]
-    return lines + _strength_lines(part["bradley_terry"])
-
-
-def _strength_lines(model: Figures) -> list[str]:
+    lines = [*_align(scores), *_align(_without_last(pairs, bool(before))), *_scope_lines(part["pairs"]), orders]
+    model = part["bradley_terry"]
     if "missing" in model:
-        return [f"  no Bradley–Terry strengths: {model['missing']}"]
+        return [*lines, f"  no Bradley–Terry strengths: {model['missing']}"]
     rows = [["Bradley–Terry", "log odds", "95 %"]]
     rows += [[row["condition"], _number(row["strength"], "+.2f"), _limits(row, "+.2f")] for row in model["conditions"]]
     rows.append(["shown first", _number(model["order"]["strength"], "+.2f"), _limits(model["order"], "+.2f")])
-    lines = _aligned(rows)
+    lines += _align(rows)
     if model["is_shrunk"]:
         lines.append("  a strength would be infinite: half a win was given to both sides of each comparison")
     return lines
-
-
-def _power_lines(part: Figures, power: float) -> list[str]:
-    if not part.get("raters_needed"):
-        return []
-    needed = []
-    for row in part["raters_needed"]:
-        size = f"{row['share']:.0%}" if "share" in row else f"{row['difference']:g}"
-        needed.append(f"{size}: {row['raters'] or 'more sentences'}")
-    of = "a preference" if part["kind"] == PAIRED else "a difference"
-    planned = f"{part['planned_sentences']} sentences, power {power:.0%}"
-    return [f"  raters to tell {of} ({planned}): {', '.join(needed)}"]
 
 
 def _scope_lines(rows: Sequence[Figures]) -> list[str]:
@@ -112,7 +104,7 @@ def _without_last(rows: list[list[str]], is_kept: bool) -> list[list[str]]:
     return rows if is_kept else [row[:-1] for row in rows]
 
 
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def _align(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows in columns, the first to the left, the others to the right; no line for a head alone."""
     if len(rows) < 2:
         return []

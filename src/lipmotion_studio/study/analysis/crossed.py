@@ -117,7 +117,10 @@ def crossed_mean(values: Array, width: float) -> CrossedMean:
         return CrossedMean(mean, np.nan, np.nan, NOTHING, None)
     if cells in (raters, sentences):  # a cell for each of one kind: grouped by the other, unless there is one group
         by_rater = sentences == 1 or (raters > 1 and cells == sentences)
-        return _one_way(mean, rest.sum(axis=int(by_rater)), cells, RATERS if by_rater else SENTENCES, width)
+        sums = rest.sum(axis=int(by_rater))  # of the differences from the mean in each group
+        spread = len(sums) / (len(sums) - 1) * float(np.square(sums).sum()) / cells**2
+        over = RATERS if by_rater else SENTENCES
+        return CrossedMean(mean, _error(spread, width), len(sums) - 1, over, None)
     components = _components(rest, seen)
     shares = [float(np.square(seen.sum(axis=axis) / cells).sum()) for axis in (1, 0)]  # 1 / R and 1 / S without gaps
     rater, sentence, residual = np.array(components)[:, None] * np.array([*shares, 1 / cells])[:, None]
@@ -158,13 +161,6 @@ def _components(rest: Array, seen: NDArray[np.bool_]) -> Components:
     excess = raters * without_sentence + sentences * without_rater - squares
     residual = max(excess / (raters + sentences - cells + 1), 0.0) if raters + sentences > cells - 1 else 0.0
     return Components(max(without_sentence - residual, 0.0), max(without_rater - residual, 0.0), residual)
-
-
-def _one_way(mean: float, sums: Array, cells: int, over: str, width: float) -> CrossedMean:
-    """Return a mean with the error over groups of cells; ``sums``: of the differences from it in each group."""
-    groups = len(sums)
-    variance = groups / (groups - 1) * float(np.square(sums).sum()) / cells**2
-    return CrossedMean(mean, _error(variance, width), groups - 1, over, None)
 
 
 def _error(variance: float, width: float) -> float:

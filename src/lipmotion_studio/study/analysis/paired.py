@@ -54,7 +54,7 @@ def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
     """Return the strengths of most likely preferences.
 
     first_wins, second_wins : how often i, shown first, was preferred to j, and j to it [shape=(C, C)]
-    All conditions must be linked by comparisons (``linked``).
+    All conditions must be linked by comparisons (``link_groups``).
     Where some condition always wins, or only the place decides, the likelihood grows without end (Albert & Anderson
     1984): then every comparison that was made gets half a win on each side.
     Source: Hunter 2004, §2 and 4 (minorisation and maximisation, effect of the place). Deviation: half wins.
@@ -64,14 +64,18 @@ def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
     if is_shrunk:
         made = HALF_WIN * (first_wins + second_wins > 0)
         first_wins, second_wins = first_wins + made, second_wins + made
-    strengths, order = _maximised(first_wins, second_wins, has_order)
+    strengths, order = _maximise(first_wins, second_wins, has_order)
     probability = _logistic(strengths[:, None] - strengths + order)
     weights = (first_wins + second_wins) * probability * (1 - probability)
-    covariance: Array = np.linalg.pinv(_information(weights, has_order), hermitian=True, rcond=1e-10).astype(float)
+    pairs = np.argwhere(weights > 0)
+    contrasts = _contrasts(pairs, len(weights))
+    contrasts[:, -1] *= has_order
+    information = (contrasts * weights[tuple(pairs.T)][:, None]).T @ contrasts  # Fisher's, on strengths and order
+    covariance: Array = np.linalg.pinv(information, hermitian=True, rcond=1e-10).astype(float)
     return Strengths(strengths, order, covariance, is_shrunk)
 
 
-def linked(comparisons: Array) -> list[list[int]]:
+def link_groups(comparisons: Array) -> list[list[int]]:
     """Return the groups of conditions that are linked by comparisons.
 
     comparisons : how often i was compared with j, in this order [shape=(C, C)]
@@ -82,7 +86,7 @@ def linked(comparisons: Array) -> list[list[int]]:
     return [np.flatnonzero(labels == label).tolist() for label in range(count)]
 
 
-def _maximised(first_wins: Array, second_wins: Array, has_order: bool) -> tuple[Array, float]:
+def _maximise(first_wins: Array, second_wins: Array, has_order: bool) -> tuple[Array, float]:
     """Return log strengths, mean 0 [shape=(C,)], and the effect of the order."""
     comparisons = first_wins + second_wins
     wins = first_wins.sum(axis=1) + second_wins.sum(axis=0)
@@ -119,14 +123,6 @@ def _contrasts(pairs: NDArray[np.intp], count: int) -> Array:
     contrasts[rows, pairs[:, 1]] = -1
     contrasts[:, -1] = 1
     return contrasts
-
-
-def _information(weights: Array, has_order: bool) -> Array:
-    """Return Fisher's information on strengths and order [shape=(C + 1, C + 1)]; ``weights``: of each pair (C, C)."""
-    pairs = np.argwhere(weights > 0)
-    contrasts = _contrasts(pairs, len(weights))
-    contrasts[:, -1] *= has_order
-    return (contrasts * weights[tuple(pairs.T)][:, None]).T @ contrasts
 
 
 def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.bool_]) -> Array:
@@ -242,8 +238,14 @@ def paired_figures(table: PairTable) -> Figures:
         counts = {"wins": wins, "answers": count, "p_binomial": binomial_p(wins, count)}
         rows.append(names | counts | share_figures(cells))
     corrected = holm([row["p"] for row in rows])
+    scores = []
+    for place, name in enumerate(table.conditions):  # how often each was preferred: Hofer 2008, Fig. 6
+        chosen, preferred = (table.shown == place).any(axis=1), table.is_preferred(place)
+        share = share_figures(table.cells(preferred.astype(float), chosen))
+        counts = {"wins": int((preferred & chosen).sum()), "answers": int(chosen.sum())}
+        scores.append({"condition": name} | counts | {key: share[key] for key in ("share", "low", "high")})
     return {
-        "conditions": [_score_figures(table, place) for place in range(len(table.conditions))],
+        "conditions": scores,
         "pairs": [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)],
         "first_preferred": {"answers": len(table.is_first)} | first,
         "consistency": consistency(table),
@@ -313,7 +315,7 @@ def order_agreement(table: PairTable) -> Indices:
 def strength_figures(table: PairTable) -> Figures:
     """Return strengths of all conditions with intervals, and the effect of the order; or why there are none."""
     first, second = table.wins()
-    groups = linked(first + second)
+    groups = link_groups(first + second)
     if len(groups) > 1:
         return {"missing": f"no comparison links the groups {group_text(table.conditions, groups)}"}
     model = fit_strengths(first, second)
@@ -361,11 +363,3 @@ def _pair_cells(table: PairTable) -> list[tuple[int, int, Array]]:
         if chosen.any():
             found.append((i, j, table.cells(table.is_preferred(i).astype(float), chosen)))
     return found
-
-
-def _score_figures(table: PairTable, place: int) -> Figures:
-    """Return in what share of its comparisons a condition was preferred (Hofer 2008, Fig. 6)."""
-    chosen, preferred = (table.shown == place).any(axis=1), table.is_preferred(place)
-    share = share_figures(table.cells(preferred.astype(float), chosen))
-    counts = {"wins": int((preferred & chosen).sum()), "answers": int(chosen.sum())}
-    return {"condition": table.conditions[place]} | counts | {name: share[name] for name in ("share", "low", "high")}

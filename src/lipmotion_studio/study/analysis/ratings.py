@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_studio.study.analysis.crossed import Array, Components, CrossedMean, Interval, crossed_mean, holm
+from lipmotion_studio.study.analysis.crossed import Array, Components, CrossedMean, crossed_mean, holm
 from lipmotion_studio.study.answers import ANCHOR, HIGHEST_MOS, HIGHEST_RANK, MOS, RECORDING, Answer
 
 SCALES = {MOS: (1.0, float(HIGHEST_MOS))}
@@ -72,7 +72,21 @@ def rating_figures(table: RatingTable, baseline: str | None) -> Figures:
 
     baseline : condition to which the others are relative; None: that with the lowest mean
     """
-    means = [_mean_figures(table, name) for name in table.conditions]
+    means = []
+    for number, name in enumerate(table.conditions):
+        values = table.of(name)
+        mean, seen = crossed_mean(values, table.width), np.isfinite(values)
+        row = {
+            "condition": name,
+            "mean": mean.mean,
+            **mean.interval_within(*table.scale)._asdict(),
+            "deviation": float(values[seen].std(ddof=1)) if seen.sum() > 1 else np.nan,
+            "answers": int(table.count[number].sum()),
+            "raters": int(seen.any(axis=1).sum()),
+            "sentences": int(seen.any(axis=0).sum()),
+            "over": mean.over,
+        }
+        means.append(row)
     base = baseline if baseline in table.conditions else lowest(table)
     return {
         "conditions": sorted(means, key=lambda row: -row["mean"]),
@@ -116,7 +130,7 @@ def pair_figures(table: RatingTable) -> list[Figures]:
     p_values = [each.p_value for each in differences]
     return [
         {"condition": pair[0], "other": pair[1], "difference": mean.mean}
-        | _limits(mean.interval)
+        | mean.interval._asdict()
         | {"p": p, "p_holm": corrected, "over": mean.over}
         for pair, mean, p, corrected in zip(pairs, differences, p_values, holm(p_values), strict=True)
     ]
@@ -126,24 +140,3 @@ def difference_components(table: RatingTable) -> Components | None:
     """Return the mean variances of the effects on differences over all pairs; None: they cannot be told apart."""
     found = [mean.components for mean in (table.difference(*pair) for pair in table.compared()) if mean.components]
     return Components(*np.mean(found, axis=0).tolist()) if found else None
-
-
-def _mean_figures(table: RatingTable, condition: str) -> Figures:
-    values = table.of(condition)
-    mean = crossed_mean(values, table.width)
-    seen = np.isfinite(values)
-    deviation = float(values[seen].std(ddof=1)) if seen.sum() > 1 else np.nan
-    return {
-        "condition": condition,
-        "mean": mean.mean,
-        **_limits(mean.interval_within(*table.scale)),
-        "deviation": deviation,
-        "answers": int(table.count[table.conditions.index(condition)].sum()),
-        "raters": int(seen.any(axis=1).sum()),
-        "sentences": int(seen.any(axis=0).sum()),
-        "over": mean.over,
-    }
-
-
-def _limits(interval: Interval) -> Figures:
-    return {"low": interval.low, "high": interval.high}

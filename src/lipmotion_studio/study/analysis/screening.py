@@ -11,34 +11,33 @@ import numpy as np
 from lipmotion_studio.study.analysis.paired import order_agreement, pair_table
 from lipmotion_studio.study.answers import ANCHOR, FIRST, PAIRED, RECORDING, Answer
 
-LEAST_ATTENTION = 2 / 3
+MIN_ATTENTION = 2 / 3
 """Share of the checks of attention that must be right."""
-MOST_ANCHOR = 0.5
+MAX_ANCHOR = 0.5
 """Share of the comparisons with the anchor in which it may be preferred."""
-LEAST_CHANCE = 0.01
+MIN_CHANCE = 0.01
 """A rater whose answers to both orders disagree more than by so small a chance presses the same side."""
-LEAST_ALIKE = 8
+MIN_ALIKE = 8
 """From so many judgements on, one who always gives the same value does not judge."""
-LEAST_PANEL = 5
+MIN_PANEL = 5
 """With fewer raters nobody is said to be faster than the others."""
 FASTEST, DEVIATIONS = 0.5, 3.0
 """A rater is too fast who is below this share of the usual time, and so many deviations of its logarithm below it."""
-LEAST_ANSWERS = 0.5
+MIN_ANSWERS = 0.5
 """Share of the usual number of answers below which a rater gave too few."""
 NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 Figures = dict[str, Any]
-
 RULES = {
-    "attention": f"at least {LEAST_ATTENTION:.0%} of the checks of attention right",
+    "attention": f"at least {MIN_ATTENTION:.0%} of the checks of attention right",
     "anchor": f"the anchor rated below the recording (without one: below the mean of the others); preferred in at "
-    f"most {MOST_ANCHOR:.0%} of its comparisons",
+    f"most {MAX_ANCHOR:.0%} of its comparisons",
     "sides": f"not one side whatever is shown: pairs in both orders answered alike not more rarely than by a chance "
-    f"of {LEAST_CHANCE:.0%}",
-    "same value": f"not one value throughout, from {LEAST_ALIKE} judgements of a kind on",
+    f"of {MIN_CHANCE:.0%}",
+    "same value": f"not one value throughout, from {MIN_ALIKE} judgements of a kind on",
     "time": f"median time (relative to the same question's usual time) not below {FASTEST:.0%} and {DEVIATIONS:g} "
-    f"robust deviations under the panel's; from {LEAST_PANEL} raters on. How long the videos are is not known here",
-    "answers": f"at least {LEAST_ANSWERS:.0%} of the usual number of answers",
+    f"robust deviations under the panel's; from {MIN_PANEL} raters on. How long the videos are is not known here",
+    "answers": f"at least {MIN_ANSWERS:.0%} of the usual number of answers",
 }
 """What is required of a rater."""
 
@@ -85,33 +84,36 @@ def screen(answers: Sequence[Answer]) -> Screening:
     checks: dict[str, list[Answer]] = {rater: [] for rater in raters}
     for answer in real:
         (checks if answer.expected else judged)[answer.rater].append(answer)
-    times = _times(counts(real))
+    fast = _find_fast(counts(real))
     usual = float(np.median([len(mine) for mine in judged.values()])) if raters else 0.0
     found: dict[str, dict[str, str]] = {}
     for rater, mine in judged.items():
+        right, shown = sum(each.value == each.expected for each in checks[rater]), len(checks[rater])
         texts = {
-            "attention": _attention(checks[rater]),
-            "anchor": _anchor(mine),
-            "sides": _sides([each for each in mine if each.kind == PAIRED]),
-            "same value": _same_value(mine),
-            "time": _time(rater, times),
-            "answers": f"{len(mine)} of usually {usual:g}" if len(mine) < LEAST_ANSWERS * usual else "",
+            "attention": f"{right} of {shown} right" if right < MIN_ATTENTION * shown else "",
+            "anchor": _check_anchor(mine),
+            "sides": _check_sides([each for each in mine if each.kind == PAIRED]),
+            "same value": _check_values(mine),
+            "time": fast.get(rater, ""),
+            "answers": f"{len(mine)} of usually {usual:g}" if len(mine) < MIN_ANSWERS * usual else "",
         }
         if any(texts.values()):
             found[rater] = {rule: text for rule, text in texts.items() if text}
     return Screening(tuple(raters), found)
 
 
-def _attention(checks: Sequence[Answer]) -> str:
-    """Return what is wrong with the checks of attention of a rater; empty: nothing."""
-    right = sum(each.value == each.expected for each in checks)
-    return f"{right} of {len(checks)} right" if right < LEAST_ATTENTION * len(checks) else ""
+def _check_values(mine: Sequence[Answer]) -> str:
+    for kind in sorted({each.kind for each in mine} - {PAIRED}):
+        values = [each.value for each in mine if each.kind == kind]
+        if len(values) >= MIN_ALIKE and len(set(values)) == 1:
+            return f"{values[0]} in all {len(values)}"
+    return ""
 
 
-def _anchor(mine: Sequence[Answer]) -> str:
+def _check_anchor(mine: Sequence[Answer]) -> str:
     compared = [each for each in mine if each.kind == PAIRED and ANCHOR in (each.condition, each.other)]
     chosen = sum((each.condition == ANCHOR) == (each.value == FIRST) for each in compared)
-    if chosen > MOST_ANCHOR * len(compared):
+    if chosen > MAX_ANCHOR * len(compared):
         return f"preferred in {chosen} of {len(compared)}"
     for kind in sorted({each.kind for each in mine} - {PAIRED}):
         rated = [(each.condition, int(each.value)) for each in mine if each.kind == kind]
@@ -125,44 +127,35 @@ def _anchor(mine: Sequence[Answer]) -> str:
     return ""
 
 
-def _sides(mine: Sequence[Answer]) -> str:
+def _check_sides(mine: Sequence[Answer]) -> str:
     from scipy.special import bdtr
 
     if not mine:
         return ""
     alike, pairs = order_agreement(pair_table(mine)).sum(axis=0).tolist()
-    if pairs and bdtr(alike, pairs, 0.5) < LEAST_CHANCE:
+    if pairs and bdtr(alike, pairs, 0.5) < MIN_CHANCE:
         return f"{alike} of {pairs} pairs answered alike in both orders"
     return ""
 
 
-def _same_value(mine: Sequence[Answer]) -> str:
-    for kind in sorted({each.kind for each in mine} - {PAIRED}):
-        values = [each.value for each in mine if each.kind == kind]
-        if len(values) >= LEAST_ALIKE and len(set(values)) == 1:
-            return f"{values[0]} in all {len(values)}"
-    return ""
+def _find_fast(answers: Sequence[Answer]) -> dict[str, str]:
+    """Return the raters who are too fast, with what share of the usual time they took.
 
-
-def _times(answers: Sequence[Answer]) -> dict[str, float]:
-    """Return each rater's median logarithm of the time for an answer over the usual time for the same question."""
+    A rater's time is the median logarithm of the time for an answer over the usual time for the same question.
+    """
     timed = [each for each in answers if 0 < each.seconds < np.inf]
     logs: dict[tuple[str, str], list[float]] = {}
     for each in timed:
         logs.setdefault((each.kind, each.question), []).append(float(np.log(each.seconds)))
     usual = {question: float(np.median(found)) for question, found in logs.items()}
-    own: dict[str, list[float]] = {}
+    by_rater: dict[str, list[float]] = {}
     for each in timed:
-        own.setdefault(each.rater, []).append(float(np.log(each.seconds)) - usual[each.kind, each.question])
-    return {rater: float(np.median(found)) for rater, found in own.items()}
-
-
-def _time(rater: str, logs: Mapping[str, float]) -> str:
-    if len(logs) < LEAST_PANEL or rater not in logs:
-        return ""
-    panel = np.array(list(logs.values()))
+        by_rater.setdefault(each.rater, []).append(float(np.log(each.seconds)) - usual[each.kind, each.question])
+    if len(by_rater) < MIN_PANEL:
+        return {}
+    times = {rater: float(np.median(found)) for rater, found in by_rater.items()}
+    panel = np.array(list(times.values()))
     middle = float(np.median(panel))
     spread = DEVIATIONS * NORMAL * float(np.median(np.abs(panel - middle)))
-    if logs[rater] < middle - max(spread, -np.log(FASTEST)):
-        return f"{np.exp(logs[rater] - middle):.0%} of the usual time"
-    return ""
+    limit = middle - max(spread, -np.log(FASTEST))
+    return {rater: f"{np.exp(time - middle):.0%} of the usual time" for rater, time in times.items() if time < limit}

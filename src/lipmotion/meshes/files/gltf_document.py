@@ -1,0 +1,322 @@
+"""A glTF 2.0 document (``.glb``, ``.gltf``, ``.vrm``): its JSON and buffers, the arrays in them, and its nodes."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.meshes.files.gltf_schema import ASSET, COMPONENTS, COMPRESSION, LARGEST_NUMBER, WIDTHS, gltf_schema
+from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
+from lipmotion.meshes.model.bones import bone_kind
+from lipmotion.meshes.model.file_limits import Budget
+from lipmotion.storage.files import whole_file
+from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.types.values import SchemaError
+
+MAGIC, VERSION = b"glTF", 2
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+MAX_CHUNKS = 100
+LONGEST_NAME_CHARACTERS = 1000
+READABLE = {
+    *("KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression"),
+    *("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_transform"),
+    *("KHR_materials_unlit", "KHR_lights_punctual", "VRM", "VRMC_vrm", "VRMC_springBone", "VRMC_node_constraint"),
+    *("VRMC_materials_mtoon", "KHR_xmp_json_ld", "KHR_animation_pointer", "VRMC_vrm_animation"),
+}
+"""Extensions that a file may require: they are read, or change nothing about the surface. All of the materials'
+extensions are accepted as well."""
+
+
+@dataclass(frozen=True, eq=False)
+class GltfDocument:
+    """The JSON of a glTF file, and its buffers.
+
+    json    : the document as it was written
+    parts   : what is used of it, of the types and in the ranges of ``gltf_schema``
+    folder  : where the files are that the document names
+    budget  : what has been read so far
+    buffers : by number; a buffer that only the extension for compression could use is missing
+    """
+
+    json: dict[str, Any]
+    parts: Mapping[str, Any]
+    folder: Path
+    budget: Budget
+    buffers: dict[int, memoryview] = field(default_factory=dict)
+
+    def items(self, name: str) -> list[dict[str, Any]]:
+        """Return a list of objects of the document; none if it is missing."""
+        return self.parts.get(name, [])
+
+    def linked(self, uri: str, kind: str) -> bytes:
+        """Return what an address in the document stands for: bytes inside of it, or a file in the same folder.
+
+        kind : what it should be, for messages
+        Raises InputError: no such file, a file elsewhere, too large, or damaged.
+        """
+        if uri.startswith("data:"):
+            head, _, body = uri.partition(",")
+            if not head.endswith(";base64"):
+                raise InputError(f"its {kind} is {shortened(head)!r}, required base64; export as .glb")
+            try:
+                return base64.b64decode(body, validate=True)
+            except (binascii.Error, ValueError) as error:
+                raise InputError(f"its {kind} is no base64 ({error}); export as .glb") from error
+        name = unquote(uri) if len(uri) <= LONGEST_NAME_CHARACTERS else uri
+        if not name or len(name) > LONGEST_NAME_CHARACTERS or Path(name).name != name or "\\" in name or "\0" in name:
+            raise InputError(f"its {kind} is {shortened(repr(name))}, required a file in the same folder")
+        return self.budget.file_bytes(self.folder / name, kind)
+
+
+def read_gltf_document(path: Path) -> GltfDocument:
+    """Return the document and the buffers of a ``.glb``, ``.vrm`` or ``.gltf`` file.
+
+    Buffers in files of their own are read only from the folder of the file.
+    Raises InputError: damaged, too large, version 1, or it requires an extension that is not known.
+    """
+    budget = Budget()
+    content = memoryview(budget.file_bytes(path, "mesh"))
+    text, binary = _split_chunks(content) if content[:4] == MAGIC else (content, None)
+    budget.spend("bytes of a document", len(text))
+    plain = bytes(text).rstrip(b"\0 ")
+    budget.spend("values in a document", sum(plain.count(mark) for mark in (b",", b"[", b"{")))
+    try:
+        json: Any = from_json(plain)
+    except ValueError as error:
+        raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
+    try:
+        version = ASSET(json)["asset"]["version"]
+    except SchemaError as error:
+        raise InputError(f"no glTF document: {error}; give a .glb, .gltf or .vrm file") from error
+    if version.split(".", maxsplit=1)[0] != str(VERSION):
+        raise InputError(f"glTF version {version!r}, required 2.0; export it again")
+    try:
+        document = GltfDocument(json, gltf_schema(json)(json), path.parent, budget)
+    except SchemaError as error:
+        raise InputError(f"{error}; export it again") from error
+    for name in document.parts.get("extensionsRequired", []):
+        if name == "KHR_draco_mesh_compression":
+            raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
+        if name not in READABLE and not name.startswith("KHR_materials_"):
+            raise InputError(f"it requires the extension {shortened(name)!r}, which is not read; export without it")
+    for number, buffer in enumerate(document.items("buffers")):
+        if "uri" in buffer:
+            document.buffers[number] = memoryview(document.linked(buffer["uri"], "buffer"))
+        elif number == 0 and binary is not None:
+            document.buffers[number] = binary
+    return document
+
+
+def _split_chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
+    """Return the document and the bytes of a GLB."""
+    if len(content) < 20:
+        raise InputError(f"{len(content)} bytes, required a whole .glb; copy it again")
+    _, version, length = struct.unpack_from("<4sII", content)
+    if version != VERSION:
+        raise InputError(f"a .glb of version {version}, required {VERSION}; export it again")
+    if length > len(content):
+        raise InputError(f"{len(content)} bytes, required {length} as its header says; copy it again")
+    chunks: dict[int, memoryview] = {}
+    position = 12
+    for _ in range(MAX_CHUNKS):
+        if position + 8 > length:
+            break
+        size, kind = struct.unpack_from("<II", content, position)
+        if position + 8 + size > length:
+            raise InputError(f"a part of {size} bytes at {position}, required at most {length - position - 8} bytes")
+        chunks.setdefault(kind, content[position + 8 : position + 8 + size])
+        position += 8 + size + -size % 4
+    if JSON_CHUNK not in chunks:
+        raise InputError("a .glb without a document; export it again")
+    return chunks[JSON_CHUNK], chunks.get(BINARY_CHUNK)
+
+
+def plain_name(name: str) -> str:
+    """Return a name, or its beginning, on one line, which UTF-8 can encode."""
+    return " ".join(name[:LONGEST_NAME_CHARACTERS].encode("utf-8", "replace").decode().split())
+
+
+def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
+    """Write a ``.glb`` of a document and one buffer. Raises ExportError: the file cannot be written."""
+    text = as_json(json, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 4)
+    padded = body + b"\0" * (-len(body) % 4)
+    with whole_file(path) as unfinished, unfinished.open("wb") as file:
+        file.write(struct.pack("<4sII", MAGIC, VERSION, 28 + len(text) + len(padded)))
+        file.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
+        file.write(struct.pack("<II", len(padded), BINARY_CHUNK) + padded)
+
+
+class GltfArrays:
+    """Reads the accessors of a document; a compressed view is decoded once."""
+
+    def __init__(self, document: GltfDocument) -> None:
+        self._document = document
+        self._decoded: dict[int, memoryview] = {}
+
+    def count(self, number: int) -> int:
+        """Return the number of elements of an accessor, as the document says."""
+        return int(self._document.items("accessors")[number]["count"])
+
+    def floats(self, number: int, width: int, count: int | None = None) -> NDArray[np.float64]:
+        """Return an accessor as numbers [shape=(N, width)]; normalised whole numbers become -1 to 1 or 0 to 1.
+
+        count : the elements that it must have; None: any
+        Raises InputError: it has another width or count, it leads out of its buffer, or values are not finite.
+        """
+        raw = self._raw(number, width, count)
+        with np.errstate(invalid="ignore"):  # signalling NaN; refused below
+            values = raw.astype(np.float64)
+        if self._document.items("accessors")[number].get("normalized") and raw.dtype.kind in "iu":
+            values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
+        if not (np.abs(values) <= LARGEST_NUMBER).all():
+            raise InputError(f"it has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}; export it again")
+        return values
+
+    def whole(self, number: int, width: int, count: int | None = None) -> NDArray[np.int64]:
+        """Return an accessor of whole numbers [shape=(N, width)]. Raises InputError: as ``floats``, or of fractions."""
+        raw = self._raw(number, width, count)
+        if raw.dtype.kind not in "iu":
+            raise InputError("it counts vertices in fractions; export it again")
+        return raw.astype(np.int64)
+
+    def bytes_of(self, number: int) -> memoryview:
+        """Return the bytes of a buffer view. Raises InputError: it leads out of its buffer."""
+        return self._view(number)[0]
+
+    def _raw(self, number: int, width: int, wanted: int | None) -> NDArray[Any]:
+        accessor = self._document.items("accessors")[number]
+        count, kind = accessor["count"], accessor["type"]
+        if WIDTHS[kind] != width:
+            raise InputError(f"an array of {kind}, required {width} numbers each; export it again")
+        if wanted is not None and count != wanted:
+            raise InputError(f"an array of {count} elements, required {wanted}; export it again")
+        self._document.budget.spend("numbers", count * width)
+        dtype = np.dtype(COMPONENTS[accessor["componentType"]])
+        values = self._elements(accessor, dtype, count, width)
+        if "sparse" not in accessor:
+            return values
+        few, where = accessor["sparse"]["count"], accessor["sparse"]["indices"]
+        if few > len(values):
+            raise InputError(f"a sparse array changes {few} of {len(values)} elements; export it again")
+        rows = self._elements(where, np.dtype(COMPONENTS[where["componentType"]]), few, 1)[:, 0]
+        if few and rows.max() >= len(values):
+            raise InputError("a sparse array that leads out of its array; export it again")
+        changed = values.copy()
+        changed[rows] = self._elements(accessor["sparse"]["values"], dtype, few, width)
+        return changed
+
+    def _elements(self, place: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
+        """Return what an accessor, or a part of a sparse one, places in a view; zeros if it names none."""
+        if "bufferView" not in place:
+            return np.zeros((count, width), dtype)
+        data, stride = self._view(place["bufferView"])
+        offset, size = place.get("byteOffset", 0), dtype.itemsize * width
+        stride = stride or size
+        if stride < size or (count and offset + (count - 1) * stride + size > len(data)):
+            raise InputError(
+                f"an array of {count} elements of {size} bytes leads out of its {len(data)} bytes; export it again"
+            )
+        if not count:
+            return np.zeros((0, width), dtype)
+        return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
+
+    def _view(self, number: int) -> tuple[memoryview, int]:
+        """Return the bytes of a buffer view, and the distance of its elements (0: none apart)."""
+        view = self._document.items("bufferViews")[number]
+        packed = next((view["extensions"][name] for name in COMPRESSION if name in view.get("extensions", {})), None)
+        if packed is None:
+            return self._slice(view), view.get("byteStride", 0)
+        if number not in self._decoded:
+            self._decoded[number] = memoryview(_decode(self._slice(packed), packed, self._document.budget))
+        return self._decoded[number], packed["byteStride"]
+
+    def _slice(self, view: dict[str, Any]) -> memoryview:
+        number, offset, length = view["buffer"], view.get("byteOffset", 0), view["byteLength"]
+        buffer = self._document.buffers.get(number, memoryview(b""))
+        if offset + length > len(buffer):
+            raise InputError(
+                f"it refers to bytes {offset} to {offset + length} of buffer {number} with {len(buffer)} bytes; "
+                "copy it again, with its buffers"
+            )
+        return buffer[offset : offset + length]
+
+
+def _decode(data: memoryview, packed: dict[str, Any], budget: Budget) -> bytes:
+    count, stride, mode, kind = packed["count"], packed["byteStride"], packed["mode"], packed.get("filter", "NONE")
+    budget.spend("compressed bytes", count * stride + len(data))
+    if kind not in {"NONE", "EXPONENTIAL"}:
+        raise InputError(f"a compressed array under the filter {shortened(kind)!r}, which is not read")
+    if mode == "ATTRIBUTES":
+        elements = decode_attributes(bytes(data), count, stride)
+        return decode_exponents(elements).tobytes() if kind == "EXPONENTIAL" else elements.tobytes()
+    if stride not in {2, 4}:
+        raise InputError(f"compressed indices of {stride} bytes, required 2 or 4; export without compression")
+    indices = (decode_triangles if mode == "TRIANGLES" else decode_indices)(bytes(data), count)
+    return indices.astype("<u2" if stride == 2 else "<u4").tobytes()
+
+
+Matrix = NDArray[np.float64]
+DEEPEST_NESTING = 256
+"""Most levels of nodes."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedNode:
+    """A node of a scene.
+
+    matrix : from its own frame to that of the scene [shape=(4, 4)]
+    kinds  : the node of each kind of bone that it is or hangs on; of several, the one nearest to the root
+    """
+
+    matrix: Matrix
+    kinds: Mapping[str, int]
+
+
+def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
+    """Return the nodes of the scene by their numbers; without scenes, all that hang on a node that hangs on none.
+
+    Raises InputError: a node is in the scene twice, too deep, or too far away.
+    """
+    nodes, scenes = document.items("nodes"), document.items("scenes")
+    if scenes:
+        roots = scenes[document.parts.get("scene", 0)].get("nodes", [])
+    else:
+        roots = sorted(set(range(len(nodes))).difference(*(node.get("children", []) for node in nodes)))
+    waiting = [(root, PlacedNode(np.eye(4), {}), 0) for root in roots]
+    placed: dict[int, PlacedNode] = {}
+    while waiting:
+        number, parent, depth = waiting.pop()
+        node = nodes[number]
+        if number in placed or depth > DEEPEST_NESTING:
+            raise InputError(f"node {number} is in the scene twice, or too deep; export it again")
+        local = np.eye(4)
+        if "matrix" in node:
+            local = np.array(node["matrix"]).reshape(4, 4).T
+        else:
+            x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+            rotation = [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+            local[:3, :3] = np.array(rotation) * node.get("scale", (1.0, 1.0, 1.0))
+            local[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+        matrix = parent.matrix @ local
+        if not np.abs(matrix).max() <= LARGEST_NUMBER:
+            raise InputError(f"node {number} is beyond ±{LARGEST_NUMBER:g}, with those that it hangs on; scale it down")
+        kind = bone_kind(node.get("name", ""))
+        kinds = parent.kinds if kind is None else {kind: number, **parent.kinds}
+        placed[number] = PlacedNode(matrix, kinds)
+        waiting += [(child, placed[number], depth + 1) for child in node.get("children", [])]
+    return placed

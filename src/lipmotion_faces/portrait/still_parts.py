@@ -1,0 +1,171 @@
+"""The parts of the portrait that are painted once: background, hair, neck and shoulders, ears, and the bald head."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lipmotion_faces.portrait.design import (
+    WHITE,
+    Colour,
+    Design,
+    Points,
+    both_sides,
+    closed_curve,
+    ellipse,
+    move_down,
+    open_curve,
+    path_points,
+    stroke,
+)
+from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, Window
+
+
+def paint_wall(window: Window, design: Design) -> Layer:
+    """Return a layer with the background, opaque."""
+    layer, colours = Layer(window), design.palette
+    lit = () if design.flat else (Glow(-0.5, -0.5, 1.5, 1.6, colours.wall_light, 0.9),)
+    layer.fill(path_points("-9 -9, 9 -9, 9 9, -9 9"), colours.wall, *lit)
+    return layer
+
+
+def paint_behind_head(window: Window, design: Design) -> Layer:
+    """Return a layer with what is behind the head: hair, neck, shoulders, ears."""
+    layer, colours, flat = Layer(window), design.palette, design.flat
+
+    if design.hair_behind is not None:
+        lit = [Glow(side * 0.98, 1.1, 0.2, 0.75, colours.hair, 1.0) for side in (-1, 1)]
+        gleam = Glow(-1.0, 1.2, 0.05, 0.3, colours.hair_light, 0.5)
+        _fill_outlined(
+            layer, design, design.hair_behind, colours.hair_dark, *lit, gleam, Rim(0.04, colours.hair_dark, 0.4)
+        )
+        for inward in () if flat else (0.05, 0.13, 0.2):
+            line = [(0.9 - inward, 0.5), (0.93 - inward, 0.95), (1 - 1.3 * inward, 1.35), (0.95 - 1.6 * inward, 1.7)]
+            for strand in both_sides(stroke(open_curve(line), [0, 0.014, 0.018, 0])):
+                layer.fill(strand, colours.hair_light, opacity=0.22, blur=0.006)
+    _fill_outlined(layer, design, design.neck, colours.skin, Rim(0.1, colours.skin_shade, 0.7))
+    if design.collarbones:
+        for bone in both_sides(stroke(open_curve("0.1 1.93, 0.35 1.86, 0.62 1.84"), [0, 0.02, 0])):
+            layer.fill(bone, colours.skin_shade, opacity=0.6, blur=0.01)
+    if not flat:
+        shadow = move_down(design.shoulders, -0.02)
+        layer.fill(shadow, colours.skin_deep, opacity=0.3, blur=0.03, within=design.neck)
+    collars = ((part, colours.collar, colours.collar_dark) for part in design.collar)
+    for part, colour, dark in ((design.shoulders, colours.cloth, colours.cloth_dark), *collars):
+        _fill_outlined(
+            layer, design, part, colour, Rim(0.1, dark, 0.8), Glow(-0.9, 1.92, 0.35, 0.12, colours.cloth_light, 0.7)
+        )
+    if design.cap is not None:
+        _fill_outlined(layer, design, design.cap, colours.hair_dark, Rim(0.05, colours.hair, 0.5))
+    _paint_ears(layer, design)
+    return layer
+
+
+def _paint_ears(layer: Layer, design: Design) -> None:
+    colours = design.palette
+    for ear in both_sides(closed_curve(design.ear)):
+        _fill_outlined(layer, design, ear, colours.skin, Rim(0.05, colours.skin_shade, 0.8))
+    for hollow in both_sides(closed_curve(design.ear_hollow)):
+        layer.fill(hollow, colours.skin_deep, opacity=0.5, blur=0 if design.flat else 0.012)
+    if design.earrings:
+        for ring in both_sides(closed_curve("0.775 0.42, 0.8 0.445, 0.775 0.47, 0.75 0.445")):
+            layer.fill(ring, colours.gold, Glow(0, 0.43, 9, 0.015, WHITE, 0.6))
+
+
+def _fill_outlined(layer: Layer, design: Design, outline: Points, colour: Colour, *shades: Glow | Rim) -> None:
+    layer.fill(outline, colour, *(() if design.flat else shades))
+    layer.contour(outline, design.line, design.palette.line)
+
+
+def paint_shaded_neck(window: Window, design: Design) -> Layer:
+    """Return a layer with the neck in full shadow."""
+    layer = Layer(window)
+    layer.fill(design.neck, design.palette.skin_deep)
+    for part in (design.shoulders, *design.collar):
+        layer.cut(part)
+    return layer
+
+
+def paint_chin_shadow(window: Window, design: Design) -> Pixels:
+    """Return the shadow of the head on what is behind it, 0..1 [shape=(h, w)]; the jaw is at rest."""
+    layer = Layer(window)
+    soft, strength = (0.0, 0.45) if design.flat else (0.045, 0.55)
+    layer.fill(move_down(design.skull, 0.12), design.palette.skin_deep, opacity=strength, blur=soft)
+    return layer.pixels[..., 3]
+
+
+def paint_head(window: Window, design: Design) -> Layer:
+    """Return a layer with the bald head without eyes and mouth."""
+    layer, colours, skull = Layer(window), design.palette, design.skull
+    if design.flat:
+        inner = skull * (0.86, 0.97) + (-0.06, -0.02)
+        unlit = np.vstack([skull[skull[:, 0] >= 0], inner[inner[:, 0] >= 0][::-1]])
+        layer.fill(skull, colours.skin)
+        layer.fill(unlit, colours.skin_shade, opacity=0.5, within=skull)
+        for cheek in (-1, 1):
+            layer.fill(ellipse(cheek * 0.46, 0.5, 0.13, 0.08), colours.blush, opacity=design.blush)
+        layer.fill(ellipse(0.03, 0.52, 0.1, 0.06), colours.skin_shade, opacity=0.55)
+        nose = open_curve("-0.1 0.5, -0.075 0.565, 0.0 0.585, 0.075 0.565, 0.1 0.5")
+        layer.fill(stroke(nose, [0.0, 0.024, 0.026, 0.024, 0.0]), colours.line)
+        layer.contour(skull, design.line, colours.line)
+    else:
+        glows = [Glow(-0.05, -0.35, 0.5, 0.35, colours.skin_light, 0.55)]
+        glows.append(Glow(0.0, 1.24, 0.16, 0.09, colours.skin_light, 0.45))
+        for side in (-1, 1):
+            glows += [
+                Glow(side * 0.43, 0.54, 0.23, 0.18, colours.blush, design.blush),
+                Glow(side * 0.36, 0.30, 0.2, 0.1, colours.skin_light, 0.5),
+                Glow(side * 0.34, -0.08, 0.24, 0.12, colours.skin_shade, 0.38),
+            ]
+        layer.fill(skull, colours.skin, Rim(0.16, colours.skin_shade, 0.62), *glows)
+        if design.beard:
+            y = design.lips.line_y
+            for x, at, wide, high in ((0, y + 0.28, 0.46, 0.26), (-0.5, y - 0.02, 0.2, 0.3), (0.5, y - 0.02, 0.2, 0.3)):
+                spot = ellipse(x, at, wide, high)
+                layer.fill(spot, colours.beard, opacity=design.beard, blur=0.09, within=skull)
+            layer.fill(ellipse(0, y - 0.15, 0.26, 0.07), colours.beard, opacity=0.8 * design.beard, blur=0.05)
+        _paint_nose(layer, design)
+    brow_colour, strength, soft = (colours.hair_dark, 1.0, 0.0) if design.flat else (colours.hair, 0.92, 0.007)
+    for brow in both_sides(stroke(open_curve(design.eyes.brow), design.eyes.brow_widths)):
+        layer.fill(brow, brow_colour, opacity=strength, blur=soft)
+    return layer
+
+
+def _paint_nose(layer: Layer, design: Design) -> None:
+    """Paint nose and philtrum."""
+    colours, wide = design.palette, (design.nose_width, 1.0)
+    layer.fill(ellipse(0, 0.61, 0.19, 0.06) * wide, colours.skin_shade, opacity=0.75, blur=0.03)
+    layer.fill(ellipse(0, 0.545, 0.13, 0.075) * wide, colours.skin_light, opacity=0.7, blur=0.04)
+    sides = both_sides(stroke(open_curve("0.125 -0.1, 0.085 0.12, 0.1 0.36"), [0.03, 0.05, 0.02]) * wide)
+    for bridge, opacity in zip(sides, (0.45, 0.25), strict=True):
+        layer.fill(bridge, colours.skin_shade, opacity=opacity, blur=0.025)
+    for wing in both_sides(stroke(open_curve("0.155 0.5, 0.195 0.57, 0.165 0.635"), [0, 0.022, 0]) * wide):
+        layer.fill(wing, colours.skin_deep, opacity=0.6, blur=0.008)
+    for nostril in both_sides(stroke(open_curve("0.035 0.632, 0.085 0.615, 0.135 0.632"), [0, 0.034, 0]) * wide):
+        layer.fill(nostril, colours.skin_deep, opacity=0.9, blur=0.005)
+    base = stroke(open_curve("-0.04 0.645, 0 0.655, 0.04 0.645"), [0, 0.012, 0])
+    layer.fill(base, colours.skin_deep, opacity=0.5, blur=0.006)
+    layer.fill(ellipse(-0.02, 0.3, 0.03, 0.2) * wide, colours.skin_light, opacity=0.6, blur=0.03)
+    layer.fill(ellipse(-0.02, 0.545, 0.035, 0.022), WHITE, opacity=0.45, blur=0.015)
+    layer.fill(ellipse(0, 0.745, 0.028, 0.06), colours.skin_shade, opacity=0.4, blur=0.02)
+    for ridge in both_sides(ellipse(0.052, 0.76, 0.014, 0.05)):
+        layer.fill(ridge, colours.skin_light, opacity=0.5, blur=0.016)
+
+
+def paint_hair(window: Window, design: Design) -> Layer:
+    """Return a layer with the hair in front of the forehead."""
+    layer, colours = Layer(window), design.palette
+    strand_colour, strength, soft = (colours.hair_light, 1.0, 0.0) if design.flat else (colours.hair_dark, 0.3, 0.006)
+    for lock in design.hair:
+        shades: list[Glow | Rim] = []
+        if not design.flat:
+            shades.append(Rim(0.07, colours.hair_dark, 0.55))
+            if lock.light is not None:
+                shades.append(Glow(*lock.light, colours.hair_light, 0.75))
+            shadow = move_down(lock.outline, 0.035)
+            layer.fill(shadow, colours.skin_deep, opacity=0.4, blur=0.03, within=design.skull)
+        layer.fill(lock.outline, colours.hair, *shades)
+        for path in lock.strands:
+            strand = stroke(open_curve(path), [0, 0.02, 0.016, 0])
+            layer.fill(strand, strand_colour, opacity=strength, blur=soft, within=lock.outline)
+        layer.contour(lock.outline, design.line, colours.line)
+    return layer

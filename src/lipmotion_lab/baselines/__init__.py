@@ -1,1 +1,0 @@
-"""Baselines: methods without a model of phones."""

@@ -1,0 +1,256 @@
+"""``lipmotion experiment engines``: all engines on the same recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.engines import Engine, engine_named
+from lipmotion.errors import InputError
+from lipmotion.kernels.threads import one_thread
+from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.training.train import Run, about_training, train
+from lipmotion.printable import printable
+from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.storage.files import make_folder, unfinished_work
+from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.sources import Source, check_apart
+from lipmotion.types import sub_monitor, with_progress
+from lipmotion_lab.comparison import correlation_statistic, opening_curves, significance_mark
+from lipmotion_lab.evaluation.evaluate import figures_of
+from lipmotion_lab.evaluation.held_out import (
+    OPENING,
+    ComparedClip,
+    HeldOutRecordings,
+    generate_compared,
+    load_held_out,
+    make_speech,
+)
+from lipmotion_lab.learning_curve import check_training_names
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, check_opening, opening_row_with_rates
+
+ENGINES_COMPARED = ("trajectory", "coupled", "selection")
+SUFFIX = ".lipmotion"
+CHECKED = ("corpus", "split", "minutes")
+"""What the header of a model says of its training, and must say of this corpus's training list."""
+
+
+@dataclass(frozen=True, eq=False)
+class EngineModel:
+    """A model of one engine.
+
+    seconds : of its training in this run; None: it was there already
+    """
+
+    model: Model
+    seconds: float | None
+
+
+def engine_models(
+    corpus: Corpus, folder: Path | None, settings: ExperimentSettings, names: Sequence[str] = ENGINES_COMPARED
+) -> dict[str, EngineModel]:
+    """Return models of the corpus's training list, each engine by its defaults.
+
+    folder : holds the models; what is not there yet is trained and put there. None: all are trained and not kept
+    names  : of the engines
+    A run that was stopped goes on where it was.
+    Raises CorpusError: no training list. Raises InputError: a file in the folder is a model of something else.
+    Raises ModelFormatError: a file in the folder is no model.
+    Raises ExportError: the folder cannot be written to, or holds the corpus.
+    """
+    training = corpus.required("train")
+    models: dict[str, EngineModel] = {}
+    if folder is not None:
+        check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
+        make_folder(folder)
+        paths = {name: folder / f"{name}{SUFFIX}" for name in names}
+        models = {name: EngineModel(load_model(path), None) for name, path in paths.items() if path.is_file()}
+        if models:
+            utterances = [corpus.utterance(name) for name in training]
+            required = about_training(corpus, utterances, "train", len(training))
+            for name, kept in models.items():
+                _check_model(paths[name], name, kept.model, required)
+    missing = [name for name in names if name not in models]
+    for number, name in enumerate(missing):
+        part = sub_monitor(settings.monitor, number / len(missing), (number + 1) / len(missing), f"{name}: ")
+        start_s, engine, here = perf_counter(), engine_named(name, {}), replace(settings, monitor=part)
+        if folder is None:
+            model = train_engine(corpus, engine, here)
+        else:
+            with unfinished_work(paths[name]) as work:
+                save_model(train_engine(corpus, engine, here, work), paths[name])
+            model = load_model(paths[name])  # as the next run finds it
+        models[name] = EngineModel(model, perf_counter() - start_s)
+    return {name: models[name] for name in names}
+
+
+def train_engine(corpus: Corpus, engine: Engine[Any], settings: ExperimentSettings, work: Path | None = None) -> Model:
+    """Return a model of the training list; ``work``: a folder from which training that was stopped goes on."""
+    run = Run(settings.monitor, work, settings.workers)
+    return train(corpus, engine=engine, recogniser=settings.recogniser, lexicon=settings.lexicon, run=run)[0]
+
+
+def _check_model(path: Path, name: str, model: Model, required: Mapping[str, object]) -> None:
+    """Raise InputError unless a model is one of this engine and of the training list of the corpus."""
+    way_out = "; move it away, or give another folder"
+    if model.engine.name != name:
+        raise InputError(f"{path}: a model of the engine {model.engine.name!r}, required {name!r}{way_out}")
+    if model.prior is not None:
+        raise InputError(
+            f"{path}: stands on another model, which may know the recordings that are compared; required one that "
+            f"stands on none (train --from none){way_out}"
+        )
+    different = [key for key in CHECKED if model.about.get(key) != required[key]]
+    if different:
+        texts = [", ".join(f"{key} {about.get(key)}" for key in different) for about in (model.about, required)]
+        raise InputError(
+            f"{path}: trained on {texts[0]}, required the training list of this corpus: {texts[1]}{way_out}"
+        )
+
+
+NAME_WIDTH = 19
+HEAD = (
+    f"  {'system':{NAME_WIDTH}}{'ACC (95 %)':23}  nRMSE  variance  jerk  width | score  precision  p b m  false |"
+    "  no pins: score  precision  p b m  false"
+)
+LEGEND = (
+    "variance, jerk: by those of the recordings; width: its ACC; score, precision, p b m: %; false: closings outside "
+    "p b m, a minute of speech; no pins: lips not made to meet"
+)
+CLOSURES = (("score", "6.1f"), ("precision", "11.1f"), ("recall_p_b_m", "7.1f"), ("false_per_minute", "7.0f"))
+
+
+def table(figures: Mapping[str, Any]) -> str:
+    """Return the figures of ``comparison.engines`` as text."""
+    minutes = {row["minutes"] for row in figures["models"].values()}
+    lines = [
+        f"split {figures['split']}: {figures['clips']} clips; models of {' and '.join(map(str, sorted(minutes)))} "
+        f"minutes of train; closed under {figures['closed_under']:.4f}"
+    ]
+    for name, condition in figures["conditions"].items():
+        row = next(iter(condition["systems"].values()))
+        lines += [
+            "",
+            f"{name}: opening, with {row['p_b_m']} p b m and {row['closings']} closings recorded, "
+            f"{figure_text(row['original_per_minute'], '.0f')} a minute outside p b m",
+            HEAD,
+            *(_line(system, each, figures["reference"]) for system, each in condition["systems"].items()),
+        ]
+    lines += [
+        "",
+        f"* differs from {figures['reference']}: the 95 % interval of the difference on the same clips leaves out 0",
+        LEGEND,
+    ]
+    return "\n".join(map(printable, lines))
+
+
+def _line(name: str, row: Mapping[str, Any], reference: str) -> str:
+    acc = "{}{} ({}–{})".format(
+        figure_text(row["acc"], ".3f"),
+        significance_mark(row["acc_gain_95"][reference]),
+        *(figure_text(end, ".3f") for end in row["acc_95"]),
+    )
+    columns = (("nrmse", "7.3f"), ("global_variance", "10.2f"), ("jerk", "6.2f"), (f"{WIDTH}_acc", "7.3f"))
+    opening = "".join(figure_text(row[key], form) for key, form in columns)
+    pinned, free = ("".join(figure_text(of[key], form) for key, form in CLOSURES) for of in (row, row["unpinned"]))
+    return f"  {name:{NAME_WIDTH}}{acc:23}{opening} |{pinned} |{'':9}{free}"
+
+
+REFERENCE_ENGINE = "trajectory"
+"""The engine that every other system is compared with; its phone models give the phones in time."""
+WIDTH = "width"
+
+
+@one_thread()
+def engines(
+    corpus: Corpus,
+    *,
+    split: str | None = "val",
+    models: Path | None = None,
+    settings: ExperimentSettings = DEFAULT_SETTINGS,
+) -> dict[str, Any]:
+    """Return the figures of all engines on ``split``.
+
+    split  : the recordings to compare; none of them may be in the training list
+    models : folder of the engines' models (``models.engine_models``); None: they are trained and not kept
+    The phones in time are those of the trajectory engine's phone models, for all of them.
+    Raises CorpusError: no training list, no utterances of this split or some of the training list among them, or
+    motion without an opening.
+    Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
+    """
+    held_out = corpus.required(split)
+    check_training_names(corpus, corpus.required("train"), held_out)
+    channels = check_opening(corpus, held_out)
+    monitor = settings.monitor
+    trained = engine_models(corpus, models, replace(settings, monitor=sub_monitor(monitor, 0, 0.6)))
+    recordings = load_held_out(
+        corpus,
+        cached_recogniser(trained[REFERENCE_ENGINE].model.phones),
+        selection=Selection(names=held_out),
+        channels=channels,
+        lexicon=settings.lexicon,
+        monitor=sub_monitor(monitor, 0.6, 0.7),
+    )
+    steps = [(condition, name) for condition in recordings.conditions for name in trained]
+    pinned: dict[str, dict[str, Sequence[ComparedClip]]] = {condition: {} for condition in recordings.conditions}
+    unpinned: dict[str, dict[str, Sequence[ComparedClip]]] = {condition: {} for condition in recordings.conditions}
+    for condition, name in with_progress(steps, "comparing", sub_monitor(monitor, 0.7, 1)):
+        system = trained[name].model
+        known = replace(recordings, speakers=system.speakers)
+        speech = make_speech(known, condition, system.engine, system.learned)
+        clips = generate_compared(known, speech, system.engine, system.learned)
+        free = system.engine.without_closures()
+        pinned[condition][name], unpinned[condition][name] = clips, clips
+        if free != system.engine:
+            unpinned[condition][name] = generate_compared(known, speech, free, system.learned)
+        settings.receive(name, condition, recordings, clips)
+    about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
+    about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
+    about["models"] = {
+        name: {
+            "configuration": each.model.engine.config.as_mapping(),
+            "utterances": each.model.about["utterances"],
+            "minutes": each.model.about["minutes"],
+            "seconds": each.seconds,
+        }
+        for name, each in trained.items()
+    }
+    conditions = {
+        condition: {
+            "systems": {
+                name: _row(recordings, clips, unpinned[condition][name], found, settings.seed)
+                for name, clips in found.items()
+            }
+        }
+        for condition, found in pinned.items()
+    }
+    return nan_as_null(about | {"conditions": conditions})
+
+
+def _row(
+    recordings: HeldOutRecordings,
+    pinned: Sequence[ComparedClip],
+    free: Sequence[ComparedClip],
+    systems: Mapping[str, Sequence[ComparedClip]],
+    seed: int,
+) -> dict[str, Any]:
+    """Return the figures of one system; ``unpinned``: those of the opening without forced closures.
+
+    ``acc_gain_95`` has the paired 95 % interval of its ACC minus that of each of the systems.
+    """
+    acc = correlation_statistic(*opening_curves(recordings, pinned))
+    gains = {
+        name: acc.gain(correlation_statistic(*opening_curves(recordings, clips)), seed)
+        for name, clips in systems.items()
+    }
+    figures = figures_of(pinned, recordings, seed)
+    width = figures["channels"].get(WIDTH, {})
+    row = opening_row_with_rates(figures) | {"acc_gain_95": gains}
+    row |= {f"{WIDTH}_{name}": width.get(name) for name in ("acc", "nrmse", "global_variance")}
+    row |= {"jerk": figures["channels"][OPENING]["jerk"], "lag_ms": figures["lag_ms"]}
+    return row | {"unpinned": opening_row_with_rates(figures_of(free, recordings, seed))}

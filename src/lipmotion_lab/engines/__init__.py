@@ -1,1 +1,0 @@
-"""The engines of this project compared in one table."""

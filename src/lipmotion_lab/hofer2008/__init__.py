@@ -1,1 +1,0 @@
-"""The experiments of Hofer, Yamagishi and Shimodaira 2008, on any corpus."""

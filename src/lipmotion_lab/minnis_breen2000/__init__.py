@@ -1,1 +1,0 @@
-"""The comparisons of Minnis & Breen 2000."""

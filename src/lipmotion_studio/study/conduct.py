@@ -1,0 +1,104 @@
+"""Conducting a study: it is served over HTTP, its answers are exported, and raters are forgotten."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import closing
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion_studio.study.answers import Answer, write_answers
+from lipmotion_studio.study.manifest import Study, check_videos, read_study
+from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name, rater_number
+from lipmotion_studio.study.trials import questions_of, trials_of
+from lipmotion_studio.web.listening import HOST, check_installed, listening, serve
+
+PORT = 8000
+
+
+def serve_study(
+    folder: Path,
+    *,
+    host: str = HOST,
+    port: int = PORT,
+    names: Collection[str] = (),
+    started: Callable[[str], object] | None = None,
+) -> None:
+    """Let raters take part in a study, until the process is stopped.
+
+    host    : address to listen at; the default can be reached from this machine alone
+    port    : 0: any that is free
+    names   : of the server as raters call it, where another passes their requests on, as ``study.example.org``
+    started : called with the address of the page once raters can come
+    Every answer is on the disk before the rater's page learns that it is stored. A stopped study goes on where it was.
+    Raises InputError: no study, a video is missing or has changed, or the address cannot be listened at.
+    Raises MissingDependencyError: a package of the extra ``study`` is not installed.
+    """
+    check_installed("serving a study", "study")
+    from lipmotion_studio.study.application import study_application
+
+    study = read_study(folder)
+    videos = check_videos(study, folder)
+    with listening(host, port) as place, closing(StudyStore(folder)) as store:
+        serve(study_application(study, videos, store, names), place, host=host, started=started)
+
+
+def collected_answers(folder: Path) -> list[Answer]:
+    """Return the answers of a study, in the order of raters and trials.
+
+    Raises InputError: no study, or nobody has answered yet.
+    """
+    study = read_study(folder)
+    with closing(StudyStore(folder, create=False)) as store:
+        return list(answers_of(study, store.sheets()))
+
+
+def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
+    """Write the answers of a study as CSV (``write_answers``); return how many there are.
+
+    rater : name of the only rater whose answers are written, as the page shows it; None: all raters
+    Raises InputError: as ``collected_answers``, or no answers of this rater. Raises ExportError: the file cannot be
+    written.
+    """
+    answers = collected_answers(folder)
+    if rater is not None:
+        name = rater_name(rater_number(rater))
+        answers = [answer for answer in answers if answer.rater == name]
+        if not answers:
+            raise InputError(f"{folder}: no answers of the rater {name}; the names are in the exported answers")
+    write_answers(output, answers)
+    return len(answers)
+
+
+def forget_rater(folder: Path, name: str) -> int:
+    """Delete a rater and all of the rater's answers; return how many there were.
+
+    name : as in the exported answers, and as the page shows it to the rater
+    Files that were exported before are not changed.
+    Raises InputError: no study, or no such rater.
+    """
+    read_study(folder)
+    with closing(StudyStore(folder, create=False)) as store:
+        return store.forget(rater_number(name))
+
+
+def answers_of(study: Study, sheets: list[AnswerSheet]) -> Iterator[Answer]:
+    """Yield one row for each judgement."""
+    orders = {number: trials_of(study, number) for number in sorted({sheet.rater for sheet in sheets})}
+    for sheet in sheets:
+        trial = orders[sheet.rater][sheet.trial]
+        for (question, condition, other), value in zip(questions_of(study, trial), sheet.values, strict=True):
+            yield Answer(
+                rater_name(sheet.rater),
+                study.kind,
+                sheet.trial,
+                study.shown(trial)[0].sentence,
+                question,
+                condition,
+                other,
+                value,
+                sheet.seconds,
+                sheet.plays,
+                trial.practice,
+                trial.expected,
+            )

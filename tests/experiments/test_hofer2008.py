@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.copies import copied, renamed
+from lipmotion import Corpus, evaluate, train
+from lipmotion.engines import engine_from_settings
+from lipmotion.engines.joint.engine import JointEngine
+from lipmotion.errors import CorpusError
+from lipmotion.hmm.model import HmmConfig
+from lipmotion_lab import hofer2008 as table1
+from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options, hofer2008, table, what_held
+from lipmotion_lab.runner import ExperimentSettings
+
+PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
+SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+TWO = Table1Options(states=(3,), mixtures=(1, 2))
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("work")
+
+
+@pytest.fixture(scope="module")
+def figures(toy_corpus: Corpus, work: Path) -> dict[str, Any]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
+        return hofer2008(toy_corpus, TWO, work=work, settings=SMALL)
+
+
+@pytest.mark.long
+def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+    assert (figures["clips"], figures["trained_on"], len(figures["tables"])) == (2, 8, 4)
+    evaluated: dict[tuple[str, str], Any] = {}
+    for block in figures["tables"]:
+        row = block["rows"]["eVis"]
+        pins = "true" if block["pins"] != "as printed" else "false"
+        settings = ["states=3", f"mixtures={row['gaussians']}", f"closures={pins}"]
+        if (pins, settings[1]) not in evaluated:
+            engine = engine_from_settings(preset="hofer2008", settings=settings)
+            model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine)[0]
+            evaluated[pins, settings[1]] = evaluate(model, toy_corpus)
+        of_condition = evaluated[pins, settings[1]]["conditions"][block["condition"]]
+        opening = of_condition["channels"]["opening"]
+        assert [row[key] for key in ("acc", "jerk", "global_variance")] == pytest.approx(
+            [opening[key] for key in ("acc", "jerk", "global_variance")], abs=0.02
+        )  # a kept model is stored at half precision
+        assert row["score"] == pytest.approx(100 * of_condition["closures"]["score"], abs=1e-9)
+        assert row["acc_on_val"][str(row["gaussians"])] == max(row["acc_on_val"].values())
+    assert json.loads(json.dumps(figures, allow_nan=False))
+
+
+@pytest.mark.long
+def test_what_was_finished_is_not_trained_again(
+    figures: dict[str, Any], toy_corpus: Corpus, work: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
+    monkeypatch.setattr(JointEngine, "growing_models", None)
+    again = hofer2008(toy_corpus, TWO, work=work, settings=SMALL)
+    assert table(again) == table(figures)
+
+
+@pytest.mark.long
+def test_pins_move_the_lips_of_the_same_units(figures: dict[str, Any]) -> None:
+    """Of given words: of recognised units, only those that are p b m alone are pinned."""
+    printed, pinned = (block["rows"]["eVis"] for block in figures["tables"] if block["condition"] == "with transcript")
+    assert pinned["recall_p_b_m"] == 100
+    assert pinned["nrmse"] != printed["nrmse"]
+    assert pinned["gaussians"] == printed["gaussians"]
+
+
+def test_what_held_of_the_order_is_told_in_words() -> None:
+    gains = [("eVis", "pbVis", (1.0, 3.0)), ("eVis", "phone", (-2.0, -1.0)), ("pbVis", "phone", (-1.0, 1.0))]
+    pairs = [{"better": better, "worse": worse, "score_gain_95": gain} for better, worse, gain in gains]
+    block = {"rows": {"eVis": {"score": 70.0}, "phone": {"score": 71.0}}, "paper_order": pairs}
+    assert what_held(block) == ("best: phone; of the paper's 3 pairs hold 1, reversed 1 (phone over eVis), open 1")
+
+
+def test_a_star_is_that_of_its_own_interval() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results" / "hofer2008.json"
+    figures = json.loads(results.read_text(encoding="utf-8"))
+    row = figures["tables"][0]["rows"]["eVis"] | {"score_gain_95": [1.0, 2.0], "acc_gain_95": [-1.0, 1.0]}
+    figures["tables"] = [figures["tables"][0] | {"rows": {"eVis": row}}]
+    (line,) = [line for line in table(figures).split("\n") if line.startswith("  eVis")]
+    assert f"{row['score']:.1f}* (" in line
+    assert f"{row['acc']:.3f} (" in line
+
+
+def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="no utterances of split 'val'"):
+        hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
+    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+        hofer2008(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"))
+
+
+def test_the_document_shows_the_figures_beside_it() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    figures = json.loads((results / "hofer2008.json").read_text(encoding="utf-8"))
+    page = (results / "hofer2008.md").read_text(encoding="utf-8")
+    shown = page.partition("```text\n")[2].partition("\n```")[0].splitlines()
+    assert len(shown) > 40
+    rest = iter(table(figures).splitlines())
+    assert [line for line in shown if line not in rest] == []  # all of them, in the order of the table
+    assert figures["trained_on"] == 452

@@ -1,0 +1,240 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from lipmotion_lab.hofer2008 import PAPER_SCORES
+from lipmotion_lab.report.charts import Dot, draw_curve, draw_dots, draw_rising
+from lipmotion_lab.report.report import PARTS
+from lipmotion_lab.report.section import FEW_CLIPS, Column, PaperOrder, PaperPair, Section, Table, warn_of_few
+from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES
+
+"""Sections of the figures that stand in docs/results: what the page says of them follows from them."""
+
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+FILES = {
+    "hofer2008": "hofer2008",
+    "xieliu2007": "xieliu2007",
+    "minnis2000": "minnis2000",
+    "engines": "engines-test",
+    "learning-curve": "learning-curve",
+    "folds": "folds",
+}
+
+
+def figures_of(name: str) -> dict[str, Any]:
+    """Return the figures of an experiment on GRID."""
+    content: dict[str, Any] = json.loads((RESULTS / f"{FILES[name]}.json").read_text(encoding="utf-8"))
+    return content
+
+
+def section_of(name: str) -> Section:
+    return PARTS[name].section(figures_of(name))
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_every_table_and_chart_is_whole(name: str) -> None:
+    section = section_of(name)
+    names = [table.name for table in section.tables]
+    assert len(names) == len(set(names))
+    for table in section.tables:
+        assert all(record[column.key] is not None for record in table.records()[:1] for column in table.columns[:1])
+        keys = {tuple(record) for record in table.records()}
+        assert len(keys) == 1
+    for chart in section.charts:
+        assert ElementTree.fromstring(chart).find("svg").attrib["role"] == "img"  # noqa: S314 (our own)
+    assert section.verdict
+    assert all(sentences for sentences in section.words.values())
+
+
+def test_hofers_pairs_are_counted_from_their_intervals() -> None:
+    section, figures = section_of("hofer2008"), figures_of("hofer2008")
+    (block,) = [
+        each
+        for each in figures["tables"]
+        if (each["states"], each["condition"], each["pins"]) == (5, "audio only", "as printed")
+    ]
+    held = sum(pair["score_gain_95"][0] > 0 for pair in block["paper_order"])
+    against = sum(pair["score_gain_95"][1] < 0 for pair in block["paper_order"])
+    assert f"of the paper's 10 pairs {held} held, {against} reversed" in section.verdict
+    assert {name: row["paper"] for name, row in section.table.rows.items()} == PAPER_SCORES
+    assert len(section.more) == len(figures["tables"]) - 1
+
+
+def test_xie_and_lius_figures_stand_beside_ours() -> None:
+    section, figures = section_of("xieliu2007"), figures_of("xieliu2007")
+    ours = figures["rows"][-1]["conditions"]["audio only"]
+    for record in section.table.records():
+        assert record["acc"] == ours[record["system"]]["acc"]
+        printed = PAPER_FIGURES.get(record["system"].removesuffix(", tuned"), (None, None))
+        assert (record["paper_amse"], record["paper_acc"]) == printed
+    pairs = [pair for pair in figures["rows"][-1]["pairs"] if not pair["better"].endswith("tuned")]
+    held = sum(pair["amse_95"][1] < 0 for pair in pairs)
+    assert f"Systems as printed: AMSE: of the paper's {len(pairs)} pairs {held} held" in section.words["By AMSE"][0]
+
+
+def test_an_addition_that_helps_is_named_so() -> None:
+    section, figures = section_of("minnis2000"), figures_of("minnis2000")
+    rows = figures["lists"]["test"]["conditions"]["audio only"]
+    raised, lowered, left_open = section.words["Each addition alone"]
+    assert ("guide from the sound" in raised) == (rows["guide from the sound"]["acc_gain_95"][0] > 0)
+    named = sum(text.count("(") for text in (raised, lowered, left_open))
+    assert named == 9
+    assert section.table.caption == "Unit selection, test, audio only"
+
+
+def test_few_recordings_are_warned_of() -> None:
+    assert warn_of_few(FEW_CLIPS) == {}
+    assert "Only 2 recordings" in warn_of_few(2)["Beware"][0]
+
+
+def test_a_share_that_is_not_defined_is_not_told_as_0() -> None:
+    figures = figures_of("folds")
+    figures["conditions"]["audio only"]["recall_p_b_m"] = None
+    (sentence,) = PARTS["folds"].section(figures).words["More closings than a test list has"]
+    assert "the lips close in – %" in sentence
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_figures_that_are_not_defined_end_no_run(name: str) -> None:
+    def undefined(content: Any) -> Any:
+        """Return figures whose correlations, scores and their intervals are not defined."""
+        if isinstance(content, list):
+            return [undefined(each) for each in content]
+        if not isinstance(content, dict):
+            return content
+        gone = {"acc", "score", "recall_p_b_m", "acc_95", "score_95", "acc_gain_95", "score_gain_95"}
+        return {
+            key: undefined(each)
+            if key not in gone or isinstance(each, dict)
+            else [None, None]
+            if isinstance(each, list)
+            else None
+            for key, each in content.items()
+        }
+
+    section = PARTS[name].section(undefined(figures_of(name)))
+    assert section.verdict
+    assert "nan" not in "".join(map(str, section.charts))
+
+
+PAPER = {"a": 3.0, "b": 2.0, "c": 1.0}
+
+
+def order(here: dict[str, float | None], signs: dict[str, int], is_error: bool = False) -> PaperOrder:
+    """Return an order of which the intervals of the pairs have some signs."""
+    lies = {1: (0.1, 0.3), -1: (-0.3, -0.1), 0: (-0.1, 0.1)}
+    pairs = [PaperPair(pair[0], pair[1], signs[pair] * 0.2, lies[signs[pair]]) for pair in ("ab", "ac", "bc")]
+    return PaperOrder("ACC", PAPER, here, pairs, "+.1f", is_error)
+
+
+@pytest.mark.parametrize(
+    ("signs", "outcome"),
+    [
+        ((1, 1, 1), "3 held, 0 reversed, 0 open: all held"),
+        ((1, 1, 0), "2 held, 0 reversed, 1 open: more held than reversed"),
+        ((-1, -1, 1), "1 held, 2 reversed, 0 open: more reversed than held"),
+        ((1, -1, 0), "1 held, 1 reversed, 1 open: as many held as reversed"),
+        ((0, 0, 0), "0 held, 0 reversed, 3 open: these recordings say nothing of its order"),
+    ],
+)
+def test_the_verdict_counts_pairs(signs: tuple[int, ...], outcome: str) -> None:
+    found = order({"a": 0.3, "b": 0.2, "c": 0.1}, dict(zip(("ab", "ac", "bc"), signs, strict=True)))
+    assert found.verdict() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
+
+
+def test_every_pair_is_told_once_the_better_one_here_first() -> None:
+    found = order({"a": 0.1, "b": 0.3, "c": 0.1}, {"ab": -1, "ac": 0, "bc": 1})
+    said = found.sentences()
+    assert said[:2] == ["In print: a 3.0, b 2.0, c 1.0.", "Here: b 0.3, a 0.1, c 0.1."]
+    assert said[2].startswith(
+        "The paper's best is 0.2 behind the best here: a against b -0.2, 95 % interval -0.3 to -0.1"
+    )
+    assert [text.partition("): ")[2] for text in said[3:6]] == ["b over c.", "b over a.", "a and c."]
+    assert said[6].startswith("Intervals aside, 1 of 3 differences")
+
+
+def test_the_smallest_error_is_the_best() -> None:
+    found = order({"a": 0.1, "b": None, "c": 0.3}, {"ab": 1, "ac": 1, "bc": 1}, is_error=True)
+    assert found.verdict().endswith("Best in print: c; here: a.")
+    assert found.sentences()[1] == "Here: a 0.1, c 0.3."
+
+
+def test_equal_and_undefined_figures() -> None:
+    signs = {"ab": 0, "ac": 0, "bc": 0}
+    assert order({"a": 0.1, "b": 0.1, "c": 0.0}, signs).verdict().endswith("here: a, b.")
+    nothing = order({"a": None, "b": None, "c": None}, signs)
+    assert nothing.verdict().endswith("here: none.")
+    assert nothing.sentences()[1] == "Here: ."
+
+
+ROWS = {
+    "a, <b>": {"acc": 0.5, "acc_95": (0.4, 0.6), "acc_gain_95": (0.1, 0.2), "kind": "x"},
+    "c": {"acc": None, "acc_95": (None, None), "acc_gain_95": None, "kind": None},
+}
+TABLE = Table("t", "All & some", (Column("acc", "ACC", ".2f", "a note"), Column("kind", "kind")), ROWS, "c")
+
+
+def test_every_figure_has_its_interval_and_difference_in_the_files() -> None:
+    first, second = csv.DictReader(io.StringIO(TABLE.as_csv()))
+    assert first["system"] == "a, <b>"
+    assert [float(first[key]) for key in ("acc", "acc_low", "acc_high")] == [0.5, 0.4, 0.6]
+    assert [float(first[key]) for key in ("acc_difference_low", "acc_difference_high")] == [0.1, 0.2]
+    assert set(second.values()) == {"c", ""}
+    content = TABLE.as_content()
+    assert content["rows"][0]["acc_difference_low"] == 0.1
+    assert (content["reference"], content["columns"]["acc"]) == ("c", "a note")
+
+
+def test_the_page_shows_the_interval_and_a_star() -> None:
+    html = TABLE.as_html("folder")
+    assert '<th scope="row">a, &lt;b&gt;</th><td class="number">0.50* <small>0.40–0.60</small></td><td>x</td>' in html
+    assert '<th scope="row">c</th><td class="number">–</td><td>–</td>' in html
+    assert 'href="folder/tables/t.csv"' in html
+    assert "difference from c leaves out 0" in html
+
+
+def test_a_table_without_rows() -> None:
+    empty = Table("t", "none", (Column("acc", "ACC", ".2f"),), {})
+    assert (empty.as_csv().strip(), empty.records()) == ("system", [])
+
+
+def test_figures_intervals_and_the_papers_stand_on_one_axis() -> None:
+    rows = [Dot("a", 0.5, (0.4, 0.6), 0.9), Dot("<b>", 0.7, (None, None)), Dot("c", None)]
+    drawing = ElementTree.fromstring(draw_dots("ACC", "ACC", rows)).find("svg")  # noqa: S314 (our own)
+    first, second = (float(each.attrib["cx"]) for each in drawing.findall("circle"))
+    (interval,) = (each for each in drawing.findall("line") if each.attrib["class"] == "interval")
+    low, high = float(interval.attrib["x1"]), float(interval.attrib["x2"])
+    (paper,) = drawing.findall("path")
+    assert high - low == pytest.approx(second - first, abs=0.3)
+    assert (low + high) / 2 == pytest.approx(first, abs=0.3)
+    assert float(paper.attrib["d"][1:].split()[0]) - first == pytest.approx(2 * (second - first), abs=0.3)
+    assert "<b> 0.7" in drawing.attrib["aria-label"]
+
+
+def test_a_curve_has_both_motions_and_what_is_marked() -> None:
+    time_s = np.arange(5) / 25
+    made = ElementTree.fromstring(draw_curve("x", time_s, np.zeros(5), np.arange(5.0), [(-0.1, 0.04, "p")])).find("svg")  # noqa: S314 (our own)
+    assert [line.attrib["class"] for line in made.findall("polyline")] == ["recorded", "generated"]
+    assert float(made.find("rect").attrib["x"]) == 34
+
+
+def test_a_still_motion_is_drawn() -> None:
+    assert "polyline" in draw_curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])
+    assert "nan" not in draw_dots("a", "b", [Dot("still", 0.0, (0.0, 0.0))])
+
+
+def test_a_curve_over_numbers_rises_with_them() -> None:
+    lines = {"a": [(10.0, Dot("10", 0.1, (0.0, 0.2))), (100.0, Dot("100", 0.3, (0.2, 0.4)))]}
+    drawing = ElementTree.fromstring(draw_rising("t", "n", lines)).find("svg")  # noqa: S314 (our own)
+    (x1, y1), (x2, y2) = (map(float, p.split(",")) for p in drawing.find("polyline").attrib["points"].split())
+    assert x2 > x1
+    assert y2 < y1

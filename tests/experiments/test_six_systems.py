@@ -1,0 +1,263 @@
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.copies import copied
+from lipmotion import Corpus, evaluate, train
+from lipmotion.engines import engine_from_settings, engine_named
+from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures import curves
+from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.storage.archive import read_archive
+from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
+from lipmotion_lab.noise import NoiseConditions
+from lipmotion_lab.runner import ExperimentSettings
+from lipmotion_lab.xie_liu2007 import six_systems, systems
+from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
+from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, table, xieliu2007
+from lipmotion_lab.xie_liu2007.systems import (
+    BEST_PATH,
+    BLSTM,
+    COMPARED_SYSTEMS,
+    MATCHED,
+    PAPER_FIGURES,
+    REFERENCE_SYSTEM,
+    TUNED,
+    TuningOptions,
+    select_systems,
+    system_from_arrays,
+)
+
+LONG = pytest.mark.long
+PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
+SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+MULTISTREAM = "ph-MSHMM"
+CHAINS = [MULTISTREAM, REFERENCE_SYSTEM, MULTISTREAM + TUNED, REFERENCE_SYSTEM + TUNED]
+SYSTEMS = [*CHAINS, BEST_PATH, "trajectory HMM", "loudness", "mean pose"]
+BRIEF = TuningOptions(clips=3, judges=1, weights=(1.0, 0.3), mixtures=2, states=())
+PICTURE = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("pictures") / "new"
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("work")
+
+
+@pytest.fixture(scope="module")
+def figures(toy_corpus: Corpus, folder: Path, work: Path) -> dict[str, Any]:
+    return xieliu2007(
+        toy_corpus,
+        ComparisonOptions(systems=SYSTEMS, tuning=BRIEF, transcripts=True, noise=NoiseConditions(("white",), (0.0,))),
+        sizes=[8, 3],
+        plots=folder,
+        work=work,
+        settings=SMALL,
+    )
+
+
+@LONG
+def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
+    assert [(row["names"], row["used"]) for row in figures["rows"]] == [(3, 3), (8, 8)]
+    for row in figures["rows"]:
+        assert list(row["conditions"]) == ["audio only", "with transcript"]
+        assert all(list(rows) == SYSTEMS for rows in row["conditions"].values())
+        assert list(row["training"]) == SYSTEMS
+    assert (figures["split"], figures["clips"], figures["tuning"]["clips"]) == ("test", 2, 3)
+    assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 0)]
+    assert json.loads(json.dumps(figures, allow_nan=False))
+
+
+@LONG
+def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+    wanted = evaluate(train(toy_corpus, recogniser=PHONE_MODELS)[0], toy_corpus)
+    for condition, expected_figures in wanted["conditions"].items():
+        row = figures["rows"][-1]["conditions"][condition]["trajectory HMM"]
+        assert (row["acc"], row["amse"]) == pytest.approx((expected_figures["acc"], expected_figures["amse"]))
+        assert row["opening_acc_95"] == pytest.approx(tuple(expected_figures["opening_acc_95"]))
+        expected = (expected_figures["lag_ms"], expected_figures["channels"]["opening"]["acc"])
+        assert (row["lag_ms"], row["opening"]["acc"]) == pytest.approx(expected)
+        assert row["opening"]["false_per_minute"] == expected_figures["closures_p_b_m"]["false_per_minute"]
+
+
+@LONG
+@pytest.mark.parametrize("name", [MULTISTREAM, REFERENCE_SYSTEM])
+def test_a_preset_is_the_row_of_the_table(name: str, figures: dict[str, Any], work: Path, toy_corpus: Corpus) -> None:
+    """The arrays of the model file and the motion are the same; conversions of one model differ by that alone."""
+    model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine_from_settings(preset=name))[0]
+    arrays = model.engine.to_arrays(model.learned)
+    kept = read_archive(work / "8" / f"system-{name}.checkpoint")
+    assert kept.keys() == {*arrays, "about"}
+    for key, array in arrays.items():
+        np.testing.assert_array_equal(array, kept[key])
+    system, learned = system_from_arrays(kept), model.engine.from_arrays(arrays)
+    recordings = load_held_out(toy_corpus, cached_recogniser(model.phones))
+    made = generate_clips(recordings, "audio only", model.engine, learned)
+    for ours, theirs in zip(made, generate_clips(recordings, "audio only", system.engine, system.model), strict=True):
+        np.testing.assert_array_equal(ours.generated, theirs.generated)
+    rows, training = (figures["rows"][-1][part] for part in ("conditions", "training"))
+    row, generated = rows["audio only"][name], [clip.generated for clip in made]
+    original = [clip.original for clip in made]
+    assert row["acc"] == pytest.approx(curves.pooled_correlation(generated, original).mean())
+    assert row["amse"] == pytest.approx(curves.mean_distance(generated, original))
+    assert training[name]["parameters"] == model.learned.chains.parameters
+    if name == REFERENCE_SYSTEM:
+        by_path = engine_named("coupled", model.engine.config.as_mapping() | {"conversion": "viterbi"})
+        made = generate_clips(recordings, "audio only", by_path, learned)
+        acc = curves.pooled_correlation([clip.generated for clip in made], original).mean()
+        assert rows["audio only"][BEST_PATH]["acc"] == pytest.approx(acc)
+
+
+@LONG
+def test_a_tuned_system_is_the_best_that_was_tried(figures: dict[str, Any]) -> None:
+    for name in (MULTISTREAM, REFERENCE_SYSTEM):
+        assert {trial["options"].get("audio_weight", 1.0) for trial in figures["tuning"]["tried"][name]} == {1.0, 0.3}
+        row = figures["rows"][-1]["training"][name + TUNED]
+        best = max(row["tried"], key=lambda trial: trial["acc"])
+        assert (row["options"], row["parameters"]) == (best["options"], best["parameters"])
+        assert row["tried"][0]["options"].keys() == {"structure", "chains"}  # as printed
+    pairs = figures["rows"][-1]["pairs"]
+    assert [(pair["better"], pair["worse"]) for pair in pairs] == [
+        (REFERENCE_SYSTEM + ending, MULTISTREAM + ending) for ending in ("", TUNED)
+    ]
+    rows = figures["rows"][-1]["conditions"]["audio only"]
+    assert pairs[0]["acc"] == pytest.approx(rows[REFERENCE_SYSTEM]["acc"] - rows[MULTISTREAM]["acc"])
+
+
+@LONG
+def test_it_goes_on_from_what_is_finished(
+    figures: dict[str, Any], work: Path, toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(systems, "train_stages", None)
+    monkeypatch.setattr(six_systems, "generate_clips", None)
+    options = ComparisonOptions(systems=[*CHAINS, "mean pose"], tuning=BRIEF)
+    again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SMALL)
+    for name in CHAINS:
+        kept, rows = (each["rows"][-1]["conditions"]["audio only"][name] for each in (again, figures))
+        assert kept == rows
+
+
+@LONG
+def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: dict[str, Any]) -> None:
+    rows = figures["rows"][-1]["conditions"]["audio only"]
+    for name, row in rows.items():
+        for key in ("amse", "acc"):
+            low, high = row[f"{key}_95"]
+            assert low - 1e-9 <= row[key] <= high + 1e-9
+        # tuned, the same system may be the same
+        assert row["acc_gain_95"] != (0, 0) or name.startswith(REFERENCE_SYSTEM)
+    assert rows[REFERENCE_SYSTEM]["acc_gain_95"] == (0, 0)
+
+
+@LONG
+def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
+    clean = figures["rows"][-1]["conditions"]["audio only"]
+    much = figures["noise"][0]["systems"]
+    for name in ("trajectory HMM", MULTISTREAM):
+        assert clean[name]["amse"] < much[name]["amse"]
+    assert clean["mean pose"]["opening"]["rmse"] == pytest.approx(much["mean pose"]["opening"]["rmse"])
+
+
+@LONG
+def test_pictures_are_written(figures: dict[str, Any], folder: Path) -> None:
+    assert figures
+    assert sorted(path.name for path in folder.iterdir()) == sorted(PLOT_FILES.values())
+    assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
+
+
+@LONG
+def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
+    lines = table(figures).splitlines()
+    for name in SYSTEMS:
+        assert sum(line.startswith(f"  {name}  ") for line in lines) >= 5
+    assert any(line.split()[:3] == [REFERENCE_SYSTEM, "6.911", "0.696"] for line in lines)
+    assert any(line.split()[-3:] == ["clean", "0", "dB"] for line in lines)
+
+
+@LONG
+@pytest.mark.parametrize("visual", ["both"])
+def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
+    options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
+    received: list[tuple[str, str]] = []
+    settings = replace(SMALL, receive=lambda *given: received.append(given[:2]))
+    made = xieliu2007(toy_corpus, options, settings=settings)
+    assert made["rows"][0]["names"] == 8
+    assert received == [(name, "audio only") for name in made["rows"][0]["training"]]
+    model = train(toy_corpus, recogniser=PHONE_MODELS, visual=visual)[0]
+    expected_figures = evaluate(model, toy_corpus)["conditions"]["audio only"]
+    row = made["rows"][0]["conditions"]["audio only"]["trajectory HMM"]
+    assert (row["acc"], row["amse"]) == pytest.approx((expected_figures["acc"], expected_figures["amse"]))
+    part = "eigenlips_" if visual == "both" else ""
+    assert row[f"{part}acc"] == pytest.approx(expected_figures["eigenlips"]["acc"])
+    assert row[f"{part}amse"] == pytest.approx(expected_figures["eigenlips"]["amse"])
+    assert len(made["channels"]) == len(expected_figures["eigenlips"]["channels"]) + (3 if visual == "both" else 0)
+    assert (row["opening"] is None) == (visual == "eigenlips")
+    assert json.loads(json.dumps(made, allow_nan=False))
+    starts = [line.split()[:1] for line in table(made).splitlines()]
+    assert (["eigenlips"] in starts) == (visual == "both")
+
+
+def test_systems_in_the_order_of_the_table() -> None:
+    assert select_systems(["loudness", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "loudness"]
+    assert select_systems([MATCHED]) == ["ph-MSHMM", "ph-vi-FHMM", REFERENCE_SYSTEM, "ph-vi-FHMM" + TUNED, MATCHED]
+    assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
+    with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
+        select_systems(["ph-RNN"])
+
+
+def test_other_engines_are_compared_when_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    left_out = COMPARED_SYSTEMS.keys() - select_systems(None)
+    assert left_out == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
+    assert set(PAPER_FIGURES) | {name + TUNED for name in PAPER_FIGURES} <= set(select_systems(None))
+    with pytest.raises(MissingDependencyError, match=r'needs PyTorch.*; pip install ".*\[network\]"'):
+        select_systems([BLSTM])
+
+
+def test_without_matplotlib_there_are_no_pictures(
+    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MissingDependencyError, match=r'need matplotlib.*; pip install ".*\[plots\]"'):
+        xieliu2007(toy_corpus, plots=tmp_path)
+
+
+def test_what_cannot_be_chosen(toy_corpus: Corpus, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no system 'nothing'"):
+        xieliu2007(toy_corpus, ComparisonOptions(systems=["nothing"]), settings=SMALL)
+    with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
+        xieliu2007(toy_corpus, ComparisonOptions(systems=[REFERENCE_SYSTEM]), sizes=[9], settings=SMALL)
+    with pytest.raises(CorpusError, match="are in the split that is compared with"):
+        xieliu2007(toy_corpus, order=toy_corpus.names("val"))
+    with pytest.raises(CorpusError, match="no utterances of split 'val'"):
+        xieliu2007(copied(toy_corpus, tmp_path / "b", lambda u: replace(u, split="test") if u.split == "val" else u))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ExportError, match="file: is a file; give a folder for the pictures"):
+        xieliu2007(toy_corpus, plots=tmp_path / "file")
+
+
+def test_noise_that_cannot_be_made() -> None:
+    with pytest.raises(InputError, match="unknown noise 'pink'; required some of: white, babble"):
+        NoiseConditions(("pink",))
+    with pytest.raises(InputError, match="a babble of 0 talkers; required at least 2"):
+        NoiseConditions(("babble",))
+
+
+def test_the_document_shows_the_figures_beside_it() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    text = (results / "xieliu2007.md").read_text(encoding="utf-8")
+    figures = json.loads((results / "xieliu2007.json").read_text(encoding="utf-8"))
+    assert f"```text\n{table(figures)}\n```" in text
+    assert REFERENCE_SYSTEM + TUNED in figures["rows"][0]["training"]

@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lipmotion import Corpus, Model, Selection
+from lipmotion.engines.coupled.chains.structures import SYSTEMS
+from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.coupled.engine import CoupledEngine
+from lipmotion.measures import curves
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.testing.examples import examples
+from lipmotion.types import silent_monitor
+from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out
+from lipmotion_lab.xie_liu2007.systems import (
+    CONVERSIONS,
+    Trial,
+    TuningOptions,
+    best_trial,
+    choose_by,
+    judge_systems,
+    list_alternatives,
+    list_changed_options,
+    search_settings,
+    train_stages,
+)
+
+SMALL = SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
+
+
+@pytest.fixture(scope="module")
+def validation(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
+    phones = Recogniser(toy_model.phones, "own")
+    return load_held_out(toy_corpus, phones, selection=Selection("val"), channels=("opening", "width"))
+
+
+def test_a_model_on_the_way_is_that_of_its_own_training() -> None:
+    sentences = examples(3)
+    one, two = train_stages(SMALL | {"mixtures": 2}, sentences)
+    assert [system.engine.config.mixtures for system in (one, two)] == [1, 2]
+    for system in (one, two):
+        alone = CoupledEngine(CoupledConfig(**SMALL | {"mixtures": system.engine.config.mixtures}))
+        arrays = alone.to_arrays(alone.fit(sentences, silent_monitor).model)
+        found = system.engine.to_arrays(system.model)
+        assert all(np.array_equal(arrays[name], found[name]) for name in arrays)
+    assert two.model.chains.parameters > one.model.chains.parameters
+
+
+def test_parameters_are_counted_by_hand() -> None:
+    """13 visemes × 2 states: means and variances of every density, and a probability of moving on of every state."""
+    (system,) = train_stages(SMALL, examples(3))
+    groups = [group.mixtures.means.shape[2] for group in system.model.chains.groups]
+    assert system.model.chains.parameters == 26 * (2 * sum(groups) + 1)
+
+
+@pytest.mark.long
+def test_every_conversion_is_judged_by_the_correlation_of_what_it_makes(validation: HeldOutRecordings) -> None:
+    systems = [*train_stages(SMALL, examples(3))]
+    found = [*judge_systems(iter(systems), validation, CONVERSIONS)]
+    assert [(system.engine.config.start, system.engine.config.steps) for _, system in found] == [
+        ("viterbi", 3),
+        ("soft", 1),
+    ]
+    for trial, system in found:
+        made = generate_clips(validation, "audio only", system.engine, system.model)
+        generated, original = [clip.generated for clip in made], [clip.original for clip in made]
+        assert trial.acc == pytest.approx(curves.pooled_correlation(generated, original).mean())
+        assert trial.amse == pytest.approx(curves.mean_distance(generated, original))
+    best = choose_by(lambda trial: -trial.amse, found)
+    assert best.tried == tuple(trial for trial, _ in found)
+    assert best.engine.config.start == min(found, key=lambda pair: pair[0].amse)[1].engine.config.start
+
+
+def test_one_setting_after_another_from_the_best_so_far() -> None:
+    asked: list[Mapping[str, Any]] = []
+
+    def attempt(options: Mapping[str, Any]) -> list[Trial]:
+        asked.append(options)
+        score = {1.0: 0.5, 0.3: 0.7}[options["audio_weight"]] - 0.1 * (options["states"] == 3)
+        counts = [1, 2] if options["mixtures"] == 2 else [1]
+        return [Trial({**options, "mixtures": k}, score - 0.01 * k, 0.0, 0) for k in counts]
+
+    kinds = [[{"audio_weight": 1.0, "mixtures": 2}, {"audio_weight": 0.3, "mixtures": 2}], [{"states": 3}]]
+    tried = search_settings({"states": 5}, kinds, attempt)
+    assert [(each["audio_weight"], each["mixtures"], each["states"]) for each in asked] == [
+        (1.0, 2, 5),
+        (0.3, 2, 5),
+        (0.3, 1, 3),
+    ]
+    assert best_trial(tried).options == {"states": 5, "audio_weight": 0.3, "mixtures": 1}
+    assert best_trial([Trial({"a": 1}, 0.5, 0, 0), Trial({"a": 2}, 0.5, 0, 0)]).options == {"a": 1}
+
+
+def test_what_is_tried_for_which_structure() -> None:
+    names = {
+        system: [
+            *dict.fromkeys(
+                name for kind in list_alternatives(options, TuningOptions()) for each in kind for name in each
+            )
+        ]
+        for system, options in SYSTEMS.items()
+    }
+    assert names["ph-HMM"] == ["audio_weight", "mixtures", "states"]
+    assert names["ph-MSHMM"] == names["ph-vi-CHMM"] == ["audio_weight", "mixtures", "visual_mixtures", "states"]
+    assert names["ph-FHMM"] == ["audio_weight", "mixtures", "unseen_loss", "start_asynchrony", "states"]
+
+
+def test_options_are_told_where_they_are_not_those_printed() -> None:
+    for system, options in SYSTEMS.items():
+        changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 0.0}))
+        assert changed == {
+            "structure": options["structure"],
+            "chains": options["chains"],
+            "audio_weight": 0.3,
+            "unseen_loss": 0.0,
+        }, system
