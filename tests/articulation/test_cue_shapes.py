@@ -4,7 +4,7 @@ import pytest
 
 from lipmotion.articulation.cue_sheets import ANY_OPEN, ANY_SHAPE, PHONE_SHAPES, shapes_of_phone
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
-from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, choose_drawn_shape
+from lipmotion.units.visemes import OPTIONAL, SHAPES, choose_drawn_shape
 
 BLAIR = "AI E O U FV L MBP WQ etc rest".split()
 """The names that OpenToonz knows."""

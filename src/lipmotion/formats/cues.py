@@ -23,7 +23,7 @@ from lipmotion.printable import is_line
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE
-from lipmotion.units.mouth_chart import REST, SHAPES
+from lipmotion.units.visemes import REST, SHAPES
 
 
 class CueFormat(NamedTuple):

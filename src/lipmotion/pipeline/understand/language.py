@@ -14,7 +14,7 @@ from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
-from lipmotion.units.languages_told import detect_language
+from lipmotion.units.language_detection import detect_language
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import split_written_words
 

@@ -14,7 +14,7 @@ from lipmotion.speech.recognition.network.posteriors import (
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.types import Audio
 from lipmotion.units.ipa_phones import read_tokens
-from lipmotion.units.languages_told import is_english
+from lipmotion.units.language_detection import is_english
 
 LOG = logging.getLogger("lipmotion")
 LEAST_CONFIDENCE = 0.4
