@@ -20,7 +20,7 @@ from lipmotion.articulation.pauses import (
     share_short_pauses,
 )
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit, VoiceEvent
-from lipmotion.types.voice_event import BREATH, LAUGHTER
+from lipmotion.types.audio import BREATH, LAUGHTER
 
 TIME_S = np.arange(301) / 100
 

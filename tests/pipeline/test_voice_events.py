@@ -12,7 +12,7 @@ from lipmotion.articulation.pauses import LAUGH_GAP
 from lipmotion.pipeline.outputs.delivered import delivered
 from lipmotion.pipeline.request import Request
 from lipmotion.types import Delivery
-from lipmotion.types.voice_event import LAUGHTER
+from lipmotion.types.audio import LAUGHTER
 from speech.made_voices import laugh, pulses, recording, said, vowels
 
 

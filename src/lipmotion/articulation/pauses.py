@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
-from lipmotion.types.voice_event import BREATH, LAUGHTER
+from lipmotion.types.audio import BREATH, LAUGHTER
 from lipmotion.units import is_silent, mark_closing_phones
 
 Curve = NDArray[np.float64]

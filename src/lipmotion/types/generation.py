@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.types.audio import Audio
+from lipmotion.types.audio import Audio, VoiceEvent
 from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
 from lipmotion.types.moods import MoodKey
 from lipmotion.types.motion import Motion, interpolate_rows
 from lipmotion.types.timeline import Span, Timeline, Unit
-from lipmotion.types.voice_event import VoiceEvent
 
 CachedT = TypeVar("CachedT")
+LARGEST_GAIN, MAX_DRAWN = 3.0, 10_000
+"""Largest factor of movements, and largest number of values of a drawn curve."""
+RowChange = Callable[[NDArray[np.floating[Any]]], NDArray[np.floating[Any]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +179,11 @@ class Pin:
 
     def __post_init__(self) -> None:
         for name, number in (("time", self.time_s), ("value", self.value)):
-            if not _is_number(number):
+            try:
+                is_number = isinstance(number, Real) and isinstance(float(number), float)
+            except OverflowError:
+                is_number = False
+            if not is_number:
                 raise InputError(f"the {name} of a pin is {shortened(repr(number))}, required a number")
 
 
@@ -208,9 +214,6 @@ class Gain:
             )
 
 
-LARGEST_GAIN = 3.0
-
-
 @dataclass(frozen=True)
 class DrawnCurve:
     """Values that a curve takes over a stretch, as somebody has drawn them.
@@ -218,7 +221,7 @@ class DrawnCurve:
     start_s, end_s : seconds; before and after them the curve goes over into them within 0.1 s
     channel : name of a channel or curve
     values  : at equal distances from the start to the end, in the unit of the channel
-    Raises InputError: fewer than 2 values, or more than ``MOST_DRAWN``; no numbers; or an end that is not after the
+    Raises InputError: fewer than 2 values, or more than ``MAX_DRAWN``; no numbers; or an end that is not after the
     start.
 
     >>> DrawnCurve(1.0, 1.5, "opening", (0.0, 0.1, 0.0)).channel
@@ -231,12 +234,9 @@ class DrawnCurve:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if not 2 <= len(self.values) <= MOST_DRAWN or not all(map(math.isfinite, self.values)):
-            raise InputError(f"{len(self.values)} values are drawn, required 2 to {MOST_DRAWN} finite numbers")
+        if not 2 <= len(self.values) <= MAX_DRAWN or not all(map(math.isfinite, self.values)):
+            raise InputError(f"{len(self.values)} values are drawn, required 2 to {MAX_DRAWN} finite numbers")
         _check_stretch(self.start_s, self.end_s)
-
-
-MOST_DRAWN = 10_000
 
 
 @dataclass(frozen=True)
@@ -283,14 +283,6 @@ class Constraints:
         if not isinstance(self.pins, Collection) or not all(isinstance(pin, Pin) for pin in self.pins):
             found = shortened(repr(self.pins))
             raise InputError(f"constraints of {found}, required pins: Constraints((Pin(0.5, 'opening', 0.02),))")
-
-
-def _is_number(value: object) -> bool:
-    """Return whether a value is a real number that a float can hold; NaN and infinity are."""
-    try:
-        return isinstance(value, Real) and isinstance(float(value), float)
-    except OverflowError:
-        return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -442,17 +434,18 @@ class Generation:
         columns = [self.motion.column(name) for name in names]
         channels = tuple(self.motion.channels[column] for column in columns)
         motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
-        if isinstance(self.spread, ReducedVariance):
-            return replace(self, motion=motion, spread=replace(self.spread, mixing=self.spread.mixing[:, columns]))
-        return replace(self, motion=motion, spread=self.spread[:, columns])
+        return replace(self, motion=motion, spread=self._change_channels(lambda rows: rows[:, columns]))
 
     def with_motion(self, motion: Motion) -> Generation:
         """Return the generation with other motion; channels after its own have the variance 0."""
         added = len(motion.channels) - len(self.motion.channels)
+        spread = self._change_channels(lambda rows: np.pad(rows, ((0, 0), (0, added))))
+        return replace(self, motion=motion, spread=spread)
+
+    def _change_channels(self, change: RowChange) -> NDArray[np.floating[Any]] | ReducedVariance:
         if isinstance(self.spread, ReducedVariance):
-            mixing = np.pad(self.spread.mixing, ((0, 0), (0, added)))
-            return replace(self, motion=motion, spread=replace(self.spread, mixing=mixing))
-        return replace(self, motion=motion, spread=np.pad(self.spread, ((0, 0), (0, added))))
+            return replace(self.spread, mixing=change(self.spread.mixing))
+        return change(self.spread)
 
     def resampled(self, rate_hz: float) -> Generation:
         """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
@@ -460,15 +453,13 @@ class Generation:
         Raises InputError: the rate is not more than 0.
         """
         motion = self.motion.resampled(rate_hz)
-        spread = self.changed_spread(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
+        spread = self.change_frames(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
         return replace(
             self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])
         )
 
-    def changed_spread(
-        self, change: Callable[[NDArray[np.floating[Any]]], NDArray[np.floating[Any]]]
-    ) -> NDArray[np.floating[Any]] | ReducedVariance:
+    def change_frames(self, change: RowChange) -> NDArray[np.floating[Any]] | ReducedVariance:
         """Return the variances with other rows, which a function makes of those of all frames."""
         if isinstance(self.spread, ReducedVariance):
             return replace(self.spread, reduced=change(self.spread.reduced))
