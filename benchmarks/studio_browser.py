@@ -76,7 +76,7 @@ def typed_edits(window: Browser, server: Served, count: int) -> dict[str, Any]:
     """Return the time from key to face, and what both sides computed, of edits by keys; the first two do not count."""
     chance, rows = Random(3), []  # noqa: S311
     for number in range(count + 2):
-        phones = window.run("return studio.store.line.phones.map(({ label }) => label)")
+        phones = window.run("return studio.store.recording.phones.map(({ label }) => label)")
         place = chance.randrange(2, len(phones) - 2)
         label = chance.choice([each for each in LABELS if each != phones[place]])
         window.run("studio.choose('phone', arguments[0]); studio.timeline.scroller.focus()", place)

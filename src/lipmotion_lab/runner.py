@@ -43,10 +43,6 @@ _CURVES, _ABOUT = ("original", "generated", "time_s"), "about"
 """Fields of ``ComparedClip`` that are curves; the array with the rest of stored clips."""
 
 
-def ignore_motion(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
-    """Do nothing with what a system generates."""
-
-
 @dataclass(frozen=True)
 class ExperimentSettings:
     """Settings that all experiments have in common.
@@ -64,7 +60,7 @@ class ExperimentSettings:
     seed: int = 0
     workers: int = 1
     monitor: Monitor = silent_monitor
-    receive: MotionReceiver = ignore_motion
+    receive: MotionReceiver = lambda *_: None
 
 
 DEFAULT_SETTINGS = ExperimentSettings()

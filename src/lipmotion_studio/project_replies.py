@@ -6,12 +6,14 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import fields
 from typing import Any
 from urllib.parse import unquote
+from uuid import uuid4
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
 from lipmotion.errors import InputError
+from lipmotion.storage.files import TEMPORARY, remove
 from lipmotion.types import values
 from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items
@@ -53,17 +55,23 @@ class ProjectReplies:
     async def understand(self, request: Request) -> Response:
         """Recordings that are to be analysed."""
         content = await content_of(request)
-        numbers = None if content.get("lines") == ALL else member(content, "lines", None, items(NUMBER))
-        return json_reply({"waiting": self._studio.queue_analysis(numbers)})
+        known = self._studio.folder.project.lines
+        numbers = list(known) if content.get("lines") == ALL else member(content, "lines", None, items(NUMBER))
+        if not set(numbers) <= known.keys():
+            raise HTTPException(404, "no such recording")
+        return json_reply({"waiting": self._studio.workspace.queue(numbers)})
 
     async def dropped(self, request: Request) -> Response:
         """A recording that was dropped on the page, as body."""
         name = text(request.query_params, "name", longest=500)
         transcript = unquote(request.headers.get("x-lipmotion-transcript", ""), errors="replace")
-        with self._studio.temporary_upload() as file:
+        file = self._studio.folder.path / f"{TEMPORARY}{uuid4().hex}"
+        try:
             with file.open("wb") as content:
                 await write_body(request, content, MAX_UPLOAD_BYTES, UPLOAD_S)
             number = await self._run_apart(lambda: self._studio.folder.drop(name, file, transcript))
+        finally:
+            remove(file)
         self._studio.workspace.queue([number])
         return json_reply(self._studio.row(self._studio.folder.recording(number)), 201)
 
@@ -74,9 +82,11 @@ class ProjectReplies:
         return json_reply(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
 
     async def remove(self, request: Request) -> Response:
-        """A recording that leaves the project."""
-        number = self._number(request)
-        self._studio.remove(number, whole(await content_of(request), "revision"))
+        """A recording that leaves the project; its files stay."""
+        number, folder = self._number(request), self._studio.folder
+        with folder.check_out(number, whole(await content_of(request), "revision")):
+            folder.change(lambda project: project.without_recording(number))
+            self._studio.workspace.forget(number)
         return json_reply({"removed": number})
 
     async def export_one(self, request: Request) -> Response:

@@ -132,7 +132,10 @@ class RecordingReplies:
     async def restore(self, request: Request) -> Response:
         """The last good copy of edits that are damaged."""
         number, _, revision = await self._change(request)
-        self._studio.restore(number, revision)
+        with self._studio.folder.check_out(number, revision) as recording:
+            self._studio.folder.restore_edits(recording)
+            self._workspace.forget(number)
+        self._workspace.open(number)
         return self._waiting(number)
 
     async def motion(self, request: Request) -> Response:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
-from uuid import uuid4
 
 from starlette.exceptions import HTTPException
 
@@ -23,7 +22,7 @@ from lipmotion.pipeline.job import Job, check_outputs, open_face, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
-from lipmotion.storage.files import TEMPORARY, made_folders, remove, sha256_of, temporary_folder
+from lipmotion.storage.files import made_folders, sha256_of, temporary_folder
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
@@ -255,22 +254,6 @@ class Studio:
             "longest_video_s": LONGEST_VIDEO_S,
         }
 
-    def queue_analysis(self, numbers: Sequence[int] | None) -> int:
-        """Queue recordings for analysis; None: all new ones. Returns how many wait. Raises HTTPException: no such."""
-        known = self.folder.project.lines
-        if numbers is not None and not set(numbers) <= known.keys():
-            raise HTTPException(404, "no such recording")
-        return self.workspace.queue(known if numbers is None else numbers)
-
-    @contextmanager
-    def temporary_upload(self) -> Iterator[Path]:
-        """Give the path of a file that something dropped is written to; afterwards it is removed."""
-        path = self.folder.path / f"{TEMPORARY}{uuid4().hex}"
-        try:
-            yield path
-        finally:
-            remove(path)
-
     def add_phones(self, sentences: Sequence[str]) -> tuple[Step, ...]:
         """Return edits; those that say words of the project's lexicon with the phones, which then stand in the edits.
 
@@ -321,22 +304,6 @@ class Studio:
             marked = replace(recording, mark=mark, marked=self.folder.summary(recording).digest)
             self.folder.change_recording(number, lambda _: marked)
             return self.row(marked)
-
-    def remove(self, number: int, revision: int) -> None:
-        """Take a recording out of the project; its files stay. Raises RevisionError: it has been changed."""
-        with self.folder.check_out(number, revision):
-            self.folder.change(lambda project: project.without_recording(number))
-            self.workspace.forget(number)
-
-    def restore(self, number: int, revision: int) -> None:
-        """Put the last good copy in the place of a recording's damaged edits, and open it.
-
-        Raises InputError: they are not damaged, or there is no copy. RevisionError: somebody else has changed it.
-        """
-        with self.folder.check_out(number, revision) as recording:
-            self.folder.restore_edits(recording)
-            self.workspace.forget(number)
-        self.workspace.open(number)
 
     def drawn_face(self, name: str) -> str | Face:
         """Return a face of which pictures are drawn. Raises InputError: there is none of that name, or a filmed one."""

@@ -22,12 +22,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # of the processes that read
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from fuzz.campaign import CampaignRecord, campaign
-from fuzz.findings import keep
 from fuzz.good import good_in, make_good
 from fuzz.inputs import Good, picked_up
 from fuzz.judge import READ, REFUSED
 from fuzz.readers import READERS
-from fuzz.report import table, write_json
+from fuzz.report import keep, table, write_json
 from fuzz.worker import Worker
 
 

@@ -1,19 +1,24 @@
-"""The worker process, with a reader that has planted defects."""
+"""The worker process, with a reader that has planted defects, its judgement, and the report."""
 
 from __future__ import annotations
 
+import json
 import sys
+import warnings
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from fuzz import judge
 from fuzz.campaign import CampaignRecord, campaign
-from fuzz.findings import keep, smallest
-from fuzz.inputs import Files, Good, picked_up
-from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFUSED
-from fuzz.planted import MEGABYTES, readers
+from fuzz.inputs import Files, Good, Reader, picked_up
+from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFUSED, Result, read_result
+from fuzz.planted import MEGABYTES, readers, seeds
+from fuzz.report import keep, smallest, table, write_json
 from fuzz.worker import Worker
+from lipmotion.errors import InputError
 
 ORDERS = {"raise": ERROR, "lie": IMPLAUSIBLE, "drop": LEFT, "spoil": LEFT, "refuse": REFUSED, "now": READ}
 NOWHERE = Good(Path("nowhere"), ())
@@ -88,3 +93,62 @@ def test_a_campaign_finds_and_counts(planted: Worker) -> None:
 
 def _input(order: str) -> Files:
     return {"a.txt": order.encode()}
+
+
+FILES: Files = {"a.txt": b"x"}
+
+
+def read_with(error: Exception, folder: Path) -> Result:
+    def read(*_: object) -> None:
+        raise error
+
+    return read_result(Reader("planted", seeds, read), FILES, folder / "bad", NOWHERE)
+
+
+def test_a_message_that_is_no_short_printable_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for line, kind in {"short": REFUSED, "x" * 5000: ERROR, "a\nb": ERROR, "\x1b[2J": ERROR, "\x9b2J": ERROR}.items():
+        monkeypatch.setattr(judge, "outcome", partial(_told, line))
+        assert read_with(InputError("anything"), tmp_path).kind == kind
+    assert list(tmp_path.iterdir()) == []
+
+
+def _told(line: str, _: object) -> tuple[int, str]:
+    return 3, line
+
+
+def test_messages_are_alike_whatever_they_quote(tmp_path: Path) -> None:
+    found = {read_with(InputError(f"{path}: line {n} is {path!r}"), tmp_path).where for n, path in enumerate("ab")}
+    assert len(found) == 2  # a name without a folder is a word
+    assert len({read_with(InputError(f"/x/{n}: line {n} is 'x{n}'"), tmp_path).where for n in range(3)}) == 1
+
+
+def test_memory_and_warnings_are_defects(tmp_path: Path) -> None:
+    def warn(*_: object) -> None:
+        warnings.warn("overflow", RuntimeWarning, stacklevel=1)
+
+    assert read_with(MemoryError("no room"), tmp_path).kind == MEMORY
+    assert read_result(Reader("planted", seeds, warn), FILES, tmp_path / "bad", NOWHERE).kind == ERROR
+
+
+def records() -> list[CampaignRecord]:
+    first, second = CampaignRecord("audio", made=5, seconds=2.0), CampaignRecord("labels", made=2, seconds=1.0)
+    for kind in (READ, CRASH, HANG, LEFT):
+        first.add(Result(kind, "somewhere", "a trace"), {"a": b""})
+    second.add(Result(READ), {"a": b""})
+    return [first, second]
+
+
+def test_a_table_with_a_sum() -> None:
+    head, *rows = (line.split() for line in table(records()).splitlines())
+    by_name = {row[0]: dict(zip(head, row, strict=True)) for row in rows}
+    assert list(by_name) == ["audio", "labels", "all"]
+    assert [by_name["all"][key] for key in ("tried", "distinct", "read", "crashes", "hangs")] == "7 5 2 1 1".split()
+    assert (by_name["audio"]["per_s"], by_name["audio"]["errors"], by_name["audio"]["defects"]) == ("2.0", "1", "3")
+
+
+def test_the_same_as_json(tmp_path: Path) -> None:
+    write_json(tmp_path / "a.json", records(), 7, 0.5)
+    found = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert [one["reader"] for one in found["readers"]] == ["audio", "labels"]
+    assert {one["kind"] for one in found["defects"]} == {CRASH, HANG, LEFT}
+    assert found["defects"][0]["detail"] == "a trace"

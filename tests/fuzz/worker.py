@@ -16,8 +16,7 @@ from typing import Any
 
 from fuzz.inputs import Files, Good, Reader
 from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, quiet, read_result
-from fuzz.lines import LineCoverage
-from fuzz.memory import Memory, busy_s
+from fuzz.measures import LineCoverage, Memory, busy_s
 
 HANG_S = 20.0
 PATIENCE = 3

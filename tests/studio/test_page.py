@@ -38,12 +38,12 @@ GHOST_PIXELS = """(() => { const { width, height } = studio.stage.ghost;
 """How many pixels of the other head are drawn over the first one."""
 FRAME_S = 1 / 60
 CLOSED = "document.querySelector('dialog').close()"
-FAILED = "{ ...studio.store.line, status: 'failed', error: 'no speech' }"
+FAILED = "{ ...studio.store.recording, status: 'failed', error: 'no speech' }"
 ASKED = """return performance.getEntriesByType("resource").map(({ name }) => new URL(name))
   .filter(({ pathname }) => pathname.endsWith("/motion"))
   .map(({ searchParams }) => ["of", "names", "by"].map((name) => searchParams.get(name)).join(" "))"""
 """Which curves were asked for: of which kind, by which model."""
-NOT_SHOWN = "studio.store.line.channels.find(({ name }) => !studio.store.channels.includes(name)).name"
+NOT_SHOWN = "studio.store.recording.channels.find(({ name }) => !studio.store.channels.includes(name)).name"
 SLOW = """const { player: { audio }, stage: { head } } = studio;
 const frame = requestAnimationFrame, posed = head.pose.bind(head);
 window.requestAnimationFrame = (act) => setTimeout(() => frame(act), 250);
@@ -71,8 +71,8 @@ return found;"""
 """How fast the real video plays where it is so far off the sound [s], and how far off the sound it is set."""
 ROWS = "new Set([...document.querySelectorAll('.over > :not([hidden])')].map((each) => each.offsetTop)).size"
 """In how many rows the buttons over the face stand."""
-READY = """const store = globalThis.studio?.store, line = store?.line;
-return Boolean(line?.status === "ready" && line.id === store.lineId && store.weights && !store.saving &&
+READY = """const store = globalThis.studio?.store, line = store?.recording;
+return Boolean(line?.status === "ready" && line.id === store.recordingId && store.weights && !store.saving &&
   studio.stage.head?.character);"""
 
 
@@ -97,7 +97,7 @@ class Page:
     @property
     def steps(self) -> list[str]:
         """The edits, as the page shows them."""
-        return list(self.of("studio.store.line.steps"))
+        return list(self.of("studio.store.recording.steps"))
 
     def reload(self) -> None:
         """Load the page anew, and wait until its line is shown."""
@@ -227,7 +227,7 @@ def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows
     assert page.of("document.querySelector('.phones .edited').getAttribute('aria-label')") == name
     page.window.press_together(CONTROL, "z")
     wait_until(lambda: page.of(marked) == [], LIMIT_S)
-    assert page.window.text(".confidence .label") == "stronger: less sure"
+    assert page.window.text(".confidence .label") == "stronger: less confident"
     page.window.run("document.querySelector('.confidence .label').focus()")
     wait_until(lambda: "the stronger" in page.window.text("#message"), LIMIT_S)
 
@@ -264,16 +264,16 @@ def test_what_was_refused_is_told_until_something_succeeds(page: Page) -> None:
     page.window.press("s")
     wait_until(lambda: "phone first" in page.window.text("#message"), LIMIT_S)
     page.window.press("a")
-    wait_until(lambda: page.of("studio.store.lines[0].mark") == "approved", LIMIT_S)
+    wait_until(lambda: page.of("studio.store.recordings[0].mark") == "approved", LIMIT_S)
     assert page.window.text("#message") == ""
     page.window.press("a")
-    wait_until(lambda: page.of("studio.store.lines[0].mark") == "none", LIMIT_S)
+    wait_until(lambda: page.of("studio.store.recordings[0].mark") == "none", LIMIT_S)
 
 
 def test_an_edit_waits_for_a_border_that_is_on_its_way(page: Page) -> None:
     """It neither takes the place of the border's last place nor is lost; and the face stays known everywhere."""
     wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
-    before, ends_s = page.steps, page.of("studio.store.line.phones[4].end_s")
+    before, ends_s = page.steps, page.of("studio.store.recording.phones[4].end_s")
     page.window.run(
         """const tier = studio.timeline.phones, ends_s = arguments[0];
         tier.drag(4, ends_s - 0.01);
@@ -298,26 +298,26 @@ def test_a_dropped_line_is_read_corrected_and_exported(opens: Opens, tmp_path: P
     with shown(opens, tmp_path) as page:
         window = page.window
         window.run(
-            """studio.server.bytes(`lines/${studio.store.lineId}/sound.wav`).then((sound) => studio.add(
+            """studio.server.bytes(`lines/${studio.store.recordingId}/sound.wav`).then((sound) => studio.add(
               [new File([sound], "second.wav"), new File([arguments[0]], "second.txt")]));""",
             said,
         )
         wait_until(lambda: window.text("#title").endswith("second"), LIMIT_S)
         page.ready()
-        assert page.of("studio.store.line.words[1].label") == "speak"
+        assert page.of("studio.store.recording.words[1].label") == "speak"
         window.click('.words [data-index="1"]')
         window.run("document.getElementById('word-phones').value = 's p iy k s'")
         window.click("#word-keep")
         wait_until(lambda: "s p iy k s" in window.text("#offers"), LIMIT_S)
         page.edit(lambda: window.click("#word-change"), "word 2 is speak said s p iy k s")
         window.press(ESCAPE, ESCAPE, "a")
-        wait_until(lambda: page.of("studio.store.lines.at(-1).mark") == "approved", LIMIT_S)
+        wait_until(lambda: page.of("studio.store.recordings.at(-1).mark") == "approved", LIMIT_S)
         window.run("document.getElementById('transcript').value += ' now'")
         page.edit(lambda: window.click("#align"), r"say please .* now from \S+ to \S+ with speak s p iy k s")
         window.click("#export")
         window.click("#export-approved")
         wait_until(lambda: "Written" in window.text("dialog"), LIMIT_S)
-        wait_until(lambda: page.of("studio.store.lines.at(-1).exported") == "yes", LIMIT_S)
+        wait_until(lambda: page.of("studio.store.recordings.at(-1).exported") == "yes", LIMIT_S)
 
 
 def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> None:
@@ -334,7 +334,7 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> N
     values = np.array(page.of("[...studio.store.weights.values]")).reshape(frames, len(names))
     page.window.run_until_done(
         """const done = arguments[0], { server, store } = studio;
-        server.told(`lines/${store.lineId}/export`, { preset: "web" }).then(() => done());"""
+        server.post(`lines/${store.recordingId}/export`, { preset: "web" }).then(() => done());"""
     )
     read, _ = read_gltf_motion(page.project / "exports" / "welcome.glb")
     shared = [name for name in read.names if name in names]
@@ -373,9 +373,9 @@ def test_versions_are_kept_compared_and_gone_back_to(page: Page) -> None:
     window.click("#version-1-back")
     page.wait_for_steps(1)
     assert page.steps == ["phone 9 is aa"]
-    wait_until(lambda: page.of("studio.store.line.versions.length") == 2, LIMIT_S)
+    wait_until(lambda: page.of("studio.store.recording.versions.length") == 2, LIMIT_S)
     window.click("#version-2-forget")
-    wait_until(lambda: page.of("studio.store.line.versions.length") == 1, LIMIT_S)
+    wait_until(lambda: page.of("studio.store.recording.versions.length") == 1, LIMIT_S)
 
 
 def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
@@ -387,7 +387,7 @@ def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
     shown = page.of("Array.from(studio.store.motion.values).filter((_, place) => place % 4 === 3)")
     whole = page.window.run_until_done(
         """const [name, done] = arguments, { server, store } = studio;
-        server.curves(`lines/${store.lineId}/motion`).then((all) =>
+        server.curves(`lines/${store.recordingId}/motion`).then((all) =>
           done(Array.from({ length: all.frames }, (_, n) => all.value(n, all.column(name)))));""",
         first,
     )
@@ -402,7 +402,7 @@ def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
 def test_a_line_that_is_opened_while_the_timeline_is_hidden_is_shown_later(page: Page) -> None:
     page.window.run("document.getElementById('timeline').style.display = 'none'")
     wait_until(lambda: page.of("studio.timeline.width") == 0, LIMIT_S)
-    page.window.run("const id = studio.store.lineId; studio.store.set({ lineId: '' }); studio.open(id)")
+    page.window.run("const id = studio.store.recordingId; studio.store.set({ recordingId: '' }); studio.open(id)")
     page.ready()
     page.window.run("studio.timeline.zoom(2); document.getElementById('timeline').style.display = ''")
     wait_until(lambda: page.of("studio.timeline.width") > 0, LIMIT_S)
@@ -416,8 +416,9 @@ def test_what_another_window_did_is_shown(page: Page) -> None:
 
     def elsewhere(what: str, content: str) -> None:
         page.window.run_until_done(
-            f"""const done = arguments[0], {{ server, store: {{ line, lineId }} }} = studio;
-            server.told(`lines/${{lineId}}/{what}`, {{ revision: line.revision, {content} }}).then(() => done());"""
+            f"""const done = arguments[0], {{ server, store: {{ recording, recordingId }} }} = studio;
+            server.post(`lines/${{recordingId}}/{what}`, {{ revision: recording.revision, {content} }})
+              .then(() => done());"""
         )
 
     elsewhere("edits", "steps: ['set intensity 1.1']")
@@ -440,15 +441,15 @@ def test_what_another_window_did_is_shown(page: Page) -> None:
     page.window.click("#approve")
     wait_until(lambda: "another window" in page.window.text("#message"), LIMIT_S)
     page.ready()
-    assert (page.steps, page.of("studio.store.lines[0].mark")) == (before, "redo")
+    assert (page.steps, page.of("studio.store.recordings[0].mark")) == (before, "redo")
 
 
 def test_damaged_edits_are_restored(page: Page) -> None:
     page.edit(lambda: page.window.click("#mood-set"), r"mood \S+ at \S+")
     steps, (file,) = page.steps, page.project.glob("edits/*.edits.json")
     file.write_text("{", encoding="utf-8")
-    page.window.run("studio.open(studio.store.lineId, true)")
-    wait_until(lambda: page.of("studio.store.line?.status") == "failed", LIMIT_S)
+    page.window.run("studio.open(studio.store.recordingId, true)")
+    wait_until(lambda: page.of("studio.store.recording?.status") == "failed", LIMIT_S)
     assert "copies" in page.window.text("#cover")
     page.window.click("#restore")
     page.ready()
@@ -458,16 +459,16 @@ def test_damaged_edits_are_restored(page: Page) -> None:
 
 def test_ten_thousand_lines_scroll(page: Page) -> None:
     page.window.run(
-        """const [line] = studio.store.lines;
+        """const [line] = studio.store.recordings;
         const made = (_, n) => ({ ...line, id: n + 1, name: `line ${n}`, doubt: (n * 7919 % 997) / 997 });
-        studio.store.set({ lines: Array.from({ length: 10000 }, made) });"""
+        studio.store.set({ recordings: Array.from({ length: 10000 }, made) });"""
     )
     wait_until(lambda: "10000" in page.window.text(".count"), LIMIT_S)
     page.window.run("document.querySelector('.view').scrollTop = 150000")
     wait_until(lambda: "line 5000" in page.window.text(".view"), LIMIT_S)
     assert page.of("document.querySelectorAll('.line').length") < 100
     page.window.run("const order = document.querySelector('#queue select'); order.value = 'doubt'; order.onchange()")
-    shown = page.of("studio.queue.lines.slice(0, 50).map(({ doubt }) => doubt)")
+    shown = page.of("studio.queue.recordings.slice(0, 50).map(({ doubt }) => doubt)")
     assert shown == sorted(shown, reverse=True)
 
 
@@ -483,8 +484,8 @@ def test_every_screen(page: Page) -> None:
         ("timeline", "studio.showPlace('stage')"),
         ("keys", "studio.help()"),
         ("export", f"{CLOSED}; document.getElementById('export').click()"),
-        ("failed", f"{CLOSED}; studio.store.set({{ line: {FAILED} }})"),
-        ("empty", "studio.store.set({ lines: [], line: null, lineId: '' })"),
+        ("failed", f"{CLOSED}; studio.store.set({{ recording: {FAILED} }})"),
+        ("empty", "studio.store.set({ recordings: [], recording: null, recordingId: '' })"),
     )  # fmt: skip
     for width, height, scheme in SCREENS:
         page.reload()

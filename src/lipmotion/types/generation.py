@@ -55,9 +55,10 @@ class Speech:
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     voice       : 0 to 1, how well the model's training knows the voice
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
+    encoding    : float16 array [shape=(T, 64)], of the speech encoder (None: the engine does not use it)
     cache       : what was computed of the sound alone (``cached``); speech with other units shares it
     parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
-                  empty: nothing is said. Beside it, features, spectrum and posteriors may be ``JoinedRows``
+                  empty: nothing is said. Beside it, features, spectrum, posteriors and encoding may be ``JoinedRows``
     """
 
     features: Features
@@ -69,6 +70,7 @@ class Speech:
     prior: PriorOutput | None = None
     voice: float = 1.0
     posteriors: TokenPosteriors | None = None
+    encoding: NDArray[np.float16] | None = None
     times_given: bool = False
     cache: dict[Any, Any] = field(default_factory=dict, repr=False)
     parts: tuple[SpeechPart, ...] | None = None
@@ -78,7 +80,7 @@ class Speech:
 
         of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
         """
-        sound = (self.features, self.log_f0, self.spectrum, self.posteriors)
+        sound = (self.features, self.log_f0, self.spectrum, self.posteriors, self.encoding)
         entry = self.cache.get(of)
         if entry is None or any(ours is not theirs for ours, theirs in zip(sound, entry[0], strict=True)):
             entry = self.cache[of] = (sound, make())
@@ -90,7 +92,8 @@ class Speech:
         features = replace(self.features, values=np.asarray(self.features.values))
         spectrum = None if self.spectrum is None else np.asarray(self.spectrum)
         said = self.posteriors and replace(self.posteriors, values=np.asarray(self.posteriors.values))
-        return replace(self, features=features, spectrum=spectrum, posteriors=said)
+        encoding = None if self.encoding is None else np.asarray(self.encoding)
+        return replace(self, features=features, spectrum=spectrum, posteriors=said, encoding=encoding)
 
     @property
     def units_decide(self) -> bool:

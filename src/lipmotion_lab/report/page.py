@@ -50,47 +50,36 @@ class FinishedPart:
     section: Section
 
 
-@dataclass(frozen=True)
-class ReportPage:
-    """What the page shows.
+def report_html(
+    title: str,
+    about: Mapping[str, str],
+    finished: Sequence[FinishedPart],
+    left_open: Mapping[str, str],
+    failed: Mapping[str, str],
+    *,
+    quick: bool,
+) -> str:
+    """Return the page of a report.
 
-    title    : of the page
     about    : of the corpus and the run, by name
     finished : experiments, in their order
-    open     : names of those that are not finished, with what is the matter
-    failed   : names of those that failed, with their errors
+    left_open, failed : names of those that are not finished, or failed, with the reasons
     quick    : whether it is a quick run
     """
-
-    title: str
-    about: Mapping[str, str]
-    finished: Sequence[FinishedPart]
-    open: Mapping[str, str]
-    failed: Mapping[str, str]
-    quick: bool
-
-    def as_html(self) -> str:
-        """Return the whole page."""
-        style = resources.files(__package__).joinpath("report.css").read_text("utf-8")
-        header = element(
-            "header",
-            element("h1", self.title),
-            element("p", "How the systems of three papers, and those of this project, do on a corpus.", class_="quiet"),
-        )
-        entries = [
-            element(
-                "li", element("strong", element("a", each.section.title, href=f"#{each.name}")), each.section.verdict
-            )
-            for each in self.finished
-        ]
-        for reasons, look in ((self.failed, "failed"), (self.open, None)):
-            entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
-        warning = [element("p", QUICK_WARNING, class_="warning")] if self.quick else []
-        overview = element("ul", *entries, class_="overview")
-        how_to_read = element("p", HOW_TO_READ, class_="quiet")
-        main = element("main", *warning, overview, how_to_read, *map(_section, self.finished))
-        footer = element("footer", element("h2", "The corpus and the run"), _listed(self.about))
-        return whole_page(self.title, style, header, main, footer, script=SCRIPT)
+    style = resources.files(__package__).joinpath("report.css").read_text("utf-8")
+    subtitle = "How the systems of three papers, and those of this project, do on a corpus."
+    header = element("header", element("h1", title), element("p", subtitle, class_="quiet"))
+    entries = [
+        element("li", element("strong", element("a", each.section.title, href=f"#{each.name}")), each.section.verdict)
+        for each in finished
+    ]
+    for reasons, look in ((failed, "failed"), (left_open, None)):
+        entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
+    warning = [element("p", QUICK_WARNING, class_="warning")] if quick else []
+    overview = element("ul", *entries, class_="overview")
+    main = element("main", *warning, overview, element("p", HOW_TO_READ, class_="quiet"), *map(_section, finished))
+    footer = element("footer", element("h2", "The corpus and the run"), _listed(about))
+    return whole_page(title, style, header, main, footer, script=SCRIPT)
 
 
 def _section(part: FinishedPart) -> Html:

@@ -29,7 +29,7 @@ from lipmotion_lab.engine_comparison import engines
 from lipmotion_lab.folds import FOLDS, folds
 from lipmotion_lab.learning_curve import learning_curve
 from lipmotion_lab.minnis2000 import minnis2000
-from lipmotion_lab.report.page import FinishedPart, ReportPage
+from lipmotion_lab.report.page import FinishedPart, report_html
 from lipmotion_lab.report.section import Section
 from lipmotion_lab.report.sections import (
     engines_section,
@@ -217,7 +217,7 @@ def experiment_report(
         for name in missing:
             share = PARTS[name].share
             part = sub_monitor(settings.monitor, done / total, (done + share) / total, f"{name}: ")
-            writer.try_to_run(name, replace(settings, monitor=part))
+            writer.run(name, replace(settings, monitor=part))
             writer.write_page(wanted)
             done += share
         finished = writer.finished()
@@ -293,13 +293,13 @@ class _Writer:
         failed = {name: f"{FAILED}{describe_error(error)}; {AGAIN}" for name, error in self.failed.items()}
         corpus = self.corpus.path.resolve().name
         about = self.corpus.summary() | {"corpus": corpus, "made with": shlex.join(self._command(wanted))}
-        text = ReportPage(f"Experiments on {corpus}", about, finished, left_open, failed, self.quick).as_html()
+        text = report_html(f"Experiments on {corpus}", about, finished, left_open, failed, quick=self.quick)
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
             with whole_file(page) as unfinished:
                 unfinished.write_text(text, encoding="utf-8")
 
-    def try_to_run(self, name: str, settings: ExperimentSettings) -> None:
+    def run(self, name: str, settings: ExperimentSettings) -> None:
         """Run an experiment, and write its folder; where it fails, keep the error.
 
         settings : with the monitor of this experiment

@@ -7,7 +7,7 @@
  * @param {...(Node | string)} children
  * @returns {any}
  */
-export function made(tag, properties = {}, ...children) {
+export function make(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
     if (name.includes("-") || name === "role" || name === "list") element.setAttribute(name, String(value));
@@ -52,26 +52,26 @@ export function icon(name) {
 }
 
 /** Return a button with an icon; its name is said, and shown when one points at it. */
-export const iconButton = (name, title, onclick, properties = {}) => made(
+export const iconButton = (name, title, onclick, properties = {}) => make(
   "button", { type: "button", className: "icon", title, "aria-label": title, onclick, ...properties }, icon(name));
 
 /** Return a button with an icon and a text, which a narrow page leaves out. */
-export const bothButton = (name, text, onclick, properties = {}) => made(
-  "button", { type: "button", className: "both", title: text, "aria-label": text, onclick, ...properties }, icon(name), made("span", { textContent: text }));
+export const bothButton = (name, text, onclick, properties = {}) => make(
+  "button", { type: "button", className: "both", title: text, "aria-label": text, onclick, ...properties }, icon(name), make("span", { textContent: text }));
 
 /** Return a button with a text. */
-export const textButton = (text, onclick, properties = {}) => made(
+export const textButton = (text, onclick, properties = {}) => make(
   "button", { type: "button", textContent: text, onclick, ...properties });
 
 /** Return a field under its label. */
 export function labelled(text, field, ...after) {
-  return made("label", { className: "field" }, made("span", { textContent: text }), field, ...after);
+  return make("label", { className: "field" }, make("span", { textContent: text }), field, ...after);
 }
 
 /** Return a choice among values, by their shown texts. */
 export function choice(values, chosen, onchange, properties = {}) {
-  const select = made("select", { onchange: () => onchange(select.value), ...properties },
-    ...values.map(([value, text]) => made("option", { value, textContent: text, selected: value === chosen })));
+  const select = make("select", { onchange: () => onchange(select.value), ...properties },
+    ...values.map(([value, text]) => make("option", { value, textContent: text, selected: value === chosen })));
   return select;
 }
 
@@ -117,9 +117,9 @@ export function inNextFrame(act) {
 }
 
 /** A part of a panel under a heading. */
-export const section = (title, ...children) => made("section", {}, title && made("h2", { textContent: title }), ...children.filter(Boolean));
+export const section = (title, ...children) => make("section", {}, title && make("h2", { textContent: title }), ...children.filter(Boolean));
 
-export const row = (...children) => made("div", { className: "row" }, ...children.filter(Boolean));
+export const row = (...children) => make("div", { className: "row" }, ...children.filter(Boolean));
 
 /** Element that shows something at the playhead: `follow` runs when it moves, and now. */
 export function following(element, follow) {

@@ -1,6 +1,6 @@
 // Files that are dropped on the page: recordings, with their scripts.
 
-import { TEXT, filled } from "./strings.js";
+import { TEXT, countRecordings, fill } from "./strings.js";
 
 const SOUND = /\.(wav|flac|mp3|ogg|opus|m4a|aac|aif|aiff|mp4|mov|mkv|webm|avi)$/i, SCRIPT = /\.(txt|lab)$/i, AT_ONCE = 3;
 const stem = (name) => name.replace(/\.[^.]*$/, "");
@@ -25,33 +25,33 @@ async function filesOf(dropped) {
 }
 
 /**
- * Send recordings to the server, each with its script; return the first line.
+ * Send recordings to the server, each with its script; return the first recording.
  * @param {any} dropped  files, or what a drop carries
  * @param {import("./studio.js").Studio} studio
  */
-export async function added(dropped, studio) {
+export async function addFiles(dropped, studio) {
   const files = await filesOf(dropped), recordings = files.filter(({ name }) => SOUND.test(name));
   const scripts = new Map(files.filter(({ name }) => SCRIPT.test(name)).map((file) => [stem(file.name), file]));
   const stems = new Set(recordings.map(({ name }) => stem(name)));
   const refused = [
-    ...files.filter(({ name }) => !SOUND.test(name) && !SCRIPT.test(name)).map(({ name }) => filled(TEXT.notSound, { name })),
-    ...[...scripts].filter(([name]) => !stems.has(name)).map(([, { name }]) => filled(TEXT.noRecording, { name })),
+    ...files.filter(({ name }) => !SOUND.test(name) && !SCRIPT.test(name)).map(({ name }) => fill(TEXT.notSound, { name })),
+    ...[...scripts].filter(([name]) => !stems.has(name)).map(([, { name }]) => fill(TEXT.noRecording, { name })),
   ];
-  studio.say(filled(TEXT.dropped, { count: recordings.length }));
-  const lines = [], waiting = recordings.map((file, n) => [file, n]);
+  studio.say(fill(TEXT.dropped, { count: countRecordings(recordings.length) }));
+  const rows = [], waiting = recordings.map((file, n) => [file, n]);
   const work = async () => {
     for (let next = waiting.shift(); next; next = waiting.shift()) {
       const [file, n] = next, script = scripts.get(stem(file.name));
       const headers = script ? { "x-lipmotion-transcript": encodeURIComponent((await script.text()).trim()) } : {};
       try {
-        lines[n] = await studio.server.told(`lines?name=${encodeURIComponent(file.name)}`, file, headers);
+        rows[n] = await studio.server.post(`lines?name=${encodeURIComponent(file.name)}`, file, headers);
       } catch (error) {
         refused.push(`${file.name}: ${error.message}`);
       }
     }
   };
   await Promise.all(Array.from({ length: AT_ONCE }, work));
-  const made = lines.filter(Boolean);
-  studio.say([made.length ? filled(TEXT.added, { count: made.length }) : "", ...refused].filter(Boolean).join(" "), refused.length ? "bad" : "");
-  return made[0] ?? null;
+  const added = rows.filter(Boolean);
+  studio.say([added.length ? fill(TEXT.added, { count: countRecordings(added.length) }) : "", ...refused].filter(Boolean).join(" "), refused.length ? "bad" : "");
+  return added[0] ?? null;
 }

@@ -48,7 +48,7 @@ export const KEYS = [
     await studio.mark(key === "a" ? "approved" : "redo");
     studio.queue.step(1);
   } },
-  { key: ["n", "p"], group: "queue", shown: ["N", "P"], help: "nextLine", act: ({ queue }, { key }) => queue.step(key === "n" ? 1 : -1) },
+  { key: ["n", "p"], group: "queue", shown: ["N", "P"], help: "nextRecording", act: ({ queue }, { key }) => queue.step(key === "n" ? 1 : -1) },
   { key: ["?"], group: "look", shown: ["?"], help: "help", act: (studio) => studio.help() },
 ];
 

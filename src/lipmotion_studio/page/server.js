@@ -3,7 +3,7 @@
 import { TEXT } from "./strings.js";
 import { Curves } from "./curves.js";
 
-/** A refusal: `status` of HTTP, 0 where nothing answered; `state` of the line, where the refusal tells it. */
+/** A refusal: `status` of HTTP, 0 where nothing answered; `state` of the recording, where the refusal has it. */
 export class Refused extends Error {
   constructor(status, message, state = null) {
     super(message);
@@ -25,8 +25,8 @@ export class Server {
       throw new Refused(0, TEXT.noReply);
     }
     if (reply.ok) return reply;
-    const told = await reply.json().catch(() => ({}));
-    throw new Refused(reply.status, told.error ?? `${reply.status} ${reply.statusText}`, told.state ?? null);
+    const content = await reply.json().catch(() => ({}));
+    throw new Refused(reply.status, content.error ?? `${reply.status} ${reply.statusText}`, content.state ?? null);
   }
 
   async read(path) { return (await this.reply(path)).json(); }
@@ -42,7 +42,7 @@ export class Server {
     return this.reply(path, { method: "POST", headers, body: raw ? content : JSON.stringify(content) });
   }
 
-  async told(path, content, headers) { return (await this.send(path, content, headers)).json(); }
+  async post(path, content, headers) { return (await this.send(path, content, headers)).json(); }
 
   /** Return curves: float32 frames by names, as the headers of the reply say. */
   async curves(path) { return curvesOf(await this.reply(path)); }

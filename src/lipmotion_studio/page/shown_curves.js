@@ -11,13 +11,13 @@ export class ShownCurves {
 
   /** The curves of the motion among those that are shown; others are weights of the face. */
   get names() {
-    const known = new Set(this.store.line.channels.map(({ name }) => name));
+    const known = new Set(this.store.recording.channels.map(({ name }) => name));
     return this.store.channels.filter((name) => known.has(name));
   }
 
-  /** Read some curves of a kind; `by`: as the server calls the model that moves the line. */
+  /** Read some curves of a kind; `by`: as the server calls the model that moves the recording. */
   async read(id, of, names, span, by = "") {
-    if (!names.length) return new Curves([], this.store.line.rate_hz, new Float32Array());
+    if (!names.length) return new Curves([], this.store.recording.rate_hz, new Float32Array());
     const stretch = span ? `&start_s=${span.start_s}&end_s=${span.end_s}` : "";
     return this.server.curves(`lines/${id}/motion?of=${of}&names=${names.map(encodeURIComponent).join()}&by=${by}${stretch}`);
   }
@@ -28,7 +28,7 @@ export class ShownCurves {
     return curves.and(await this.read(id, of, missing, null, by)).only(names);
   }
 
-  /** Read again what has changed, of the line with a number; null: all. */
+  /** Read again what has changed, of the recording with a number; null: all. */
   async change(id, span) {
     const { store, server, names } = this;
     const again = async (of) => {
@@ -38,7 +38,7 @@ export class ShownCurves {
     };
     const [motion, deviation, confidence] = await Promise.all([
       again("motion"), again("deviation"), span ? store.confidence : server.curves(`lines/${id}/motion?of=confidence`)]);
-    if (id !== store.lineId) return;
+    if (id !== store.recordingId) return;
     store.set({ motion, deviation, confidence });
     await this.fill(id);
   }
@@ -48,7 +48,7 @@ export class ShownCurves {
     const { store, store: { motion, deviation }, names } = this;
     if (!motion || String(motion.names) === String(names)) return; // what is still to come is filled then
     const [means, spreads] = await Promise.all([this.completed(id, "motion", motion), this.completed(id, "deviation", deviation)]);
-    if (id !== store.lineId) return;
+    if (id !== store.recordingId) return;
     if (motion === store.motion) store.set({ motion: means, deviation: spreads });
     await this.fill(id);
   }

@@ -1,16 +1,16 @@
-// What the page knows. Whoever shows a part of it is told when that part changes.
+// What the page knows. Whoever shows a part of it is notified when that part changes.
 
 export class Store {
   #listeners = [];
-  #told = new Set();
+  #changed = new Set();
   #waiting = false;
 
   constructor() {
     /** @type {any} */ this.project = null; // as the server says
-    /** @type {any[]} */ this.lines = [];
-    /** @type {any} */ this.line = null; // state of the open line
-    this.lineId = "";
-    /** @type {any} */ this.sound = null; // samples of the open line
+    /** @type {any[]} */ this.recordings = [];
+    /** @type {any} */ this.recording = null; // state of the open recording
+    this.recordingId = "";
+    /** @type {any} */ this.sound = null; // samples of the open recording
     /** @type {any} */ this.motion = null;
     /** @type {any} */ this.deviation = null;
     /** @type {any} */ this.confidence = null;
@@ -22,9 +22,9 @@ export class Store {
     this.time_s = 0;
     this.comparing = false; // whether the other version is shown
     /** @type {"one" | "sides" | "over"} */ this.heads = "one"; // whether both are shown, and how
-    /** @type {{order: boolean[], span: {start_s: number, end_s: number}, place: number, asked: boolean, told: string} | null} */
+    /** @type {{order: boolean[], span: {start_s: number, end_s: number}, place: number, asked: boolean, result: string} | null} */
     this.blind = null; // comparison: which is the other one, of what stretch, which plays
-    /** @type {any} */ this.progress = null; // of the open line
+    /** @type {any} */ this.progress = null; // of the open recording
     /** @type {any} */ this.training = {}; // how far a voice or a face is
     this.tool = "select";
     this.channels = ["opening", "width", "outer"];
@@ -44,11 +44,11 @@ export class Store {
     for (const [name, value] of Object.entries(changes)) {
       if (this[name] === value) continue;
       this[name] = value;
-      this.#told.add(name);
+      this.#changed.add(name);
     }
-    if (this.#told.size && !this.#waiting) {
+    if (this.#changed.size && !this.#waiting) {
       this.#waiting = true;
-      queueMicrotask(() => this.#tell());
+      queueMicrotask(() => this.#notify());
     }
   }
 
@@ -61,16 +61,16 @@ export class Store {
     act();
   }
 
-  #tell() {
-    const told = this.#told;
-    this.#told = new Set();
+  #notify() {
+    const changed = this.#changed;
+    this.#changed = new Set();
     this.#waiting = false;
     for (const [names, act] of this.#listeners) {
-      if (!names.some((name) => told.has(name))) continue;
+      if (!names.some((name) => changed.has(name))) continue;
       try {
         act();
       } catch (error) {
-        reportError(error); // the others are told all the same
+        reportError(error); // the others are notified all the same
       }
     }
   }

@@ -1,12 +1,12 @@
-// The studio: one page over the lines of a project. What it shows comes from the server; what it changes are sentences.
+// The studio: one page over the recordings of a project. What it shows comes from the server; what it changes are sentences.
 
 import { showExport, showKeys } from "./dialogs.js";
 import { WhenCalm } from "./calm.js";
-import { bothButton, icon, iconButton, made, textButton } from "./dom.js";
+import { bothButton, icon, iconButton, make, textButton } from "./dom.js";
 import { Comparison } from "./compare/comparison.js";
 import { Stage } from "./face/stage.js";
 import { Weights } from "./face/weights.js";
-import { added } from "./files.js";
+import { addFiles } from "./files.js";
 import { listen } from "./keys.js";
 import { followOwn, showOwn } from "./own.js";
 import { Panel } from "./panel/panel.js";
@@ -17,12 +17,12 @@ import { ShownCurves } from "./shown_curves.js";
 import { Player } from "./sound/player.js";
 import { samplesOf } from "./sound/samples.js";
 import { Store } from "./store.js";
-import { OWN, TEXT, filled } from "./strings.js";
+import { OWN, TEXT, fill } from "./strings.js";
 import { Timeline } from "./timeline/timeline.js";
 import { Transport } from "./transport.js";
 
-const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, OWN_MS = 1000, NUDGE_MS = 250;
-/** Of a line that is not ready. */
+const PAGE_SIZE = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, OWN_MS = 1000, NUDGE_MS = 250;
+/** Of a recording that is not ready. */
 const NOTHING = { words: [], phones: [], channels: [], steps: [], undo: 0, redo: 0 };
 
 export class Studio {
@@ -40,23 +40,23 @@ export class Studio {
   }
 
   build() {
-    const { store } = this, part = (tag, id, properties = {}) => made(tag, { id, ...properties });
-    const queue = part("nav", "queue", { "aria-label": TEXT.lines }), face = part("section", "stage", { "aria-label": TEXT.face });
+    const { store } = this, part = (tag, id, properties = {}) => make(tag, { id, ...properties });
+    const queue = part("nav", "queue", { "aria-label": TEXT.recordings }), face = part("section", "stage", { "aria-label": TEXT.face });
     const panel = part("aside", "panel", { "aria-label": TEXT.places.panel }), transport = part("div", "transport", { role: "toolbar", "aria-label": TEXT.play });
     const timeline = part("section", "timeline", { className: "timeline", "aria-label": TEXT.places.stage });
     this.message = part("p", "message", { role: "status" });
     this.state = part("p", "saved");
     this.title = part("h1", "title");
     this.cover = part("div", "cover", { hidden: true });
-    const picker = made("input", { type: "file", multiple: true, accept: "audio/*,video/*,.txt", hidden: true, "aria-label": TEXT.open, onchange: () => this.add([...picker.files]) });
+    const picker = make("input", { type: "file", multiple: true, accept: "audio/*,video/*,.txt", hidden: true, "aria-label": TEXT.open, onchange: () => this.add([...picker.files]) });
     const own = bothButton("person", OWN.open, () => showOwn(this), { id: "own" });
-    const header = made("header", {}, iconButton("lines", TEXT.hideLines, () => document.body.classList.toggle("without-queue"), { id: "hide-lines" }), this.title,
+    const header = make("header", {}, iconButton("lines", TEXT.hideRecordings, () => document.body.classList.toggle("without-queue"), { id: "hide-lines" }), this.title,
       bothButton("plus", TEXT.open, () => picker.click(), { id: "open" }), picker, own,
       bothButton("out", TEXT.export, () => showExport(this), { id: "export" }), textButton("?", () => this.help(), { id: "help", title: TEXT.help, "aria-label": TEXT.help }));
-    const places = made("nav", { id: "places", "aria-label": TEXT.show }, ...["lines", "stage", "panel"].map((name) => textButton(TEXT.places[name],
+    const places = make("nav", { id: "places", "aria-label": TEXT.show }, ...["lines", "stage", "panel"].map((name) => textButton(TEXT.places[name],
       () => this.showPlace(name), { id: `place-${name}` })));
-    document.body.append(header, made("main", {}, queue, face, panel, transport, timeline, this.cover), made("footer", {}, this.message, this.state), places,
-      made("datalist", { id: "phones-known" }));
+    document.body.append(header, make("main", {}, queue, face, panel, transport, timeline, this.cover), make("footer", {}, this.message, this.state), places,
+      make("datalist", { id: "phones-known" }));
     this.showPlace("stage");
     this.queue = new Queue(queue, this);
     this.weights = new Weights(this);
@@ -72,14 +72,14 @@ export class Studio {
       this.message.replaceChildren(text, ...(again ? [" ", textButton(TEXT.makeAgain, again, { id: "make-again" })] : []));
       this.message.className = store.message.kind;
     });
-    store.on(["saving", "unsaved", "line"], () => {
-      this.state.textContent = store.saving ? TEXT.saving : store.unsaved ? TEXT.notSaved : store.line ? TEXT.saved : "";
+    store.on(["saving", "unsaved", "recording"], () => {
+      this.state.textContent = store.saving ? TEXT.saving : store.unsaved ? TEXT.notSaved : store.recording ? TEXT.saved : "";
     });
-    store.on(["project", "line"], () => {
-      this.title.textContent = [store.project?.name, store.line?.name].filter(Boolean).join(" / ") || TEXT.studio;
-      document.title = store.line ? `${store.line.name} · ${TEXT.studio}` : TEXT.studio;
+    store.on(["project", "recording"], () => {
+      this.title.textContent = [store.project?.name, store.recording?.name].filter(Boolean).join(" / ") || TEXT.studio;
+      document.title = store.recording ? `${store.recording.name} · ${TEXT.studio}` : TEXT.studio;
     });
-    store.on(["lines", "line", "project", "progress"], () => this.coverUp());
+    store.on(["recordings", "recording", "project", "progress"], () => this.coverUp());
     for (const name of ["dragenter", "dragover"]) addEventListener(name, (event) => { event.preventDefault(); document.body.classList.add("dropping"); });
     addEventListener("dragleave", (event) => { if (!event.relatedTarget) document.body.classList.remove("dropping"); });
     addEventListener("drop", async (event) => {
@@ -98,7 +98,7 @@ export class Studio {
   /** Say something in the status line; `again`: what its button does. */
   say(text, kind = "", again = null) { this.store.set({ message: { text, kind, again } }); }
 
-  /** What was refused is told until something succeeds. */
+  /** What was refused is shown until something succeeds. */
   succeed() { if (this.store.message.kind) this.say(""); }
 
   refuse(error) {
@@ -109,8 +109,8 @@ export class Studio {
 
   async start() {
     try {
-      await this.listed();
-      const first = this.store.lines.find(({ status }) => status === "ready") ?? this.store.lines[0];
+      await this.reloadList();
+      const first = this.store.recordings.find(({ status }) => status === "ready") ?? this.store.recordings[0];
       if (first) await this.open(first.id);
     } catch (error) {
       this.refuse(error);
@@ -118,39 +118,39 @@ export class Studio {
     this.poll();
   }
 
-  /** Read the lines of the project, a page after another. */
-  async listed() {
-    let lines = [], page = null;
+  /** Read the recordings of the project, a page after another. */
+  async reloadList() {
+    let recordings = [], page = null;
     do {
       const before = page;
-      page = await this.server.read(`project?from=${lines.length}&count=${PAGE_OF_LINES}`);
-      lines = before && before.count !== page.count ? [] : [...lines, ...page.lines]; // some have come or gone: from the first one on
-    } while ((page.lines.length || !lines.length) && lines.length < page.count);
+      page = await this.server.read(`project?from=${recordings.length}&count=${PAGE_SIZE}`);
+      recordings = before && before.count !== page.count ? [] : [...recordings, ...page.lines]; // some have come or gone: from the first one on
+    } while ((page.lines.length || !recordings.length) && recordings.length < page.count);
     if (!this.store.project) {
-      document.getElementById("phones-known").replaceChildren(...page.forms.phones.map(({ name }) => made("option", { value: name })));
+      document.getElementById("phones-known").replaceChildren(...page.forms.phones.map(({ name }) => make("option", { value: name })));
       this.store.set({ face: page.forms.faces.find(({ mesh }) => mesh)?.name ?? page.forms.faces[0]?.name });
     }
-    this.store.set({ project: page, lines });
+    this.store.set({ project: page, recordings });
   }
 
-  /** Ask for what the server does by itself, more often while a line is made. */
+  /** Ask for what the server does by itself, more often while a recording is made. */
   async poll() {
     let pause_ms = CALM_MS;
     try {
-      const { lines, revision, training } = await this.server.read("progress");
+      const { lines: recordings, revision, training } = await this.server.read("progress");
       if (this.store.message.text === TEXT.noReply) this.succeed();
       this.store.set({ training });
-      const before = this.store.lines.map(({ id, status }) => `${id} ${status}`).join();
-      if (lines.length || revision !== this.store.project?.revision) {
-        const states = new Map(lines.map((line) => [line.id, line]));
-        const changed = this.store.lines.some(({ id, status }) => states.has(id) && states.get(id).status !== status);
-        if (changed || revision !== this.store.project?.revision) await this.listed();
-        this.store.set({ progress: states.get(this.store.lineId) ?? null });
-        if (lines.some(({ status }) => status === "waiting" || status === "working")) pause_ms = POLL_MS;
+      const before = this.store.recordings.map(({ id, status }) => `${id} ${status}`).join();
+      if (recordings.length || revision !== this.store.project?.revision) {
+        const states = new Map(recordings.map((recording) => [recording.id, recording]));
+        const changed = this.store.recordings.some(({ id, status }) => states.has(id) && states.get(id).status !== status);
+        if (changed || revision !== this.store.project?.revision) await this.reloadList();
+        this.store.set({ progress: states.get(this.store.recordingId) ?? null });
+        if (recordings.some(({ status }) => status === "waiting" || status === "working")) pause_ms = POLL_MS;
       }
       if (training.state === "working") pause_ms = Math.min(pause_ms, OWN_MS);
-      const open = this.store.lines.find(({ id }) => id === this.store.lineId);
-      if (open && this.store.line && open.status !== this.store.line.status && before) await this.open(open.id, true);
+      const open = this.store.recordings.find(({ id }) => id === this.store.recordingId);
+      if (open && this.store.recording && open.status !== this.store.recording.status && before) await this.open(open.id, true);
     } catch (error) {
       if (error instanceof Refused) this.refuse(error);
       else throw error;
@@ -165,48 +165,48 @@ export class Studio {
     this.polling = setTimeout(() => this.poll(), POLL_MS);
   }
 
-  /** Show another line. */
+  /** Show another recording. */
   async open(id, again = false) {
-    if (id === this.store.lineId && !again) return;
+    if (id === this.store.recordingId && !again) return;
     if (!again) {
       this.typed = null;
       this.say("");
     }
     this.player.stop();
     this.weights.forget();
-    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
+    this.store.set({ recordingId: id, recording: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
     try {
-      const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
-      if (id !== this.store.lineId) return;
-      if (line.status !== "ready") this.wake();
-      this.settleLater(line);
-      this.store.set({ line });
+      const recording = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
+      if (id !== this.store.recordingId) return;
+      if (recording.status !== "ready") this.wake();
+      this.settleLater(recording);
+      this.store.set({ recording });
       const sound = this.server.bytes(`lines/${id}/sound.wav`).then((buffer) => {
-        if (id !== this.store.lineId) return;
+        if (id !== this.store.recordingId) return;
         this.player.load(buffer);
         this.store.set({ sound: samplesOf(buffer) });
       });
-      await Promise.all([sound, line.status === "ready" && this.moved(id, null)]);
+      await Promise.all([sound, recording.status === "ready" && this.reloadCurves(id, null)]);
     } catch (error) {
-      if (id === this.store.lineId) this.refuse(error);
+      if (id === this.store.recordingId) this.refuse(error);
     }
   }
 
-  /** Read curves of a line again; `changed`: only this stretch of them, null: all. The weights of the face follow. */
-  async moved(id, changed) {
+  /** Read curves of a recording again; `changed`: only this stretch of them, null: all. The weights of the face follow. */
+  async reloadCurves(id, changed) {
     const following = this.weights.change(changed);
     await this.curves.change(id, changed);
-    if (id !== this.store.lineId) return;
-    this.doubted(id);
+    if (id !== this.store.recordingId) return;
+    this.loadDoubts(id);
     if (!changed) await following;
   }
 
-  async doubted(id) {
-    const doubts = await this.server.read(`lines/${id}/doubts`).catch(() => []), { phones } = this.store.line ?? { phones: [] };
-    if (id !== this.store.lineId) return;
+  async loadDoubts(id) {
+    const doubts = await this.server.read(`lines/${id}/doubts`).catch(() => []), { phones } = this.store.recording ?? { phones: [] };
+    if (id !== this.store.recordingId) return;
     const spans = doubts.filter(({ confidence }) => confidence < DOUBTFUL).slice(0, MOST_DOUBTS).map(({ time_s, confidence, phone }) => {
       const place = phones.findIndex(({ end_s }) => end_s > time_s), { start_s = time_s, end_s = time_s } = phones[place] ?? {};
-      return { start_s, end_s, confidence, place, text: filled(TEXT.doubtOf, { phone: phones[place]?.label ?? phone, share: Math.round(100 * confidence) }) };
+      return { start_s, end_s, confidence, place, text: fill(TEXT.doubtOf, { phone: phones[place]?.label ?? phone, share: Math.round(100 * confidence) }) };
     });
     this.store.set({ doubts: spans });
   }
@@ -215,31 +215,31 @@ export class Studio {
   async showCurves(channels) {
     this.store.set({ channels });
     try {
-      if (this.store.line?.status === "ready") await this.curves.fill(this.store.lineId);
+      if (this.store.recording?.status === "ready") await this.curves.fill(this.store.recordingId);
     } catch (error) {
       this.refuse(error);
     }
   }
 
   /** Make edits; one after another, each with the revision that the one before left. Returns whether they were made. */
-  edit(steps) { return this.request("edits", { steps }, filled(TEXT.changed, { what: steps[0] ?? "" })); }
+  edit(steps) { return this.request("edits", { steps }, fill(TEXT.changed, { what: steps[0] ?? "" })); }
 
   /** Where a dragged border is: each edit takes the place of the one before; all others wait for the last one. */
-  dragged(steps, instead) {
-    return this.sending(this.requested(this.store.lineId, "edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: steps[0] ?? "" })));
+  dragBorder(steps, instead) {
+    return this.sending(this.sendChange(this.store.recordingId, "edits", { steps, ...(instead ? { instead } : {}) }, fill(TEXT.changed, { what: steps[0] ?? "" })));
   }
 
-  undo() { return this.stepped("undo", TEXT.undone, TEXT.nothingToUndo); }
+  undo() { return this.stepEdits("undo", TEXT.undone, TEXT.nothingToUndo); }
 
-  redo() { return this.stepped("redo", TEXT.redone, TEXT.nothingToRedo); }
+  redo() { return this.stepEdits("redo", TEXT.redone, TEXT.nothingToRedo); }
 
   /** Go back to a version that was kept; the edits as they are are kept, too. */
-  backTo({ name, number }) { return this.request("versions/back", { version: name }, filled(TEXT.wentBack, { number })); }
+  restoreVersion({ name, number }) { return this.request("versions/back", { version: name }, fill(TEXT.wentBack, { number })); }
 
-  stepped(kind, done, nothing) {
-    const { line, saving } = this.store;
-    if (line?.status !== "ready") return this.say(TEXT.notOpen);
-    return line[kind] || saving ? this.request(kind, {}, done) : this.say(nothing);
+  stepEdits(kind, done, nothing) {
+    const { recording, saving } = this.store;
+    if (recording?.status !== "ready") return this.say(TEXT.notOpen);
+    return recording[kind] || saving ? this.request(kind, {}, done) : this.say(nothing);
   }
 
   async realign(text) {
@@ -248,21 +248,21 @@ export class Studio {
     if (await this.request("transcript", { text, ...(span ?? {}) }, TEXT.aligned)) this.typed = null;
   }
 
-  /** After edits of a long line, which moved the mouth around them alone, let the whole motion be made. */
+  /** After edits of a long recording, which moved the mouth around them alone, make the full motion. */
   settleLater({ settled }) {
     if (settled === false) this.settling.want();
     else this.settling.drop();
   }
 
   settle() {
-    const id = this.store.lineId;
-    this.edits = this.edits.then(() => this.requested(id, "settle", {}, "")).catch(() => {});
+    const id = this.store.recordingId;
+    this.edits = this.edits.then(() => this.sendChange(id, "settle", {}, "")).catch(() => {});
   }
 
   request(kind, content, done) {
     this.settling.drop();
-    const id = this.store.lineId;
-    return this.inTurn(() => this.requested(id, kind, content, done));
+    const id = this.store.recordingId;
+    return this.inTurn(() => this.sendChange(id, kind, content, done));
   }
 
   /** Do something after the changes before it, which leave another revision. */
@@ -280,27 +280,27 @@ export class Studio {
     return reply.finally(() => this.store.set({ saving: this.store.saving - 1 }));
   }
 
-  async requested(id, kind, content, done) {
-    if (id !== this.store.lineId || !this.store.line) return false;
+  async sendChange(id, kind, content, done) {
+    if (id !== this.store.recordingId || !this.store.recording) return false;
     const asked_ms = performance.now();
     try {
-      const state = await this.server.told(`lines/${id}/${kind}`, { revision: this.store.line.revision, ...content });
-      if (id !== this.store.lineId) return true;
+      const state = await this.server.post(`lines/${id}/${kind}`, { revision: this.store.recording.revision, ...content });
+      if (id !== this.store.recordingId) return true;
       if (state.status && state.status !== "ready") return this.open(id, true);
       this.take(state);
       const guessed = (state.guessed ?? []).map(({ word, phones }) => `${word} (${phones.join(" ")})`).join(", ");
       this.succeed();
-      if (guessed || done) this.say(guessed ? filled(TEXT.guessed, { words: guessed }) : done);
+      if (guessed || done) this.say(guessed ? fill(TEXT.guessed, { words: guessed }) : done);
       this.store.set({ unsaved: false });
       if (state.changed) {
         this.askedAt = asked_ms;
-        await this.moved(id, state.changed);
+        await this.reloadCurves(id, state.changed);
       }
       return true;
     } catch (error) {
       if (error instanceof Refused && error.status === 409) {
         const what = (content.steps ?? [content.text ?? kind]).join(", ");
-        await this.late(id, error.state, what, () => this.request(kind, { ...content, ...(content.instead ? { instead: 0 } : {}) }, done));
+        await this.reportConflict(id, error.state, what, () => this.request(kind, { ...content, ...(content.instead ? { instead: 0 } : {}) }, done));
       } else {
         if (error.status === 0) this.store.set({ unsaved: true });
         this.refuse(error);
@@ -309,26 +309,26 @@ export class Studio {
     }
   }
 
-  /** Somebody else was first: show the line as it is now, say what was not made, and offer to make it. */
-  async late(id, state, what, again) {
-    if (id !== this.store.lineId) return;
+  /** Somebody else was first: show the recording as it is now, say what was not made, and offer to make it. */
+  async reportConflict(id, state, what, again) {
+    if (id !== this.store.recordingId) return;
     if (state?.status === "ready") {
       this.take(state);
-      await this.moved(id, null);
+      await this.reloadCurves(id, null);
     } else await this.open(id, true);
-    await this.listed();
-    this.say(filled(TEXT.elsewhere, { what }), "bad", again);
+    await this.reloadList();
+    this.say(fill(TEXT.elsewhere, { what }), "bad", again);
   }
 
-  /** Take a new state of the open line. */
-  take(line) {
-    const { selected, lines, span, line: before } = this.store, list = selected && line[`${selected.kind}s`];
+  /** Take a new state of the open recording. */
+  take(recording) {
+    const { selected, recordings, span, recording: before } = this.store, list = selected && recording[`${selected.kind}s`];
     const was = selected && before?.[`${selected.kind}s`]?.[selected.index], is = list?.[selected.index];
     const follows = was && is && span && span.start_s === was.start_s && span.end_s === was.end_s;
-    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, edits_digest: line.edits_digest, revision: line.revision,
-      exported: each.exported === "yes" && each.edits_digest !== line.edits_digest ? "changed" : each.exported } : each));
-    this.settleLater(line);
-    this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
+    const listed = recordings.map((each) => (each.id === recording.id ? { ...each, edits: recording.steps.length, edits_digest: recording.edits_digest, revision: recording.revision,
+      exported: each.exported === "yes" && each.edits_digest !== recording.edits_digest ? "changed" : each.exported } : each));
+    this.settleLater(recording);
+    this.store.set({ recording, recordings: listed, ...(list && !is ? { selected: null } : {}),
       ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
   }
 
@@ -339,7 +339,7 @@ export class Studio {
   }
 
   /** The face has been drawn: how long after the edit is kept with the measures of the page. */
-  measured() {
+  measureDelay() {
     if (!this.editedAt) return;
     performance.measure("edit to face", { start: this.editedAt, end: performance.now() });
     this.editedAt = 0;
@@ -348,7 +348,7 @@ export class Studio {
   /** Select a phone or a word, and its time. */
   choose(kind, index) {
     this.left = false;
-    const span = this.store.line?.[`${kind}s`][index];
+    const span = this.store.recording?.[`${kind}s`][index];
     if (!span) return;
     this.store.set({ selected: { kind, index }, span: { start_s: span.start_s, end_s: span.end_s }, tab: this.store.tab === "why" ? "why" : "edit" });
     if (!this.store.playing) this.player.seek(span.start_s);
@@ -356,7 +356,7 @@ export class Studio {
   }
 
   extendTo(kind, index) {
-    const span = this.store.line[`${kind}s`][index], now = this.store.span;
+    const span = this.store.recording[`${kind}s`][index], now = this.store.span;
     this.store.set({ span: { start_s: Math.min(span.start_s, now.start_s), end_s: Math.max(span.end_s, now.end_s) } });
   }
 
@@ -364,9 +364,9 @@ export class Studio {
 
   /** The next or previous phone or word, by the key of tabulators; past the last one the focus goes on. */
   tab(event) {
-    const target = /** @type {HTMLElement} */ (event.target), { line, selected, time_s } = this.store;
-    if (!line?.phones?.length || !target.closest(".timeline") || (this.left && !selected)) return;
-    const kind = selected?.kind === "word" ? "word" : "phone", spans = line[`${kind}s`];
+    const target = /** @type {HTMLElement} */ (event.target), { recording, selected, time_s } = this.store;
+    if (!recording?.phones?.length || !target.closest(".timeline") || (this.left && !selected)) return;
+    const kind = selected?.kind === "word" ? "word" : "phone", spans = recording[`${kind}s`];
     const here = selected?.kind === kind ? selected.index + (event.shiftKey ? -1 : 1) : Math.max(spans.findIndex(({ end_s }) => end_s > time_s), 0);
     if (here < 0 || here >= spans.length) return;
     event.preventDefault();
@@ -375,17 +375,17 @@ export class Studio {
   }
 
   changeTier(up) {
-    const { line, selected } = this.store;
-    if (!line) return;
+    const { recording, selected } = this.store;
+    if (!recording) return;
     const holds = (span, { start_s, end_s }) => span.start_s <= (start_s + end_s) / 2 && span.end_s > (start_s + end_s) / 2;
-    if (up && selected?.kind === "phone") this.choose("word", line.words.findIndex((word) => holds(word, line.phones[selected.index])));
-    if (!up && selected?.kind === "word") this.choose("phone", line.phones.findIndex((phone) => holds(line.words[selected.index], phone)));
+    if (up && selected?.kind === "phone") this.choose("word", recording.words.findIndex((word) => holds(word, recording.phones[selected.index])));
+    if (!up && selected?.kind === "word") this.choose("phone", recording.phones.findIndex((phone) => holds(recording.words[selected.index], phone)));
   }
 
   type() {
     const { selected } = this.store;
     if (!selected || selected.kind === "curve") return this.focusOn("curve-value");
-    const span = this.store.line[`${selected.kind}s`][selected.index];
+    const span = this.store.recording[`${selected.kind}s`][selected.index];
     this.timeline.reveal(span.start_s, span.end_s);
     this.timeline.drawNow();
     this.timeline[`${selected.kind}s`].type(selected.index);
@@ -401,7 +401,7 @@ export class Studio {
 
   /** Split a phone at the playhead, or else in its middle: the second half can then be made another one. */
   async split(index) {
-    const { start_s, end_s } = this.store.line.phones[index], { time_s } = this.store;
+    const { start_s, end_s } = this.store.recording.phones[index], { time_s } = this.store;
     const inside = time_s > start_s + 0.01 && time_s < end_s - 0.01;
     if (await this.edit([say.split(index + 1, inside ? time_s : (start_s + end_s) / 2)])) this.choose("phone", index + 1);
   }
@@ -425,9 +425,9 @@ export class Studio {
   nudge(side, frames) {
     this.withPhone((index) => {
       const tier = this.timeline.phones, before = side === "end" ? index : index - 1;
-      if (before < 0 || before + 1 >= this.store.line.phones.length) return;
-      const from_s = tier.dragged?.before === before ? tier.dragged.time_s : this.store.line.phones[before].end_s;
-      tier.drag(before, from_s + frames / this.store.line.rate_hz);
+      if (before < 0 || before + 1 >= this.store.recording.phones.length) return;
+      const from_s = tier.dragged?.before === before ? tier.dragged.time_s : this.store.recording.phones[before].end_s;
+      tier.drag(before, from_s + frames / this.store.recording.rate_hz);
       clearTimeout(this.nudging);
       this.nudging = setTimeout(() => tier.drop(), NUDGE_MS);
     });
@@ -435,13 +435,13 @@ export class Studio {
 
   /** The time of the frame at the playhead. */
   get frameTime() {
-    const rate = this.store.line?.rate_hz ?? 100;
+    const rate = this.store.recording?.rate_hz ?? 100;
     return Math.round(this.store.time_s * rate) / rate;
   }
 
   step(frames) {
     this.player.stop();
-    this.player.seek(this.frameTime + frames / (this.store.line?.rate_hz ?? 100));
+    this.player.seek(this.frameTime + frames / (this.store.recording?.rate_hz ?? 100));
     this.timeline.reveal(this.store.time_s);
   }
 
@@ -477,12 +477,12 @@ export class Studio {
     queueMicrotask(() => document.getElementById(id)?.focus());
   }
 
-  /** Let lines be understood, after those that wait already. */
-  async understand(lines) {
+  /** Queue recordings for analysis, after those that wait already. */
+  async queueAnalysis(lines) {
     try {
-      await this.server.told("understand", { lines });
+      await this.server.post("understand", { lines });
       this.succeed();
-      await this.listed();
+      await this.reloadList();
       this.wake();
     } catch (error) {
       this.refuse(error);
@@ -490,17 +490,17 @@ export class Studio {
   }
 
   mark(mark) {
-    const { lineId } = this.store;
+    const { recordingId } = this.store;
     return this.inTurn(async () => {
-      const { lines, line } = this.store, row = lines.find(({ id }) => id === lineId), seen = line?.id === lineId ? line : row;
+      const { recordings, recording } = this.store, row = recordings.find(({ id }) => id === recordingId), seen = recording?.id === recordingId ? recording : row;
       if (!row) return;
       try {
-        const changed = await this.server.told(`lines/${lineId}/mark`, { mark: row.mark === mark ? "none" : mark, revision: seen.revision });
-        if (seen === this.store.line) seen.revision = changed.revision; // nothing else of it has changed: nothing is drawn anew
-        this.store.set({ lines: this.store.lines.map((each) => (each.id === lineId ? changed : each)) });
+        const changed = await this.server.post(`lines/${recordingId}/mark`, { mark: row.mark === mark ? "none" : mark, revision: seen.revision });
+        if (seen === this.store.recording) seen.revision = changed.revision; // nothing else of it has changed: nothing is drawn anew
+        this.store.set({ recordings: this.store.recordings.map((each) => (each.id === recordingId ? changed : each)) });
         this.succeed();
       } catch (error) {
-        if (error instanceof Refused && error.status === 409) await this.late(lineId, null, TEXT.marks[mark], () => this.mark(mark));
+        if (error instanceof Refused && error.status === 409) await this.reportConflict(recordingId, null, TEXT.marks[mark], () => this.mark(mark));
         else this.refuse(error);
       }
     });
@@ -508,8 +508,8 @@ export class Studio {
 
   async keepPronunciation(word, phones, { revision }) {
     try {
-      await this.server.told("lexicon", { word, phones, revision });
-      this.say(filled(TEXT.kept, { word, phones: phones.join(" ") }));
+      await this.server.post("lexicon", { word, phones, revision });
+      this.say(fill(TEXT.kept, { word, phones: phones.join(" ") }));
     } catch (error) {
       this.refuse(error);
     }
@@ -517,21 +517,21 @@ export class Studio {
 
   async add(dropped) {
     try {
-      const first = await added(dropped, this), { message } = this.store;
-      await this.listed();
+      const first = await addFiles(dropped, this), { message } = this.store;
+      await this.reloadList();
       const opened = first && this.open(first.id);
-      this.store.set({ message }); // what was not added is told with the new line, too
+      this.store.set({ message }); // what was not added is shown with the new recording, too
       await opened;
     } catch (error) {
       this.refuse(error);
     }
   }
 
-  /** Ask for something that a line may be open after. */
+  /** Ask for something that a recording may be open after. */
   async tryAgain(id, path, content) {
     try {
-      await this.server.told(path, content);
-      await this.listed();
+      await this.server.post(path, content);
+      await this.reloadList();
       await this.open(id, true);
     } catch (error) {
       this.refuse(error);
@@ -542,21 +542,21 @@ export class Studio {
 
   /** What covers the face and the timeline while there is nothing to show there. */
   coverUp() {
-    const { project, lines, line, lineId, progress } = this.store, { cover } = this;
-    const listed = lines.find(({ id }) => id === lineId), status = line?.status ?? listed?.status;
-    cover.hidden = !project || Boolean(lines.length && (status === "ready" || !status));
+    const { project, recordings, recording, recordingId, progress } = this.store, { cover } = this;
+    const listed = recordings.find(({ id }) => id === recordingId), status = recording?.status ?? listed?.status;
+    cover.hidden = !project || Boolean(recordings.length && (status === "ready" || !status));
     if (cover.hidden) return;
-    if (!lines.length) {
-      cover.replaceChildren(icon("plus"), made("h2", { textContent: TEXT.empty }), made("p", { textContent: TEXT.emptyHint }),
+    if (!recordings.length) {
+      cover.replaceChildren(icon("plus"), make("h2", { textContent: TEXT.empty }), make("p", { textContent: TEXT.emptyHint }),
         textButton(TEXT.open, () => document.getElementById("open").click(), { className: "main" }));
     } else if (status === "failed") {
-      cover.replaceChildren(made("h2", { textContent: TEXT.failed }), made("p", { className: "bad", textContent: line?.error ?? listed?.error ?? "" }),
-        textButton(TEXT.tryAgain, () => this.tryAgain(lineId, "understand", { lines: [lineId] })),
-        ...(line?.restorable ? [textButton(TEXT.restore, () => this.tryAgain(lineId, `lines/${lineId}/restore`, { revision: line.revision }), { id: "restore" })] : []));
+      cover.replaceChildren(make("h2", { textContent: TEXT.failed }), make("p", { className: "bad", textContent: recording?.error ?? listed?.error ?? "" }),
+        textButton(TEXT.tryAgain, () => this.tryAgain(recordingId, "understand", { lines: [recordingId] })),
+        ...(recording?.restorable ? [textButton(TEXT.restore, () => this.tryAgain(recordingId, `lines/${recordingId}/restore`, { revision: recording.revision }), { id: "restore" })] : []));
     } else {
-      const told = progress ?? line?.progress ?? {};
-      cover.replaceChildren(made("h2", { textContent: told.stage ? filled(TEXT.working, { what: told.stage }) : TEXT.waiting }),
-        made("progress", { value: told.share ?? 0, max: 1, "aria-label": TEXT.states.working }));
+      const work = progress ?? recording?.progress ?? {};
+      cover.replaceChildren(make("h2", { textContent: work.stage ? fill(TEXT.working, { what: work.stage }) : TEXT.waiting }),
+        make("progress", { value: work.share ?? 0, max: 1, "aria-label": TEXT.states.working }));
     }
   }
 }

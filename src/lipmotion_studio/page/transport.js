@@ -1,8 +1,8 @@
 // The bar between face and timeline: play, loop, speed, time, undo, tools, zoom.
 
-import { choice, icon, iconButton, made } from "./dom.js";
+import { choice, icon, iconButton, make } from "./dom.js";
 import { clock } from "./timeline/sound_tracks.js";
-import { TEXT, filled } from "./strings.js";
+import { TEXT, fill } from "./strings.js";
 
 const LIP_POINT = /^[xyz]_\d+$/;
 
@@ -16,10 +16,10 @@ export class Transport {
     const pressed = (name, title, act, properties) => iconButton(name, title, act, { "aria-pressed": "false", ...properties });
     const play = iconButton("play", TEXT.play, () => player.toggle(), { id: "play" });
     const loop = pressed("loop", TEXT.loop, () => store.set({ looping: !store.looping }), { id: "loop" });
-    const half = made("button", { type: "button", id: "half", textContent: "½×", title: TEXT.half, "aria-label": `½×, ${TEXT.half}`, "aria-pressed": "false",
+    const half = make("button", { type: "button", id: "half", textContent: "½×", title: TEXT.half, "aria-label": `½×, ${TEXT.half}`, "aria-pressed": "false",
       onclick: () => store.set({ speed: store.speed === 0.5 ? 1 : 0.5 }) });
-    const time = made("output", { id: "time", "aria-label": TEXT.follow });
-    const frame = made("span", { id: "frame" });
+    const time = make("output", { id: "time", "aria-label": TEXT.follow });
+    const frame = make("span", { id: "frame" });
     const undo = iconButton("undo", TEXT.undo, () => studio.undo(), { id: "undo" }), redo = iconButton("redo", TEXT.redo, () => studio.redo(), { id: "redo" });
     const draw = pressed("draw", TEXT.draw, () => store.set({ tool: store.tool === "draw" ? "select" : "draw" }), { id: "draw" });
     const add = choice([], "", (name) => {
@@ -27,9 +27,9 @@ export class Transport {
       studio.showCurves(channels.includes(name) ? channels.filter((each) => each !== name) : [...channels, name]);
     }, { id: "curves", "aria-label": TEXT.curvesShown });
     place.append(
-      made("div", { className: "set" }, play, loop, half), time, frame, made("span", { className: "space" }),
-      made("div", { className: "set" }, undo, redo), made("div", { className: "set" }, draw, add),
-      made("div", { className: "set zoom" }, iconButton("minus", TEXT.zoomOut, () => timeline.zoom(1 / 1.5)), iconButton("plus", TEXT.zoomIn, () => timeline.zoom(1.5)),
+      make("div", { className: "set" }, play, loop, half), time, frame, make("span", { className: "space" }),
+      make("div", { className: "set" }, undo, redo), make("div", { className: "set" }, draw, add),
+      make("div", { className: "set zoom" }, iconButton("minus", TEXT.zoomOut, () => timeline.zoom(1 / 1.5)), iconButton("plus", TEXT.zoomIn, () => timeline.zoom(1.5)),
         iconButton("fit", TEXT.fit, () => timeline.fit())));
     store.on(["playing"], () => {
       play.replaceChildren(icon(store.playing ? "pause" : "play"));
@@ -44,21 +44,21 @@ export class Transport {
       draw.setAttribute("aria-pressed", String(store.tool === "draw"));
     });
     store.on(["tool"], () => { if (store.tool === "draw") studio.say(TEXT.drawing); });
-    store.on(["line"], () => {
-      undo.disabled = !store.line?.undo;
-      redo.disabled = !store.line?.redo;
+    store.on(["recording"], () => {
+      undo.disabled = !store.recording?.undo;
+      redo.disabled = !store.recording?.redo;
     });
-    store.on(["line", "channels", "weights"], () => {
-      const channels = (store.line?.channels ?? []).map(({ name }) => name), shapes = (store.weights?.names ?? []).filter((name) => !name.includes("."));
-      const group = (label, names) => names.length && made("optgroup", { label }, ...names.map((name) => made("option", { value: name,
+    store.on(["recording", "channels", "weights"], () => {
+      const channels = (store.recording?.channels ?? []).map(({ name }) => name), shapes = (store.weights?.names ?? []).filter((name) => !name.includes("."));
+      const group = (label, names) => names.length && make("optgroup", { label }, ...names.map((name) => make("option", { value: name,
         textContent: `${store.channels.includes(name) ? "✓ " : ""}${name}` })));
-      add.replaceChildren(...[made("option", { value: "", textContent: TEXT.curves, disabled: true, selected: true }),
+      add.replaceChildren(...[make("option", { value: "", textContent: TEXT.curves, disabled: true, selected: true }),
         group(TEXT.curveGroups.motion, channels.filter((name) => !LIP_POINT.test(name))), group(TEXT.curveGroups.shapes, shapes),
         group(TEXT.curveGroups.points, channels.filter((name) => LIP_POINT.test(name)))].filter(Boolean));
     });
-    store.on(["time_s", "line"], () => {
+    store.on(["time_s", "recording"], () => {
       time.textContent = `${clock(store.time_s)} / ${clock(player.duration_s)}`;
-      frame.textContent = filled(TEXT.frame, { number: Math.round(store.time_s * (store.line?.rate_hz ?? 100)) });
+      frame.textContent = fill(TEXT.frame, { number: Math.round(store.time_s * (store.recording?.rate_hz ?? 100)) });
     });
   }
 }

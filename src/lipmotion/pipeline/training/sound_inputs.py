@@ -8,8 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.engines import Engine
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, token_posteriors
 from lipmotion.speech.sound.acoustic_conditions import condition_spectra
 from lipmotion.types import (
@@ -39,8 +41,8 @@ def with_sound_inputs(
 ) -> list[Example]:
     """Return examples with what the engine's training takes from their sound (``Inputs``).
 
-    These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, and spectra in many
-    acoustic conditions (``Example.condition_spectra``).
+    These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, the encoding of the
+    sound (``Speech.encoding``), and spectra in many acoustic conditions (``Example.condition_spectra``).
     sound : of each example, by its name
     each  : applies a function to many items, perhaps in several processes
     """
@@ -50,9 +52,18 @@ def with_sound_inputs(
     name = installed_phone_recogniser() if inputs.posteriors else None
     if name is not None:
         result = _with_posteriors(result, recordings, name, sub_monitor(monitor, 0, 0.5), each)
+    if inputs.encoding:
+        result = [
+            replace(example, speech=replace(example.speech, encoding=encoding))
+            for example, encoding in zip(result, each(_encode, recordings), strict=True)
+        ]
     if inputs.conditions:
         result = _with_conditions(result, recordings, inputs.conditions, sub_monitor(monitor, 0.5, 1), each)
     return result
+
+
+def _encode(audio: Audio) -> NDArray[np.float16]:
+    return analysed(audio).encoding
 
 
 def _with_posteriors(

@@ -364,7 +364,12 @@ def speech_of(
             SpeechPart(first, own, speech_of(engine, sound, sound.mfcc(), Timeline(()), kind, each))
             for first, own, sound in audio.passages
         )
-    speech = Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, parts=parts)
+    encoding: Any = None
+    if inputs.encoding:
+        encoding = audio.encoding if audio.is_passage else audio.joined_rows(lambda sound: sound.encoding)
+    speech = Speech(
+        features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts
+    )
     return with_units(speech, units) if len(units) else speech
 
 

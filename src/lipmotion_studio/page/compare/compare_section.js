@@ -1,27 +1,27 @@
 // The part of the panel that compares: with what, how, and a blind comparison.
 
-import { iconButton, made, row, section, textButton } from "../dom.js";
-import { TEXT, filled } from "../strings.js";
+import { iconButton, make, row, section, textButton } from "../dom.js";
+import { TEXT, fill } from "../strings.js";
 import { OTHER } from "./comparison.js";
 
 export function compareSection(studio) {
-  const { store, comparison } = studio, { other, project, blind, line } = store, against = project?.forms.against;
+  const { store, comparison } = studio, { other, project, blind, recording } = store, against = project?.forms.against;
   const kept = [textButton(TEXT.compareKeep, () => comparison.keep(), { id: "compare-keep" }),
-    against && textButton(filled(TEXT.compareModel, { name: against }), () => comparison.with(OTHER), { id: "compare-model" })].filter(Boolean);
-  return section(TEXT.compare, line.versions.length ? made("ul", { className: "list versions" }, ...line.versions.map((version) => versionRow(studio, version))) : null, other && made("p", { className: "hint", textContent: filled(TEXT.comparedWith, { name: other.name }) }),
-    row(...kept), other && row(...(blind && !blind.told ? blindButtons(studio) : [
+    against && textButton(fill(TEXT.compareModel, { name: against }), () => comparison.with(OTHER), { id: "compare-model" })].filter(Boolean);
+  return section(TEXT.compare, recording.versions.length ? make("ul", { className: "list versions" }, ...recording.versions.map((version) => versionRow(studio, version))) : null, other && make("p", { className: "hint", textContent: fill(TEXT.comparedWith, { name: other.name }) }),
+    row(...kept), other && row(...(blind && !blind.result ? blindButtons(studio) : [
       held(studio), ...Object.entries(TEXT.heads).map(([heads, name]) => textButton(name, () => comparison.toggle(heads), { id: `compare-${heads}`, disabled: !other.weights, "aria-pressed": String(store.heads === heads) })),
       textButton(TEXT.blind, () => comparison.blind(), { id: "compare-blind", disabled: !other.weights || !comparison.differs }),
       textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" })])),
-    blind && made("p", { id: "blind-told", className: "hint", textContent: blind.told || filled(TEXT.blindAsk, { what: "AB"[blind.place] }) }));
+    blind && make("p", { id: "blind-told", className: "hint", textContent: blind.result || fill(TEXT.blindAsk, { what: "AB"[blind.place] }) }));
 }
 
 function versionRow(studio, version) {
-  const { comparison, store: { other, blind } } = studio, name = filled(TEXT.versionNamed, version), during = { disabled: Boolean(blind && !blind.told) };
-  return made("li", {}, row(
+  const { comparison, store: { other, blind } } = studio, name = fill(TEXT.versionNamed, version), during = { disabled: Boolean(blind && !blind.result) };
+  return make("li", {}, row(
     textButton(name, () => comparison.with(version.name), { id: version.name, "aria-pressed": String(other?.by === version.name), ...during }),
-    textButton(TEXT.versionBack, () => studio.backTo(version), { id: `${version.name}-back`, title: TEXT.versionBackHint, ...during }),
-    iconButton("remove", filled(TEXT.versionForget, { name }), () => comparison.forget(version.name), { id: `${version.name}-forget`, ...during })));
+    textButton(TEXT.versionBack, () => studio.restoreVersion(version), { id: `${version.name}-back`, title: TEXT.versionBackHint, ...during }),
+    iconButton("remove", fill(TEXT.versionForget, { name }), () => comparison.forget(version.name), { id: `${version.name}-forget`, ...during })));
 }
 
 function held({ store }) {
@@ -35,8 +35,8 @@ function held({ store }) {
 function blindButtons({ comparison, store: { blind } }) {
   const once = { disabled: !blind.asked };
   return [
-    ...["A", "B"].map((name, place) => textButton(filled(TEXT.blindPlay, { name }), () => comparison.play(place), { id: `blind-play-${name}`, ...once })),
-    ...["A", "B"].map((name, place) => textButton(filled(TEXT.blindBetter, { name }), () => comparison.vote(place), { id: `blind-better-${name}`, ...once })),
+    ...["A", "B"].map((name, place) => textButton(fill(TEXT.blindPlay, { name }), () => comparison.play(place), { id: `blind-play-${name}`, ...once })),
+    ...["A", "B"].map((name, place) => textButton(fill(TEXT.blindBetter, { name }), () => comparison.vote(place), { id: `blind-better-${name}`, ...once })),
     textButton(TEXT.blindNeither, () => comparison.vote(null), { id: "blind-neither", ...once }),
     textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" }),
   ];

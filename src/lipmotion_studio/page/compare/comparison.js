@@ -1,7 +1,7 @@
 // The other motion: a version that was kept, or that of the other model; and blind comparisons with it.
 
 import { Refused } from "../server.js";
-import { TEXT, filled } from "../strings.js";
+import { TEXT, fill } from "../strings.js";
 
 /** What the server calls the model that the project's is compared with. */
 export const OTHER = "other";
@@ -11,7 +11,7 @@ export class Comparison {
   constructor(studio) {
     this.studio = studio;
     this.store = studio.store;
-    this.store.on(["line", "face"], () => this.renew());
+    this.store.on(["recording", "face"], () => this.renew());
     this.store.on(["channels"], () => this.fill());
     this.store.on(["playing", "time_s"], () => this.heard());
   }
@@ -19,7 +19,7 @@ export class Comparison {
   /** Keep the edits as they are, and compare with them from now on. */
   async keep() {
     if (!await this.studio.request("versions", {}, "")) return;
-    const { line } = this.store, version = line?.versions?.find(({ digest }) => digest === line.edits_digest);
+    const { recording } = this.store, version = recording?.versions?.find(({ digest }) => digest === recording.edits_digest);
     if (version) await this.with(version.name);
   }
 
@@ -31,18 +31,18 @@ export class Comparison {
 
   /** What a motion is called, by what the server calls it. */
   name(by) {
-    const { line, project } = this.store, version = line.versions.find(({ name }) => name === by);
-    return version ? filled(TEXT.versionNamed, version) : filled(TEXT.modelNamed, { name: project.forms.against });
+    const { recording, project } = this.store, version = recording.versions.find(({ name }) => name === by);
+    return version ? fill(TEXT.versionNamed, version) : fill(TEXT.modelNamed, { name: project.forms.against });
   }
 
   /** Compare with a version, or with the motion that the other model makes of the same edits. */
   async with(by) {
-    const { store, studio: { server, curves, curves: { names } } } = this, { lineId, line: { revision }, face } = store;
+    const { store, studio: { server, curves, curves: { names } } } = this, { recordingId, recording: { revision }, face } = store;
     const isMesh = store.project.forms.faces.find(({ name }) => name === face)?.mesh;
     try {
-      const [motion, moved] = await Promise.all([curves.read(lineId, "motion", names, null, by),
-        isMesh && server.weights(`lines/${lineId}/weights?by=${by}&face=${encodeURIComponent(face)}`)]);
-      if (lineId !== store.lineId || face !== store.face) return;
+      const [motion, moved] = await Promise.all([curves.read(recordingId, "motion", names, null, by),
+        isMesh && server.weights(`lines/${recordingId}/weights?by=${by}&face=${encodeURIComponent(face)}`)]);
+      if (recordingId !== store.recordingId || face !== store.face) return;
       this.show({ by, revision, face, name: this.name(by), motion, names, weights: moved ? moved.weights : null });
       await this.fill();
     } catch (error) {
@@ -52,11 +52,11 @@ export class Comparison {
 
   /** Read the other motion's curves that are shown by now and are not here. */
   async fill() {
-    const { store, store: { other, lineId }, studio, studio: { curves } } = this;
-    if (!other || !store.line || String(other.names) === String(curves.names)) return;
+    const { store, store: { other, recordingId }, studio, studio: { curves } } = this;
+    if (!other || !store.recording || String(other.names) === String(curves.names)) return;
     const { names } = curves;
     try {
-      const motion = await curves.completed(lineId, "motion", other.motion, other.by);
+      const motion = await curves.completed(recordingId, "motion", other.motion, other.by);
       if (other === store.other) store.set({ other: { ...other, motion, names } });
       await this.fill();
     } catch (error) {
@@ -70,9 +70,9 @@ export class Comparison {
 
   /** After an edit the other model moves the mouth by it, too; weights are of the face that is shown. */
   renew() {
-    const { other, line, face } = this.store;
-    if (!other || line?.status !== "ready") return;
-    if (face !== other.face || (other.by === OTHER && line.revision !== other.revision)) this.with(other.by);
+    const { other, recording, face } = this.store;
+    if (!other || recording?.status !== "ready") return;
+    if (face !== other.face || (other.by === OTHER && recording.revision !== other.revision)) this.with(other.by);
   }
 
   /** Show both heads in a way, or, if they are, one. */
@@ -82,7 +82,7 @@ export class Comparison {
   blind() {
     const order = Math.random() < 0.5 ? [false, true] : [true, false], { duration_s } = this.studio.player;
     const span = this.store.span ?? { start_s: 0, end_s: duration_s };
-    this.store.set({ heads: "one", blind: { order, span, place: 0, asked: false, told: "" } });
+    this.store.set({ heads: "one", blind: { order, span, place: 0, asked: false, result: "" } });
     this.play(0, false);
   }
 
@@ -97,29 +97,29 @@ export class Comparison {
   /** The end of the first is followed by the second; then it is asked. */
   heard() {
     const { blind, playing, time_s } = this.store;
-    if (!blind || blind.told || blind.asked || playing || time_s < blind.span.end_s - 0.02) return;
+    if (!blind || blind.result || blind.asked || playing || time_s < blind.span.end_s - 0.02) return;
     if (blind.place === 0) this.play(1, false);
     else this.store.set({ blind: { ...blind, asked: true } });
   }
 
   /** Whether the other motion may be another one: it is that of the other model, or of other edits. */
   get differs() {
-    const { other, line } = this.store;
-    return other?.by === OTHER || line?.versions.find(({ name }) => name === other?.by)?.digest !== line?.edits_digest;
+    const { other, recording } = this.store;
+    return other?.by === OTHER || recording?.versions.find(({ name }) => name === other?.by)?.digest !== recording?.edits_digest;
   }
 
   /** Keep which was better: 0, 1, or null: neither; and tell what was what. */
   async vote(place) {
-    const { blind, blind: { order }, other, line, lineId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
+    const { blind, blind: { order }, other, recording, recordingId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
     const shown = order.map((isOther) => ({ by: isOther ? other.by : "" }));
     try {
-      const { better, neither } = await this.studio.server.told(`lines/${lineId}/votes`, { shown, better: place, revision: line.revision });
+      const { better, neither } = await this.studio.server.post(`lines/${recordingId}/votes`, { shown, better: place, revision: recording.revision });
       this.studio.player.stop();
-      const told = filled(TEXT.blindTold, { a: names[0], b: names[1], now: better[order.indexOf(false)], other: better[order.indexOf(true)], neither, name: other.name });
-      this.store.set({ blind: { ...blind, told }, comparing: false });
-      this.studio.say(told);
+      const result = fill(TEXT.blindResult, { a: names[0], b: names[1], now: better[order.indexOf(false)], other: better[order.indexOf(true)], neither, name: other.name });
+      this.store.set({ blind: { ...blind, result }, comparing: false });
+      this.studio.say(result);
     } catch (error) {
-      if (error instanceof Refused && error.status === 409) await this.studio.late(lineId, error.state, TEXT.blind, null);
+      if (error instanceof Refused && error.status === 409) await this.studio.reportConflict(recordingId, error.state, TEXT.blind, null);
       else this.studio.refuse(error);
     }
   }

@@ -1,4 +1,4 @@
-// A silent video that follows the sound of the line, which is its clock, too.
+// A silent video that follows the sound of the recording, which is its clock, too.
 
 /** Further off than the second it is set to the time of the sound; further than the first it goes faster or slower. */
 const NEAR_S = 0.01, FAR_S = 0.25, HASTE = 5, MOST_HASTE = 0.5, MOST_LEAD_S = 1;
@@ -16,7 +16,7 @@ export class Following {
     store.on(["time_s", "playing", "speed"], () => this.follow());
   }
 
-  /** When in the video the sound of the line begins; negative: the video begins later. */
+  /** When in the video the sound of the recording begins; negative: the video begins later. */
   get begins_s() { return 0; }
 
   /** Show the picture of the time; while the sound plays, play along. */

@@ -1,6 +1,6 @@
-// The real video of the line, beside the face.
+// The real video of the recording, beside the face.
 
-import { iconButton, made } from "../dom.js";
+import { iconButton, make } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { Following } from "./following.js";
 
@@ -10,20 +10,20 @@ export class Recorded extends Following {
    * @param {import("../studio.js").Studio} studio
    */
   constructor(place, studio) {
-    super(made("video", { className: "recorded", muted: true, playsInline: true, preload: "auto", hidden: true, "aria-label": TEXT.recorded }), studio.store);
+    super(make("video", { className: "recorded", muted: true, playsInline: true, preload: "auto", hidden: true, "aria-label": TEXT.recorded }), studio.store);
     this.place = place;
     this.video.addEventListener("error", () => { if (!this.video.hidden) studio.stage.say(TEXT.noRecorded); });
     this.button = iconButton("camera", TEXT.besideFace, () => this.toggle(), { id: "recorded", "aria-pressed": "false" });
     place.append(this.video);
-    this.store.on(["line"], () => this.offer());
+    this.store.on(["recording"], () => this.offer());
   }
 
-  get address() { return this.store.line?.media?.video ?? ""; }
+  get address() { return this.store.recording?.media?.video ?? ""; }
 
-  /** When in the video the sound of the line begins. */
-  get begins_s() { return this.store.line?.media?.sound_begins_s ?? 0; }
+  /** When in the video the sound of the recording begins. */
+  get begins_s() { return this.store.recording?.media?.sound_begins_s ?? 0; }
 
-  /** Offer the video of a line that has one. */
+  /** Offer the video of a recording that has one. */
   offer() {
     this.button.hidden = !this.address;
     if (!this.address) this.show(false);

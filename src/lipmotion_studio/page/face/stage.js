@@ -1,7 +1,7 @@
 // The place of the face: a character in WebGL, or pictures of a drawn face, or a video of a span.
 
-import { choice, made, onDrag, textButton } from "../dom.js";
-import { TEXT, filled } from "../strings.js";
+import { choice, make, onDrag, textButton } from "../dom.js";
+import { TEXT, fill } from "../strings.js";
 import { Film } from "./film.js";
 import { Head } from "./head.js";
 import { Recorded } from "./recorded.js";
@@ -19,17 +19,17 @@ export class Stage {
     this.loaded = ""; // name of the character in WebGL
     this.asked = false; // a picture is on its way
     this.wanted = false; // and another one is wanted
-    this.solid = made("canvas", { className: "head", tabIndex: 0, role: "img", "aria-label": TEXT.faceLabel });
-    this.ghost = made("canvas", { className: "ghost", hidden: true, "aria-hidden": "true" });
-    this.drawn = made("canvas", { className: "drawn", width: 640, height: 640, hidden: true, role: "img", "aria-label": TEXT.faceLabel });
-    this.note = made("p", { className: "note", hidden: true });
-    this.views = made("div", { className: "views", role: "group", "aria-label": TEXT.show },
+    this.solid = make("canvas", { className: "head", tabIndex: 0, role: "img", "aria-label": TEXT.faceLabel });
+    this.ghost = make("canvas", { className: "ghost", hidden: true, "aria-hidden": "true" });
+    this.drawn = make("canvas", { className: "drawn", width: 640, height: 640, hidden: true, role: "img", "aria-label": TEXT.faceLabel });
+    this.note = make("p", { className: "note", hidden: true });
+    this.views = make("div", { className: "views", role: "group", "aria-label": TEXT.show },
       ...Object.entries(TEXT.views).map(([name, text]) => textButton(text, () => this.head?.look(name))));
-    this.faces = made("div", { className: "faces" });
+    this.faces = make("div", { className: "faces" });
     this.recorded = new Recorded(place, studio);
     place.append(this.solid, this.ghost, this.drawn);
     this.film = new Film(place, this);
-    place.append(this.note, made("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.film.button));
+    place.append(this.note, make("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.film.button));
     onDrag(this.solid, {
       start: (event) => { this.from = [event.clientX, event.clientY]; },
       move: (event) => {
@@ -50,7 +50,7 @@ export class Stage {
     new ResizeObserver(() => this.head?.draw()).observe(this.solid);
     this.store.on(["project", "face"], () => this.offer());
     this.store.on(["face", "project", "mesh"], () => this.change());
-    this.store.on(["weights", "time_s", "line", "other", "comparing", "heads"], () => this.show());
+    this.store.on(["weights", "time_s", "recording", "other", "comparing", "heads"], () => this.show());
   }
 
   get form() { return this.store.project?.forms.faces.find(({ name }) => name === this.store.face); }
@@ -84,7 +84,7 @@ export class Stage {
         await this.head.load(await this.studio.server.bytes(`faces/${encodeURIComponent(mesh)}.glb`));
         this.say("");
       } catch (error) {
-        this.say(filled(TEXT.noFace, { reason: error.message }));
+        this.say(fill(TEXT.noFace, { reason: error.message }));
       }
     }
     this.show();
@@ -102,28 +102,28 @@ export class Stage {
   }
 
   show() {
-    const { weights, other, comparing, heads, time_s, line } = this.store;
+    const { weights, other, comparing, heads, time_s, recording } = this.store;
     if (this.isSolid && this.head) {
       if (weights && !this.studio.weights.known(time_s)) return; // the pose before stays until it is known
       this.head.pose(comparing && other?.weights ? other.weights : weights, time_s, heads === "one" ? null : other?.weights, heads === "over");
-      this.studio.measured();
-    } else if (line && !this.drawn.hidden) this.picture();
+      this.studio.measureDelay();
+    } else if (recording && !this.drawn.hidden) this.picture();
   }
 
   /** Draw the picture of the time; while one is on its way, only the newest other one is asked for. */
   async picture() {
     if (this.asked) { this.wanted = true; return; }
     this.asked = true;
-    const { lineId, time_s, face, other, comparing } = this.store, by = comparing && other ? other.by : "";
+    const { recordingId, time_s, face, other, comparing } = this.store, by = comparing && other ? other.by : "";
     try {
-      const picture = await this.studio.server.picture(`lines/${lineId}/picture?time=${time_s.toFixed(3)}&face=${encodeURIComponent(face)}&by=${by}`);
+      const picture = await this.studio.server.picture(`lines/${recordingId}/picture?time=${time_s.toFixed(3)}&face=${encodeURIComponent(face)}&by=${by}`);
       this.drawn.width = picture.width;
       this.drawn.height = picture.height;
       this.drawn.getContext("2d").drawImage(picture, 0, 0);
       this.say("");
-      this.studio.measured();
+      this.studio.measureDelay();
     } catch (error) {
-      this.say(filled(TEXT.noFace, { reason: error.message }));
+      this.say(fill(TEXT.noFace, { reason: error.message }));
     }
     this.asked = false;
     if (this.wanted) {

@@ -19,7 +19,7 @@ export class Weights {
     this.store.on(["time_s"], () => this.look());
   }
 
-  /** What is known is of another line or face. */
+  /** What is known is of another recording or face. */
   forget() {
     this.number += 1;
     this.held = null;
@@ -44,14 +44,14 @@ export class Weights {
 
   get isMesh() { return this.store.project?.forms.faces.find(({ name }) => name === this.store.face)?.mesh; }
 
-  /** The next portions to ask for: the one at the playhead alone, then what follows; of a short line all. */
+  /** The next portions to ask for: the one at the playhead alone, then what follows; of a short recording all. */
   next() {
-    const { line, time_s, playing } = this.store, ahead = playing ? PLAYED_AHEAD : AHEAD, count = Math.max(Math.ceil(line.duration_s / PORTION_S), 1);
+    const { recording, time_s, playing } = this.store, ahead = playing ? PLAYED_AHEAD : AHEAD, count = Math.max(Math.ceil(recording.duration_s / PORTION_S), 1);
     this.held ??= new Uint8Array(count);
-    const here = Math.min(this.portion(time_s), count - 1), last = line.duration_s <= SHORT_S ? count : Math.min(here + ahead, count);
+    const here = Math.min(this.portion(time_s), count - 1), last = recording.duration_s <= SHORT_S ? count : Math.min(here + ahead, count);
     if (!this.held[here]) return [here, here + 1];
     let first = this.held.indexOf(0, here);
-    if (first < 0 || first >= last) first = line.duration_s <= SHORT_S ? this.held.indexOf(0) : -1;
+    if (first < 0 || first >= last) first = recording.duration_s <= SHORT_S ? this.held.indexOf(0) : -1;
     if (first < 0) return null;
     let stop = first + 1;
     while (stop < count && stop - first < AT_ONCE && !this.held[stop]) stop++;
@@ -59,24 +59,24 @@ export class Weights {
   }
 
   async look() {
-    if (this.running || this.store.line?.status !== "ready" || !this.isMesh) return;
+    if (this.running || this.store.recording?.status !== "ready" || !this.isMesh) return;
     this.running = true;
     try {
-      for (let next = this.next(); next; next = this.store.line?.status === "ready" ? this.next() : null) await this.read(...next);
+      for (let next = this.next(); next; next = this.store.recording?.status === "ready" ? this.next() : null) await this.read(...next);
     } catch (error) {
       this.studio.refuse(error);
     }
     this.running = false;
-    if (this.store.line?.status === "ready" && !this.exact && this.store.line.duration_s <= SHORT_S) this.settling.want();
+    if (this.store.recording?.status === "ready" && !this.exact && this.store.recording.duration_s <= SHORT_S) this.settling.want();
   }
 
-  address() { return `lines/${this.store.lineId}/weights?face=${encodeURIComponent(this.store.face)}`; }
+  address() { return `lines/${this.store.recordingId}/weights?face=${encodeURIComponent(this.store.face)}`; }
 
   async read(first, stop) {
     const { number, store, studio } = this, stretch = `&start_s=${first * PORTION_S}&end_s=${stop * PORTION_S}`;
     const { weights: part, mesh } = await studio.server.weights(this.address() + stretch);
     if (number !== this.number || !this.held) return;
-    const frames = Math.max(store.line.frames, part.first + part.frames), before = store.weights;
+    const frames = Math.max(store.recording.frames, part.first + part.frames), before = store.weights;
     const isSame = before && String(before.names) === String(part.names), fits = isSame && before.frames >= frames;
     const values = fits ? before.values : new Float32Array(frames * part.names.length).fill(NaN);
     if (isSame && !fits) values.set(before.values);

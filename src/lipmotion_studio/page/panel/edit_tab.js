@@ -1,8 +1,8 @@
 // What is selected, and what can be done to it.
 
-import { choice, following, labelled, made, row, section, textButton } from "../dom.js";
+import { choice, following, labelled, make, row, section, textButton } from "../dom.js";
 import { placed, say } from "../sentences.js";
-import { TEXT, filled } from "../strings.js";
+import { TEXT, fill } from "../strings.js";
 
 const MOST_GAIN = 2;
 /** Moods that have no strength. */
@@ -10,14 +10,14 @@ const PLAIN = ["neutral", "plain"];
 
 /** Return what the tab shows. */
 export function editTab(studio) {
-  const { line, selected, span } = studio.store;
-  if (!line?.phones.length) return [];
+  const { recording, selected, span } = studio.store;
+  if (!recording?.phones.length) return [];
   return [
-    selected?.kind === "phone" && line.phones[selected.index] && phonePart(studio, selected.index),
-    selected?.kind === "word" && line.words[selected.index] && wordPart(studio, selected.index),
+    selected?.kind === "phone" && recording.phones[selected.index] && phonePart(studio, selected.index),
+    selected?.kind === "word" && recording.words[selected.index] && wordPart(studio, selected.index),
     selected?.kind === "curve" && curvePart(studio, selected.channel),
     span && spanPart(studio, span),
-    !selected && !span && made("p", { className: "hint", textContent: TEXT.nothingSelected }),
+    !selected && !span && make("p", { className: "hint", textContent: TEXT.nothingSelected }),
     moodPart(studio),
     !selected && transcriptPart(studio),
   ].filter(Boolean);
@@ -26,31 +26,31 @@ export function editTab(studio) {
 const phoneChoices = ({ forms }) => forms.phones.map(({ name, example }) => [name, example ? `${name}   ${example}` : name]);
 
 function timeField(id, value, name, onchange) {
-  return labelled(name, made("input", { id, type: "number", step: "0.01", min: "0", value: value.toFixed(3), onchange: (event) => onchange(Number(event.target.value)) }));
+  return labelled(name, make("input", { id, type: "number", step: "0.01", min: "0", value: value.toFixed(3), onchange: (event) => onchange(Number(event.target.value)) }));
 }
 
 function phonePart(studio, index) {
-  const { line, project } = studio.store, phone = line.phones[index], number = index + 1;
+  const { recording, project } = studio.store, phone = recording.phones[index], number = index + 1;
   const labels = phoneChoices(project);
   const label = choice(labels, phone.label, (to) => studio.relabel("phone", index, to), { id: "phone-label", "aria-label": TEXT.phone });
   const sure = phone.confidence === null || phone.confidence === undefined ? ""
-    : made("span", { className: "sure", textContent: filled(TEXT.sure, { share: Math.round(100 * phone.confidence) }) });
+    : make("span", { className: "sure", textContent: fill(TEXT.sure, { share: Math.round(100 * phone.confidence) }) });
   return section(`${TEXT.phone} ${number}`,
     row(label, sure),
     row(timeField("phone-from", phone.start_s, TEXT.from, (time_s) => studio.edit([say.begins(number, time_s)])),
       timeField("phone-to", phone.end_s, TEXT.to, (time_s) => studio.edit([say.ends(number, time_s)]))),
     row(textButton(TEXT.split, () => studio.split(index), { id: "phone-split" }),
-      textButton(TEXT.mergeNext, () => studio.merge(index), { id: "phone-merge", disabled: number === line.phones.length }),
-      textButton(TEXT.remove, () => studio.removePhone(index), { id: "phone-remove", disabled: line.phones.length < 2 })),
+      textButton(TEXT.mergeNext, () => studio.merge(index), { id: "phone-merge", disabled: number === recording.phones.length }),
+      textButton(TEXT.remove, () => studio.removePhone(index), { id: "phone-remove", disabled: recording.phones.length < 2 })),
   );
 }
 
 function wordPart(studio, index) {
-  const { line } = studio.store, word = line.words[index];
-  const field = made("input", { id: "word-label", value: word.label, autocapitalize: "none", spellcheck: false, "aria-label": TEXT.word });
-  const offers = made("div", { className: "offers", id: "offers", role: "group", "aria-label": TEXT.pronunciations });
-  const phones = made("input", { id: "word-phones", spellcheck: false, autocapitalize: "none" });
-  const spoken = spokenAs(line, index).join(" ");
+  const { recording } = studio.store, word = recording.words[index];
+  const field = make("input", { id: "word-label", value: word.label, autocapitalize: "none", spellcheck: false, "aria-label": TEXT.word });
+  const offers = make("div", { className: "offers", id: "offers", role: "group", "aria-label": TEXT.pronunciations });
+  const phones = make("input", { id: "word-phones", spellcheck: false, autocapitalize: "none" });
+  const spoken = spokenAs(recording, index).join(" ");
   phones.value = spoken;
   let waiting = 0, seen = {};
   const offer = async () => { seen = await offerPronunciations(studio, field.value.trim().toLowerCase(), offers, phones); };
@@ -81,11 +81,11 @@ async function offerPronunciations(studio, word, place, phones) {
   try {
     if (word) found = await studio.server.read(`lexicon?word=${encodeURIComponent(word)}`);
   } catch (error) {
-    place.replaceChildren(made("p", { className: "hint", textContent: error.message }));
+    place.replaceChildren(make("p", { className: "hint", textContent: error.message }));
     return {};
   }
   place.replaceChildren(
-    found.known === false ? made("p", { className: "hint", textContent: TEXT.noPronunciation }) : "",
+    found.known === false ? make("p", { className: "hint", textContent: TEXT.noPronunciation }) : "",
     ...(found.pronunciations ?? []).map((said) => textButton(said.join(" "), () => { phones.value = said.join(" "); }, { className: "offer" })));
   return { ...found, asked: word };
 }
@@ -98,7 +98,7 @@ function spokenAs({ words, phones }, index) {
 
 function curvePart(studio, channel) {
   const { store } = studio;
-  const field = following(made("input", { id: "curve-value", type: "number", step: "0.01", "aria-label": TEXT.value }), (shown) => {
+  const field = following(make("input", { id: "curve-value", type: "number", step: "0.01", "aria-label": TEXT.value }), (shown) => {
     const curves = store.curvesOf(channel);
     if (curves && document.activeElement !== shown) shown.value = curves.at(store.time_s, curves.column(channel)).toFixed(3);
   });
@@ -108,10 +108,10 @@ function curvePart(studio, channel) {
 }
 
 function spanPart(studio, { start_s, end_s }) {
-  const { store } = studio, { selected, line, project } = store;
+  const { store } = studio, { selected, recording, project } = store;
   const channel = selected?.kind === "curve" ? selected.channel : "";
-  const shown = made("output", { textContent: "1.00" });
-  const factor = made("input", { id: "gain", type: "range", min: "0", max: String(MOST_GAIN), step: "0.05", value: "1", "aria-label": TEXT.gain,
+  const shown = make("output", { textContent: "1.00" });
+  const factor = make("input", { id: "gain", type: "range", min: "0", max: String(MOST_GAIN), step: "0.05", value: "1", "aria-label": TEXT.gain,
     oninput: () => { shown.textContent = Number(factor.value).toFixed(2); } });
   const phone = choice(phoneChoices(project), "ah", () => {}, { id: "insert-phone", "aria-label": TEXT.insertPhone });
   const insert = () => studio.edit([say.insert(phone.value, start_s, end_s)]);
@@ -120,7 +120,7 @@ function spanPart(studio, { start_s, end_s }) {
     event.preventDefault();
     insert();
   });
-  const locked = placed(line.steps).locks.find((lock) => lock.start_s < end_s && lock.end_s > start_s);
+  const locked = placed(recording.steps).locks.find((lock) => lock.start_s < end_s && lock.end_s > start_s);
   return section(`${TEXT.span} ${start_s.toFixed(2)} – ${end_s.toFixed(2)} s`,
     row(labelled(`${TEXT.gain}: ${channel || TEXT.wholeMouth}`, factor, shown),
       textButton(TEXT.apply, () => studio.edit([say.gain(channel, Number(factor.value), start_s, end_s)]), { id: "gain-apply" })),
@@ -131,7 +131,7 @@ function spanPart(studio, { start_s, end_s }) {
 }
 
 function moodPart(studio) {
-  const { project } = studio.store, strength = made("input", { id: "mood-strength", type: "range", min: "0.1", max: "1", step: "0.1", value: "0.7", "aria-label": TEXT.strength });
+  const { project } = studio.store, strength = make("input", { id: "mood-strength", type: "range", min: "0.1", max: "1", step: "0.1", value: "0.7", "aria-label": TEXT.strength });
   const known = ["neutral", ...project.forms.moods, "plain", ...project.forms.manners].map((each) => [each, each]);
   const moods = choice(known, "happy", () => {}, { id: "mood", "aria-label": TEXT.mood });
   const set = () => studio.edit([say.mood(PLAIN.includes(moods.value) ? moods.value : `${moods.value}:${strength.value}`, studio.store.time_s)]);
@@ -139,8 +139,8 @@ function moodPart(studio) {
 }
 
 function transcriptPart(studio) {
-  const { line } = studio.store, words = (!line.steps.length && line.transcript) || line.words.map(({ label }) => label).join(" ");
-  const field = made("textarea", { id: "transcript", rows: 3, value: studio.typed ?? words, "aria-label": TEXT.transcript });
-  const warnings = (line.warnings ?? []).map((text) => made("p", { className: "hint", textContent: filled(TEXT.wouldHelp, { what: text }) }));
+  const { recording } = studio.store, words = (!recording.steps.length && recording.transcript) || recording.words.map(({ label }) => label).join(" ");
+  const field = make("textarea", { id: "transcript", rows: 3, value: studio.typed ?? words, "aria-label": TEXT.transcript });
+  const warnings = (recording.warnings ?? []).map((text) => make("p", { className: "hint", textContent: fill(TEXT.wouldHelp, { what: text }) }));
   return section(TEXT.transcript, ...warnings, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
 }

@@ -1,17 +1,17 @@
-// The edits of the line, newest first, and the comparison with another motion.
+// The edits of the recording, newest first, and the comparison with another motion.
 
 import { compareSection } from "../compare/compare_section.js";
-import { made, row, section, textButton } from "../dom.js";
+import { make, row, section, textButton } from "../dom.js";
 import { TEXT } from "../strings.js";
 
 export function historyTab(studio) {
-  const { line } = studio.store;
-  if (!line) return [];
+  const { recording } = studio.store;
+  if (!recording) return [];
   return [
     section(TEXT.history,
-      row(textButton(TEXT.undo, () => studio.undo(), { id: "undo-here", disabled: !line.undo }), textButton(TEXT.redo, () => studio.redo(), { id: "redo-here", disabled: !line.redo })),
-      line.steps.length ? made("ol", { className: "list steps", reversed: true }, ...line.steps.map((step, n) => made("li", { value: n + 1, textContent: step })).reverse())
-        : made("p", { className: "hint", textContent: TEXT.noHistory })),
+      row(textButton(TEXT.undo, () => studio.undo(), { id: "undo-here", disabled: !recording.undo }), textButton(TEXT.redo, () => studio.redo(), { id: "redo-here", disabled: !recording.redo })),
+      recording.steps.length ? make("ol", { className: "list steps", reversed: true }, ...recording.steps.map((step, n) => make("li", { value: n + 1, textContent: step })).reverse())
+        : make("p", { className: "hint", textContent: TEXT.noHistory })),
     compareSection(studio),
   ];
 }

@@ -1,6 +1,6 @@
 // The panel beside the face: what is selected, delivery, why, history.
 
-import { made, replaced } from "../dom.js";
+import { make, replaced } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { editTab } from "./edit_tab.js";
 import { deliveryTab } from "./delivery_tab.js";
@@ -9,8 +9,8 @@ import { historyTab } from "./history_tab.js";
 
 /** Each tab, and what it is made anew for: a panel that is made anew under the pointer loses a click. */
 const TABS = {
-  edit: { shown: editTab, follows: ["line", "selected", "span"] }, delivery: { shown: deliveryTab, follows: ["line"] },
-  why: { shown: whyTab, follows: ["line", "doubts"] }, history: { shown: historyTab, follows: ["line", "other", "blind", "heads", "project"] },
+  edit: { shown: editTab, follows: ["recording", "selected", "span"] }, delivery: { shown: deliveryTab, follows: ["recording"] },
+  why: { shown: whyTab, follows: ["recording", "doubts"] }, history: { shown: historyTab, follows: ["recording", "other", "blind", "heads", "project"] },
 };
 
 export class Panel {
@@ -20,10 +20,10 @@ export class Panel {
    */
   constructor(place, studio) {
     const { store } = studio, names = Object.keys(TABS);
-    this.body = made("div", { className: "body", role: "tabpanel", tabIndex: 0, id: "panel-body" });
-    const tabs = names.map((name) => made("button", { type: "button", role: "tab", id: `tab-${name}`, textContent: TEXT.tabs[name],
+    this.body = make("div", { className: "body", role: "tabpanel", tabIndex: 0, id: "panel-body" });
+    const tabs = names.map((name) => make("button", { type: "button", role: "tab", id: `tab-${name}`, textContent: TEXT.tabs[name],
       "aria-controls": "panel-body", onclick: () => store.set({ tab: name }) }));
-    const list = made("div", { className: "tabs", role: "tablist" }, ...tabs);
+    const list = make("div", { className: "tabs", role: "tablist" }, ...tabs);
     list.addEventListener("keydown", (event) => {
       const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
       if (!step) return;

@@ -1,7 +1,7 @@
 // Why the mouth is as it is at the playhead, and the moments that are in doubt.
 
-import { following, made, row, section, textButton } from "../dom.js";
-import { TEXT, filled } from "../strings.js";
+import { following, make, row, section, textButton } from "../dom.js";
+import { TEXT, fill } from "../strings.js";
 
 const SETTLED_MS = 120, FACTS = ["word", "phone", "unit", "state", "experts", "confidence"];
 
@@ -11,8 +11,8 @@ const shownFact = (name, value) => (name === "experts" ? value.map((each) => `${
 
 export function whyTab(studio) {
   const { store } = studio;
-  if (!store.line?.phones.length) return [];
-  const facts = made("div", { id: "why" });
+  if (!store.recording?.phones.length) return [];
+  const facts = make("div", { id: "why" });
   let waiting = 0;
   const shown = following(section(TEXT.why.replace("{time}", "…"), facts), (part) => {
     clearTimeout(waiting);
@@ -20,21 +20,21 @@ export function whyTab(studio) {
   });
   return [shown, section(TEXT.doubts,
     row(textButton(TEXT.previousDoubt, () => studio.jump(-1), { id: "previous-doubt" }), textButton(TEXT.nextDoubt, () => studio.jump(1), { id: "next-doubt" })),
-    store.doubts.length ? made("ol", { className: "list" }, ...store.doubts.map((doubt) => made("li", {},
-      textButton(`${doubt.start_s.toFixed(2)} s  ${doubt.text}`, () => studio.goTo(doubt))))) : made("p", { className: "hint", textContent: TEXT.noDoubts }))];
+    store.doubts.length ? make("ol", { className: "list" }, ...store.doubts.map((doubt) => make("li", {},
+      textButton(`${doubt.start_s.toFixed(2)} s  ${doubt.text}`, () => studio.goTo(doubt))))) : make("p", { className: "hint", textContent: TEXT.noDoubts }))];
 }
 
 async function tell(studio, shown, facts) {
-  const { lineId, time_s } = studio.store;
+  const { recordingId, time_s } = studio.store;
   try {
-    const why = await studio.server.read(`lines/${lineId}/why?time=${time_s.toFixed(3)}`);
+    const why = await studio.server.read(`lines/${recordingId}/why?time=${time_s.toFixed(3)}`);
     if (studio.store.time_s !== time_s) return;
-    shown.firstChild.textContent = filled(TEXT.why, { time: time_s.toFixed(2) });
+    shown.firstChild.textContent = fill(TEXT.why, { time: time_s.toFixed(2) });
     facts.replaceChildren(
-      made("dl", {}, ...FACTS.filter((name) => ![undefined, null, ""].includes(why[name]) && why[name].length !== 0).flatMap((name) => [
-        made("dt", { textContent: TEXT.facts[name] }), made("dd", { textContent: shownFact(name, why[name]) })])),
-      made("details", { open: facts.querySelector("details")?.open ?? false }, made("summary", { textContent: TEXT.inFull }), made("p", { textContent: why.text ?? "" })));
+      make("dl", {}, ...FACTS.filter((name) => ![undefined, null, ""].includes(why[name]) && why[name].length !== 0).flatMap((name) => [
+        make("dt", { textContent: TEXT.facts[name] }), make("dd", { textContent: shownFact(name, why[name]) })])),
+      make("details", { open: facts.querySelector("details")?.open ?? false }, make("summary", { textContent: TEXT.inFull }), make("p", { textContent: why.text ?? "" })));
   } catch (error) {
-    facts.replaceChildren(made("p", { className: "hint", textContent: error.message }));
+    facts.replaceChildren(make("p", { className: "hint", textContent: error.message }));
   }
 }

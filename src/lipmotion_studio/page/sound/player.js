@@ -1,4 +1,4 @@
-// The sound of the open line, which is the clock of everything that moves.
+// The sound of the open recording, which is the clock of everything that moves.
 
 import { endingAt } from "./samples.js";
 
@@ -22,7 +22,7 @@ export class Player {
     store.on(["speed"], () => { this.audio.playbackRate = store.speed; });
   }
 
-  get duration_s() { return this.store.sound?.duration_s ?? this.store.line?.duration_s ?? 0; }
+  get duration_s() { return this.store.sound?.duration_s ?? this.store.recording?.duration_s ?? 0; }
 
   /** Take another sound, a WAV file. */
   load(buffer) {
@@ -46,7 +46,7 @@ export class Player {
   }
 
   /** The stretch that is compared blind, outside of which nothing is heard; null: none. */
-  get judged() { return this.store.blind && !this.store.blind.told ? this.store.blind.span : null; }
+  get judged() { return this.store.blind && !this.store.blind.result ? this.store.blind.span : null; }
 
   seek(time_s) {
     const held = Math.min(Math.max(time_s, 0), this.duration_s);

@@ -1,4 +1,4 @@
-// The samples of a line: read from WAV, and their extremes at several widths, so that any stretch is drawn at once.
+// The samples of a recording: read from WAV, and their extremes at several widths, so that any stretch is drawn at once.
 
 const STEP = 64;
 

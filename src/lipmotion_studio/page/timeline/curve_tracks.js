@@ -1,6 +1,6 @@
 // Curves of the motion with their deviations, pins, and the pen that draws over them.
 
-import { made } from "../dom.js";
+import { make } from "../dom.js";
 import { placed, say } from "../sentences.js";
 import { cleared, colour } from "./canvas.js";
 
@@ -13,11 +13,11 @@ export class CurveTracks {
     this.selectable = true;
     this.rows = new Map();
     this.stroke = null; // what is being drawn: channel and points by time
-    this.element = made("div", { className: "track curves" });
+    this.element = make("div", { className: "track curves" });
   }
 
   draw() {
-    const { channels, line } = this.store;
+    const { channels, recording } = this.store;
     for (const [name, row] of this.rows) {
       if (channels.includes(name)) continue;
       row.element.remove();
@@ -25,14 +25,14 @@ export class CurveTracks {
     }
     this.element.classList.toggle("drawing", this.store.tool === "draw");
     if (channels.some((name) => !this.row(name).height)) this.read();
-    const { pins, locks } = placed(line?.steps ?? []);
+    const { pins, locks } = placed(recording?.steps ?? []);
     for (const name of channels) this.drawRow(name, this.row(name), pins.filter(({ channel }) => channel === name), locks);
   }
 
   row(name) {
     if (!this.rows.has(name)) {
-      const canvas = made("canvas"), label = made("button", { type: "button", className: "label", textContent: name, tabIndex: -1 });
-      const element = made("div", { className: "curve" }, canvas, label);
+      const canvas = make("canvas"), label = make("button", { type: "button", className: "label", textContent: name, tabIndex: -1 });
+      const element = make("div", { className: "curve" }, canvas, label);
       element.dataset.channel = name;
       label.addEventListener("click", () => this.timeline.studio.chooseCurve(name));
       this.rows.set(name, { element, canvas, label, range: [0, 1], height: 0 });
@@ -59,7 +59,7 @@ export class CurveTracks {
   }
 
   drawRow(name, row, pins, locks) {
-    const { timeline, store, store: { deviation, selected, other, blind } } = this, hidden = blind && !blind.told, comparing = store.comparing && !hidden, motion = store.curvesOf(name), its = other && !hidden && store.curvesOf(name, other), { height } = row;
+    const { timeline, store, store: { deviation, selected, other, blind } } = this, hidden = blind && !blind.result, comparing = store.comparing && !hidden, motion = store.curvesOf(name), its = other && !hidden && store.curvesOf(name, other), { height } = row;
     const pen = cleared(row.canvas, timeline.width, height), isSelected = selected?.kind === "curve" && selected.channel === name;
     row.element.classList.toggle("selected", isSelected);
     row.label.setAttribute("aria-pressed", isSelected);
@@ -168,7 +168,7 @@ export class CurveTracks {
   }
 
   point(time_s, value) {
-    const rate = this.store.line.rate_hz;
+    const rate = this.store.recording.rate_hz;
     this.stroke.points.set(Math.round(time_s * rate) / rate, value);
   }
 

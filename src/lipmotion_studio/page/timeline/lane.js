@@ -1,7 +1,7 @@
 // The lane of edits that have a place in time: moods, gains, drawn curves, held poses, locks.
 
-import { made } from "../dom.js";
-import { TEXT, filled } from "../strings.js";
+import { make } from "../dom.js";
+import { TEXT, fill } from "../strings.js";
 import { placed } from "../sentences.js";
 
 const ROW_PX = 18, LEAST_PX = 14;
@@ -10,12 +10,12 @@ export class Lane {
   constructor(timeline) {
     this.timeline = timeline;
     this.selectable = true;
-    this.element = made("div", { className: "track lane" });
+    this.element = make("div", { className: "track lane" });
   }
 
   draw() {
-    const { line } = this.timeline.store;
-    if (this.of !== line) this.items = packed(itemsOf((this.of = line)?.steps ?? [], this.timeline.duration_s));
+    const { recording } = this.timeline.store;
+    if (this.of !== recording) this.items = packed(itemsOf((this.of = recording)?.steps ?? [], this.timeline.duration_s));
     const { start_s, end_s } = this.timeline, rows = 1 + Math.max(-1, ...this.items.map(({ row }) => row));
     this.element.replaceChildren(...this.items.filter((item) => item.end_s >= start_s && item.start_s <= end_s).map((item) => this.button(item)));
     this.element.hidden = !rows;
@@ -24,7 +24,7 @@ export class Lane {
 
   button({ kind, text, start_s, end_s, row }) {
     const { timeline, timeline: { store, studio } } = this;
-    const button = made("button", { type: "button", className: kind, textContent: text, title: text, tabIndex: -1, onclick: () => {
+    const button = make("button", { type: "button", className: kind, textContent: text, title: text, tabIndex: -1, onclick: () => {
       store.set({ span: { start_s, end_s }, tab: "edit" });
       studio.player.seek(start_s);
     } });
@@ -41,7 +41,7 @@ function itemsOf(steps, duration_s) {
   return [
     ...moods.map(({ mood, time_s }, n) => ({ kind: "mood", text: mood, start_s: time_s, end_s: moods[n + 1]?.time_s ?? duration_s })),
     ...gains.map((gain) => ({ ...gain, kind: "gain", text: `${gain.channel} ×${gain.factor}` })),
-    ...drawn.map((stroke) => ({ ...stroke, kind: "gain", text: filled(TEXT.drawn, stroke) })),
+    ...drawn.map((stroke) => ({ ...stroke, kind: "gain", text: fill(TEXT.drawn, stroke) })),
     ...holds.map((hold) => ({ ...hold, kind: "gain", text: TEXT.held })),
     ...locks.map((lock) => ({ ...lock, kind: "lock", text: TEXT.locked })),
   ];

@@ -1,6 +1,6 @@
 // Tracks that follow from the sound, and the ruler above them.
 
-import { made, onDrag } from "../dom.js";
+import { make, onDrag } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { ROWS, Spectra } from "../sound/spectrum.js";
 import { cleared, colour } from "./canvas.js";
@@ -11,8 +11,8 @@ const LABEL_PX = 64, STRIP_PX = 2, STRIP_HEIGHT_PX = 15, SHADES = 8, TILE_PX = 2
 export class Ruler {
   constructor(timeline) {
     this.timeline = timeline;
-    this.canvas = made("canvas");
-    this.element = made("div", { className: "track ruler" }, this.canvas);
+    this.canvas = make("canvas");
+    this.element = make("div", { className: "track ruler" }, this.canvas);
     const seek = (event) => timeline.studio.player.seek(timeline.timeOf(event));
     onDrag(this.element, { start: seek, move: seek, end: seek });
   }
@@ -43,8 +43,8 @@ export class WaveTrack {
   constructor(timeline) {
     this.timeline = timeline;
     this.selectable = true;
-    this.canvas = made("canvas", { role: "img", "aria-label": TEXT.sound });
-    this.element = made("div", { className: "track wave" }, this.canvas);
+    this.canvas = make("canvas", { role: "img", "aria-label": TEXT.sound });
+    this.element = make("div", { className: "track wave" }, this.canvas);
   }
 
   read() { this.height = this.element.clientHeight; }
@@ -72,8 +72,8 @@ export class SpectrumTrack {
     this.timeline = timeline;
     this.selectable = true;
     this.tiles = new Map();
-    this.canvas = made("canvas", { role: "img", "aria-label": TEXT.spectrum });
-    this.element = made("div", { className: "track spectrum" }, this.canvas);
+    this.canvas = make("canvas", { role: "img", "aria-label": TEXT.spectrum });
+    this.element = make("div", { className: "track spectrum" }, this.canvas);
   }
 
   read() { this.height = this.element.clientHeight; }
@@ -119,7 +119,7 @@ export class SpectrumTrack {
   }
 }
 
-/** Return the confidence that is least, and that of which half of the line has less; a line that is sure has no doubt. */
+/** Return the confidence that is least, and that of which half of the recording has less; a recording that is sure has no doubt. */
 function quantiles(curves) {
   const values = Float32Array.from(curves.values).sort(), at = (share) => values[Math.floor(share * (values.length - 1))];
   return [at(0.03), Math.min(at(0.5), 0.95)];
@@ -130,10 +130,10 @@ export class ConfidenceStrip {
   constructor(timeline) {
     this.timeline = timeline;
     this.selectable = true;
-    this.canvas = made("canvas", { role: "img", "aria-label": TEXT.confidence });
+    this.canvas = make("canvas", { role: "img", "aria-label": TEXT.confidence });
     const explain = () => timeline.studio.say(TEXT.confidenceOf);
-    this.element = made("div", { className: "track confidence" }, this.canvas,
-      made("button", { type: "button", className: "label", textContent: TEXT.confidenceLegend, title: TEXT.confidenceOf, onclick: explain, onfocus: explain }));
+    this.element = make("div", { className: "track confidence" }, this.canvas,
+      make("button", { type: "button", className: "label", textContent: TEXT.confidenceLegend, title: TEXT.confidenceOf, onclick: explain, onfocus: explain }));
   }
 
   draw() {

@@ -1,8 +1,8 @@
 // A tier of spans with labels: words, or phones, whose borders can be dragged.
 
-import { made, onDrag } from "../dom.js";
+import { make, onDrag } from "../dom.js";
 import { say } from "../sentences.js";
-import { TEXT, filled } from "../strings.js";
+import { TEXT, fill } from "../strings.js";
 
 const LEAST_PX = 3, LABEL_PX = 6, NARROW_PX = 13, LEAST_BORDER_PX = 3, LEAST_PHONE_S = 0.01, SURE = 0.5;
 
@@ -20,13 +20,13 @@ export class Tier {
     this.borders = new Map();
     this.settled = Promise.resolve(); // when what was dragged before is on the server
     this.dragged = null; // a border on its way: the phone before it, its time, and the time that the server has
-    this.whole = made("div", { className: "whole" }); // from the beginning of the line: scrolling moves this alone
-    this.element = made("div", { className: `track tier ${name}`, role: "group", "aria-label": TEXT[name] }, this.whole);
+    this.whole = make("div", { className: "whole" }); // from the beginning of the recording: scrolling moves this alone
+    this.element = make("div", { className: `track tier ${name}`, role: "group", "aria-label": TEXT[name] }, this.whole);
   }
 
   /** Spans as they are shown: with the border that is dragged. */
   spans() {
-    const spans = this.store.line?.[this.name] ?? [];
+    const spans = this.store.recording?.[this.name] ?? [];
     if (this.dragged === null || this.name !== "phones") return spans;
     const { before, time_s } = this.dragged;
     return spans.map((span, n) => (n === before ? { ...span, end_s: time_s } : n === before + 1 ? { ...span, start_s: time_s } : span));
@@ -74,8 +74,8 @@ export class Tier {
     button.classList.toggle("edited", Boolean(span.edited));
     button.setAttribute("aria-pressed", isSelected);
     const values = { number: n + 1, label: span.label, start: span.start_s.toFixed(3), end: span.end_s.toFixed(3) };
-    const sure = span.confidence === null || span.confidence === undefined ? "" : `, ${filled(TEXT.sure, { share: Math.round(100 * span.confidence) })}`;
-    const name = filled(TEXT[`${this.kind}Label`], values) + sure + (span.edited ? `, ${TEXT.edited}` : "");
+    const sure = span.confidence === null || span.confidence === undefined ? "" : `, ${fill(TEXT.sure, { share: Math.round(100 * span.confidence) })}`;
+    const name = fill(TEXT[`${this.kind}Label`], values) + sure + (span.edited ? `, ${TEXT.edited}` : "");
     if (button.title !== name) {
       button.title = name;
       button.setAttribute("aria-label", name);
@@ -84,7 +84,7 @@ export class Tier {
 
   button(n) {
     if (!this.shown.has(n)) {
-      const button = made("button", { type: "button", className: this.kind, tabIndex: -1 });
+      const button = make("button", { type: "button", className: this.kind, tabIndex: -1 });
       button.dataset.index = n;
       button.addEventListener("click", (event) => {
         if (event.shiftKey && this.store.span) return this.timeline.studio.extendTo(this.kind, n);
@@ -99,16 +99,16 @@ export class Tier {
 
   border(n) {
     if (!this.borders.has(n)) {
-      const border = made("div", { className: "border" });
+      const border = make("div", { className: "border" });
       border.dataset.before = n;
       this.borders.set(n, border);
       this.whole.append(border);
       onDrag(border, {
-        start: (event) => { this.offset = event.clientX - this.timeline.x(this.store.line.phones[n].end_s); },
+        start: (event) => { this.offset = event.clientX - this.timeline.x(this.store.recording.phones[n].end_s); },
         move: (event) => this.drag(n, (event.clientX - this.offset + this.timeline.left_px) / this.timeline.px_s),
         end: (event) => {
           if (this.dragged && !this.dragged.dropped) return this.drop();
-          return this.timeline.studio.choose("phone", this.timeline.timeOf(event) < this.store.line.phones[n].end_s ? n : n + 1);
+          return this.timeline.studio.choose("phone", this.timeline.timeOf(event) < this.store.recording.phones[n].end_s ? n : n + 1);
         },
         cancel: () => this.cancel(),
       });
@@ -118,7 +118,7 @@ export class Tier {
 
   /** Show a border elsewhere, between the phones beside it, and let the face follow. */
   drag(before, time_s) {
-    const { phones } = this.store.line, least = phones[before].start_s + LEAST_PHONE_S, most = phones[before + 1].end_s - LEAST_PHONE_S;
+    const { phones } = this.store.recording, least = phones[before].start_s + LEAST_PHONE_S, most = phones[before + 1].end_s - LEAST_PHONE_S;
     if (this.dragged?.before !== before || this.dragged.dropped) {
       this.drop();
       this.dragged = { before, time_s: null, sent_s: null, loop: null, earlier: Promise.all([this.settled, this.timeline.studio.edits]), dropped: false };
@@ -136,7 +136,7 @@ export class Tier {
       await dragged.earlier;
       while (dragged.time_s !== dragged.sent_s) {
         const { before, time_s } = dragged;
-        if (!await this.timeline.studio.dragged([say.ends(before + 1, time_s)], dragged.sent_s === null ? 0 : 1)) break;
+        if (!await this.timeline.studio.dragBorder([say.ends(before + 1, time_s)], dragged.sent_s === null ? 0 : 1)) break;
         dragged.sent_s = time_s;
       }
     };
@@ -159,7 +159,7 @@ export class Tier {
     dragged.dropped = true;
     dragged.time_s = dragged.sent_s; // no more is sent
     this.leave(dragged);
-    this.settled = this.sent(dragged).then(() => dragged.sent_s !== null && this.timeline.studio.dragged([], 1));
+    this.settled = this.sent(dragged).then(() => dragged.sent_s !== null && this.timeline.studio.dragBorder([], 1));
   }
 
   leave(dragged) {
@@ -170,9 +170,9 @@ export class Tier {
 
   /** Type over a label: Enter makes the edit, Escape leaves. */
   type(n) {
-    const span = this.store.line?.[this.name][n], button = this.shown.get(n);
+    const span = this.store.recording?.[this.name][n], button = this.shown.get(n);
     if (!span || !button) return;
-    const field = made("input", {
+    const field = make("input", {
       className: "over", value: span.label, "aria-label": button.title, autocapitalize: "none", spellcheck: false,
       ...(this.kind === "phone" ? { list: "phones-known" } : {}),
     });

@@ -1,6 +1,6 @@
 // The timeline: what is heard, said and shown, over the same time.
 
-import { inNextFrame, made, onDrag } from "../dom.js";
+import { inNextFrame, make, onDrag } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { CurveTracks } from "./curve_tracks.js";
 import { Lane } from "./lane.js";
@@ -20,12 +20,12 @@ export class Timeline {
     this.px_s = 100;
     this.width = 0; // until it is laid out
     this.left_px = 0;
-    this.window = made("div", { className: "window" });
-    this.extent = made("div", { className: "extent" }, this.window);
-    this.scroller = made("div", { className: "scroller", tabIndex: 0, role: "group", "aria-label": TEXT.timeline }, this.extent);
+    this.window = make("div", { className: "window" });
+    this.extent = make("div", { className: "extent" }, this.window);
+    this.scroller = make("div", { className: "scroller", tabIndex: 0, role: "group", "aria-label": TEXT.timeline }, this.extent);
     place.append(this.scroller);
-    this.spanShade = made("div", { className: "span", hidden: true });
-    this.playhead = made("div", { className: "playhead" });
+    this.spanShade = make("div", { className: "span", hidden: true });
+    this.playhead = make("div", { className: "playhead" });
     this.words = new Tier(this, "words");
     this.phones = new Tier(this, "phones");
     /** @type {any[]} */ this.tracks = [
@@ -46,13 +46,13 @@ export class Timeline {
       for (const track of this.tracks) track.recolour?.();
       this.draw();
     });
-    this.store.on(["lineId"], () => { this.fitted = false; });
-    this.store.on(["sound", "line"], () => {
+    this.store.on(["recordingId"], () => { this.fitted = false; });
+    this.store.on(["sound", "recording"], () => {
       this.fitFirst();
       this.sized();
     });
     const { store } = this;
-    store.on(["line", "sound", "motion", "deviation", "confidence", "weights", "channels", "selected", "tool", "other", "comparing", "blind"], this.draw);
+    store.on(["recording", "sound", "motion", "deviation", "confidence", "weights", "channels", "selected", "tool", "other", "comparing", "blind"], this.draw);
     store.on(["span"], () => this.place());
     store.on(["time_s"], () => this.followPlayhead());
   }
@@ -95,7 +95,7 @@ export class Timeline {
     this.scrollTo(held * this.px_s - x);
   }
 
-  /** Show a line that has just been opened: all of it, or as much as can be read. */
+  /** Show a recording that has just been opened: all of it, or as much as can be read. */
   fitFirst() {
     if (this.fitted || !this.duration_s || !this.width) return;
     this.fitted = true;
