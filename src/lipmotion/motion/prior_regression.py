@@ -19,19 +19,22 @@ from lipmotion.types import SPECTRUM_BANDS, Speech
 Array = NDArray[np.float64]
 WINDOW = 4
 """Time steps of 40 ms before and after a frame whose spectrum is used: 160 ms."""
+ENCODING_REACH, ENCODING_COMPONENTS = 3, 32
+"""Time steps before and after a frame whose encoding is used, and its principal components: a minute of speech says no
+more of other ones (docs/results/voices.md)."""
 RIDGES = tuple(10.0**power for power in range(0, 6))
 """Ridge parameters that cross-validation chooses from, one for each kind of regressors."""
 INITIAL_RIDGE = 1000.0
 """Ridge parameter of all kinds before the choice."""
 ROUNDS = 2
 MIN_DEVIATION = 1e-3
-KINDS = ("prior", "hidden", "articulation", "spectrum")
+KINDS = ("prior", "hidden", "articulation", "spectrum", "encoding")
 """Kinds of regressors: the articulators of the other model's motion, the last hidden layers of its networks, the table
-of articulation for the phones in time, the spectrum around the frame."""
+of articulation for the phones in time, the spectrum and the encoding of the sound around the frame."""
 
 
 PRIOR_ARRAYS = {
-    "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
+    "prior_sizes": ArraySpec(np.int32, "K", 0, 1e5),
     "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
     "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
     "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
@@ -42,7 +45,7 @@ PRIOR_ARRAYS = {
 @final
 @dataclass(frozen=True, eq=False)
 class PriorRegression(Predictor):
-    """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the spectrum.
+    """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the sound.
 
     sizes        : number of regressors of each of ``KINDS``
     mean, scale  : of the regressors [each shape=(R,)]
@@ -77,6 +80,8 @@ class PriorRegression(Predictor):
         known = [example.valid[::STEP] for example in examples]
         rows = np.concatenate([x[mask] for x, mask in zip(everything, known, strict=True)])
         mean, scale = rows.mean(axis=0), rows.std(axis=0) + MIN_DEVIATION
+        if sizes[-1]:  # principal components keep their proportions
+            scale[-sizes[-1] :] = scale[-sizes[-1] :].max()
         data = [
             _Fold((x[mask] - mean) / scale, motion[::STEP][mask])
             for x, motion, mask in zip(everything, values, known, strict=True)
@@ -140,7 +145,10 @@ class PriorRegression(Predictor):
         """Deserialise a regression; as ``Predictor.from_arrays``."""
         stored = check_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
         sizes = tuple(stored["prior_sizes"].tolist())
-        if sum(sizes) != stored.sizes["R"] or sizes[2:] != (len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS):
+        sizes += (0,) * (len(KINDS) - len(sizes))  # models of earlier versions have no encoding
+        around = (2 * ENCODING_REACH + 1) * ENCODING_COMPONENTS
+        known = {(len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS, size) for size in (0, around)}
+        if sum(sizes) != stored.sizes["R"] or sizes[2:] not in known:
             raise ValueError(f"prior_sizes {sizes}, whose sum is not {stored.sizes['R']}, or of another version")
         mean, scale = stored["prior_inputs"]
         scale = check_scale(scale, "prior_inputs")
@@ -165,7 +173,17 @@ def _regressors(speech: Speech) -> list[Array]:
     table = trace_articulators(speech.units, frames)[::STEP]
     prior = speech.prior
     motion, hidden = (prior.articulators, prior.hidden) if prior is not None else (np.zeros((count, 0)),) * 2
-    return [np.asarray(x, float) for x in (motion, hidden, table, bands[around].reshape(count, -1))]
+    kinds = motion, hidden, table, bands[around].reshape(count, -1), _encoding_around(speech, count)
+    return [np.asarray(x, float) for x in kinds]
+
+
+def _encoding_around(speech: Speech, count: int) -> NDArray[np.floating]:
+    """Return the encoding around every time step [shape=(count, R)]; R is 0 without one."""
+    if speech.encoding is None:
+        return np.zeros((count, 0))
+    around = np.clip(np.arange(count)[:, None] + np.arange(-ENCODING_REACH, ENCODING_REACH + 1), 0, count - 1)
+    rows = np.asarray(speech.encoding)[::STEP, :ENCODING_COMPONENTS]
+    return rows[around].reshape(count, -1)
 
 
 def _solve(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
