@@ -17,10 +17,11 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import resample_track
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.motion.transfer_map import count_speech_s, fit_transfer_map, select_channels
+from lipmotion.pipeline.analysis.read_request import read_recording
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.generation import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request
-from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source
@@ -31,7 +32,7 @@ from lipmotion_faces.tracking.track import track
 
 MOST_FOOTAGE_S = 60.0
 """Seconds of footage that are used: the first of a video, utterances spread evenly over a corpus."""
-LEAST_SPEECH_S = 0.5
+MIN_SPEECH_S = 0.5
 """Fewest seconds of speech, with the face measured, of which a map is made."""
 
 
@@ -74,9 +75,9 @@ def map_onto(
         source.append(pair[0])
         target.append(pair[1])
     spoken_s = count_speech_s(target)
-    if spoken_s < LEAST_SPEECH_S:
+    if spoken_s < MIN_SPEECH_S:
         raise InputError(
-            f"{where}: {spoken_s:.2f} s of speech with a measured face, required {LEAST_SPEECH_S} s or more; give a "
+            f"{where}: {spoken_s:.2f} s of speech with a measured face, required {MIN_SPEECH_S} s or more; give a "
             "recording in which the person speaks, with sound"
         )
     return fit_transfer_map(source, target)
@@ -176,9 +177,9 @@ def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
 def _understood(model: Model, request: Request) -> Speech:
     """Return the speech of a recording; without its transcript where that cannot be aligned."""
     try:
-        return understand(model, request)
+        return analyse(model, request)
     except AlignmentError:
-        return understand(model, replace(request, transcript=None))
+        return analyse(model, replace(request, transcript=None))
 
 
 def _measured(
@@ -187,8 +188,8 @@ def _measured(
     """Return the motion of a person in speech at 100 Hz, and the frames in which it is valid [shape=(T,)]."""
     if isinstance(measured, Track):
         return resample_track(measured, len(speech.features.values))
-    same = Request(audio_of(request), units=speech.units)
+    same = Request(read_recording(request), units=speech.units)
     other = generate_for(
-        speaker_map(measured.speakers, speaker), measured.engine, measured.learned, understand(measured, same)
+        speaker_map(measured.speakers, speaker), measured.engine, measured.learned, analyse(measured, same)
     )
     return other.motion, np.ones(len(other.motion.values), bool)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import find_phrases
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import parse_clock, parse_number
@@ -342,7 +342,7 @@ def parse_shape(name: str, names: dict[str, str], place: str) -> str:
     shape = names.get(name.strip().lower().removeprefix(PREFIX))
     if shape is None:
         known = " ".join(dict.fromkeys(names))
-        raise InputError(f"{place}: no mouth shape is {shortened(name)!r}; the shapes are: {known}")
+        raise InputError(f"{place}: no mouth shape is {shorten(name)!r}; the shapes are: {known}")
     return shape
 
 

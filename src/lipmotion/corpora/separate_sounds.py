@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, RecordingFolder
-from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.text_table import read_table
 
@@ -61,7 +61,7 @@ def read_offsets(path: Path) -> dict[str, float]:
     try:
         table = read_table(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES), newline=""))
         if table.plain_names != COLUMNS:
-            raise InputError(f"{path}: the columns are {shortened(','.join(table.names))!r}, required name,offset_ms")
+            raise InputError(f"{path}: the columns are {shorten(','.join(table.names))!r}, required name,offset_ms")
         offsets: dict[str, float] = {}
         for number, row in table.rows:
             name = row[0].strip().replace("/", "-")
@@ -70,11 +70,11 @@ def read_offsets(path: Path) -> dict[str, float]:
                     raise ValueError(f"{len(row)} fields")
                 offset_s = float(row[1].replace(",", ".")) / 1000
             except ValueError as error:
-                what = f"{path}: line {number}: {shortened(str(error))}"
+                what = f"{path}: line {number}: {shorten(str(error))}"
                 raise InputError(f"{what}, required a name and milliseconds") from error
             _check(offset_s)
             if offsets.setdefault(name, offset_s) != offset_s:
-                raise InputError(f"{path}: line {number}: {shortened(name)!r} has another offset above; keep one")
+                raise InputError(f"{path}: line {number}: {shorten(name)!r} has another offset above; keep one")
     except ValueError as error:
         raise CorpusError(str(error)) from error
     return offsets

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, mouth_template
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.markers import MARKER, MILLIMETRES, measure_markers, to_head_frame
 from lipmotion.meshes.files.steady_rate import exact_rate
@@ -188,7 +188,7 @@ def _read_parameters(content: bytes, at: int, processor: int) -> dict[str, Value
         if step == 0:
             break
         if step < 0:
-            raise InputError(f"the parameter {shortened(name)!r} is before its own place; export the capture again")
+            raise InputError(f"the parameter {shorten(name)!r} is before its own place; export the capture again")
         at = body + step
     return {f"{groups.get(group, '')}.{name}": values for group, name, values in stored}
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.meshes.files.steady_rate import exact_rate
 from lipmotion.meshes.fitting.point_motion import move_points
@@ -70,7 +70,7 @@ def check(motion: Motion) -> None:
     """Raise ExportError if motion holds anything but these parameters."""
     others = [name for name in motion.names if _number(name) is None]
     if others or not motion.names:
-        raise ExportError(f"no parameters of MPEG-4 but {shortened(', '.join(others[:4])) or 'nothing'}; write .json")
+        raise ExportError(f"no parameters of MPEG-4 but {shorten(', '.join(others[:4])) or 'nothing'}; write .json")
     if len({_number(name) for name in motion.names}) < len(motion.names):
         raise ExportError("two channels are the same parameter of MPEG-4, required each once; write .json")
 
@@ -98,7 +98,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
             head = next(lines, "").split()
             if len(head) < 4 or not head[0].startswith("2."):
-                raise ValueError(f"it begins with {shortened(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
+                raise ValueError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
             rate, frames = head[-2:]
             held, used = _read_frames(lines, int(frames))
     except ValueError as error:

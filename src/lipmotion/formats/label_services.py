@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import next_at
 from lipmotion.formats.label_tiers import (
     EARLIEST_S,
@@ -205,7 +205,7 @@ def describe_json(text: str, where: str) -> str:
     for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
         if name in names:
             return f"holds {what}, which is motion and no labels; render it"
-    named = ", ".join(map(shortened, names[:8])) or "no names"
+    named = ", ".join(map(shorten, names[:8])) or "no names"
     return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
 
 
@@ -272,21 +272,21 @@ def _read_row(item: dict[str, Any], place: str, where: str, name: str) -> Row | 
     text = next((text for name in TEXTS if name in item and (text := _find_text(item[name])) is not None), None)
     role = WORDS if "word" in item or name in WORD_LISTS else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
-        stored = shortened(repr(item.get("text") or item.get("word"))[:200])
+        stored = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {stored}, required a text")
     if "visemeid" in item or item.get("type") == "viseme":  # a number of Azure's, or a name of Polly's
         viseme, role = item.get("visemeid", item.get("value")), PHONE_LABELS
         if isinstance(viseme, str):
             if viseme not in POLLY_VISEMES:
                 known = " ".join(POLLY_VISEMES)
-                raise InputError(f"{where}: {place}: no viseme of Polly is {shortened(viseme)!r}; known are: {known}")
+                raise InputError(f"{where}: {place}: no viseme of Polly is {shorten(viseme)!r}; known are: {known}")
             text = POLLY_VISEMES[viseme]
         else:
             last = len(AZURE_VISEMES) - 1
             text = AZURE_VISEMES[require(values.whole(0, last), viseme, f"{where}: {place}: the viseme")]
     if text is not None and "markname" in item and not MARK.fullmatch(text):
         raise InputError(
-            f"{where}: {place} is the mark {shortened(text)!r}, which is no word; name every mark as the word that "
+            f"{where}: {place} is the mark {shorten(text)!r}, which is no word; name every mark as the word that "
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
         )
     start, end, times = _find_times(item, f"{where}: {place}")

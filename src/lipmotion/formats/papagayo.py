@@ -19,7 +19,7 @@ from lipmotion.articulation.cue_sheets import (
     parse_cue_time,
     parse_shape,
 )
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
 from lipmotion.units.mouth_chart import REST, SHAPES
@@ -133,7 +133,7 @@ def parse_project(text: str) -> CueSheet:
             fields = line.rsplit(maxsplit=3)
             if len(fields) != 4:
                 wanted = "a word, its frames and the number of its shapes"
-                raise InputError(f"{lines.place} is {shortened(line)!r}, required {wanted}")
+                raise InputError(f"{lines.place} is {shorten(line)!r}, required {wanted}")
             first, last, count = (int(parse_cue_time(field, lines.place)) for field in fields[1:])
             words.append(Span(first / fps, (last + 1) / fps, fields[0]))
             for _ in range(count):

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import MotionFormat, read_members, write_json
 from lipmotion.meshes.files.steady_rate import TIME_COLUMN, column_key, resample_rows, tabulate_frames, times_to_seconds
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
@@ -192,6 +192,6 @@ def _name_weights(value: Any) -> dict[str, float] | None:
         name = next((str(keyed[key]) for key in NAMED if keyed.get(key)), None)
         score = next((keyed[key] for key in SCORED if key in keyed), None)
         if name is None or score is None:
-            raise InputError(f"{shortened(repr(each)[:200])} is no blendshape, required a name and a score")
+            raise InputError(f"{shorten(repr(each)[:200])} is no blendshape, required a name and a score")
         weights[name] = float(score)
     return weights if isinstance(value, list) else None

@@ -28,7 +28,7 @@ from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraini
 from lipmotion.motion.reliability import rate_clearness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Speech, sub_monitor
 
 Array = NDArray[np.float64]
@@ -45,8 +45,8 @@ trained on clean speech, the other one in noise and rooms."""
 SURE_POSTERIORS = (0.75, 0.9)
 """For an unknown voice it has no share at the first mean posterior, all of its share at the second one. A known voice
 has all of it in a clear recording, too."""
-ENCODING_SHARE = 0.4
-"""Share of the regression on the encoding for a voice that training does not know; one that it knows has none of it."""
+ENCODING_SHARE = 0.5
+"""Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none."""
 
 TARGETS = {
     "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
@@ -125,9 +125,16 @@ class AcousticNetwork(Predictor):
             fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
             share = (fitting * (known + strange * (unknown - known)))[:, None]
             motion = motion + share * (network.predict(speech)[0] - motion)
-        if self.encoding is not None and strange > 0 and self.encoding.can_predict(speech):
-            motion = motion + ENCODING_SHARE * strange * (self.encoding.predict(speech)[0] - motion)
+        encoded = self.predict_encoded(speech)
+        if encoded is not None:
+            motion = motion + ENCODING_SHARE * min(2 * strange, 1.0) * (encoded - motion)
         return motion, distortion
+
+    def predict_encoded(self, speech: Speech) -> Array | None:
+        """Return motion from the encoding of the sound alone, for voices that training does not know."""
+        if self.encoding is None or speech.encoding is None or speech.voice >= 1:
+            return None
+        return self.encoding.predict(speech)[0]
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""
@@ -163,7 +170,7 @@ class AcousticNetwork(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> AcousticNetwork:
         """Deserialise a network; as ``Predictor.from_arrays``."""
-        stored = checked_arrays(arrays, TARGETS, Q=dimensions)
+        stored = check_arrays(arrays, TARGETS, Q=dimensions)
         mean, scale = stored["network_targets"]
         network = SHAPE.from_arrays(arrays, dimensions + 1)
         found = not arrays.keys().isdisjoint(PosteriorNetwork.ARRAYS)

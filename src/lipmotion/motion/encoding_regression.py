@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.network_steps import STEP, interpolate_steps, measure_error_variances
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ class EncodingRegression(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> EncodingRegression:
         """Deserialise a regression; as ``Predictor.from_arrays``."""
-        stored = checked_arrays(arrays, cls.ARRAYS, Q=dimensions)
+        stored = check_arrays(arrays, cls.ARRAYS, Q=dimensions)
         return cls(*(stored[name] for name in cls.ARRAYS))
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.types.audio import Audio
 from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
@@ -181,7 +181,7 @@ class Pin:
     def __post_init__(self) -> None:
         for name, number in (("time", self.time_s), ("value", self.value)):
             if not _is_number(number):
-                raise InputError(f"the {name} of a pin is {shortened(repr(number))}, required a number")
+                raise InputError(f"the {name} of a pin is {shorten(repr(number))}, required a number")
 
 
 @dataclass(frozen=True)
@@ -284,7 +284,7 @@ class Constraints:
 
     def __post_init__(self) -> None:
         if not isinstance(self.pins, Collection) or not all(isinstance(pin, Pin) for pin in self.pins):
-            found = shortened(repr(self.pins))
+            found = shorten(repr(self.pins))
             raise InputError(f"constraints of {found}, required pins: Constraints((Pin(0.5, 'opening', 0.02),))")
 
 

@@ -15,7 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging, stage_liveliness
 from lipmotion_faces.mesh.stage import MeshStage
@@ -100,5 +100,5 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
     from PIL import Image
 
     picture = MeshStage(character, WIDTH, HEIGHT).picture(character.mesh.vertices)
-    with whole_file(path) as unfinished:
+    with atomic_file(path) as unfinished:
         Image.fromarray(picture).save(unfinished, format="PNG")

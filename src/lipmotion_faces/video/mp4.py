@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.files import as_text, atomic_file
 from lipmotion.storage.media import x264_instructions
 from lipmotion.types import Audio
 
@@ -101,7 +101,7 @@ def write_mp4(
     if unknown := set(tags or ()) - TAGS:
         raise ExportError(f"{path}: unknown tags {', '.join(sorted(unknown))}; known: {', '.join(sorted(TAGS))}")
     texts = {name: as_text(text) for name, text in (tags or {}).items()}
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         _encode(temporary, path, _checked(frames, path), frame_rate(fps), audio, texts)
         if xmp is not None:
             append_xmp(temporary, xmp)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import frame_rate
 
@@ -59,7 +59,7 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
         raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
     if not len(audio.samples):
         raise ExportError(f"{path}: the sound has no samples")
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         _encode(temporary, path, _checked(frames, path), frame_rate(fps), audio)
 
 
@@ -72,7 +72,7 @@ def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
     from PIL import Image
 
     for number, frame in enumerate(_checked(frames, path)):
-        with whole_file(path.with_name(path.name % number)) as temporary:
+        with atomic_file(path.with_name(path.name % number)) as temporary:
             Image.fromarray(frame).save(temporary, compress_level=4)
 
 
