@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.measures.closures import clip_closure_counts
 from lipmotion.measures.curves import Clips, bootstrap_interval
-from lipmotion.stats.rounding import varies
+from lipmotion.stats.curves import varies
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings
 
 Array = NDArray[np.float64]

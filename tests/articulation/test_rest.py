@@ -24,7 +24,7 @@ from lipmotion.articulation.rest import (
 )
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit, VoiceEvent
-from lipmotion.types.voice_event import BREATH, LAUGHTER
+from lipmotion.types.audio import BREATH, LAUGHTER
 
 SILENCE = Timeline((Span(0.0, 0.2, Unit("sil")), Span(0.2, 1.0, Unit("aa"))))
 

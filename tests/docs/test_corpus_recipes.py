@@ -76,7 +76,7 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     monkeypatch.setattr(prepare_module, "track", track)
     versions: Callable[[], dict[str, str]] = lambda: {"mediapipe": "0"}  # noqa: E731
-    monkeypatch.setattr(prepare_module, "tracker_named", lambda _: SimpleNamespace(versions=versions))
+    monkeypatch.setattr(prepare_module, "make_tracker", lambda _: SimpleNamespace(versions=versions))
     monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.chdir(tmp_path)

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.formats.label_files import LARGEST_LABELS, find_labels, read_labels
 from lipmotion.formats.label_tiers import MAX_LABELS
 from lipmotion.units import PHONES, find_phone
-from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
+from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES
 
 SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 

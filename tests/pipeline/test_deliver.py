@@ -73,7 +73,7 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
             levels.append(prosody.level_db)
         return face
 
-    monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.staged_face", staged)
+    monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.stage_face", staged)
     monkeypatch.setattr("lipmotion_faces.video.transparent.write_pictures", lambda *_: None)
     for offset_ms in (0, 500):
         path = tmp_path / "a%d.png"

@@ -109,7 +109,7 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
     return replace(
         generation,
         motion=Motion(values, rate_hz, motion.channels),
-        spread=generation.changed_spread(lambda rows: rows[nearest]),
+        spread=generation.change_frames(lambda rows: rows[nearest]),
         units=shift_units(
             generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
         ),
@@ -166,7 +166,7 @@ def intensify(generation: Generation, intensity: float, opening: Curve | None = 
             larger[:, column] = values[:, column]
         if channel.name in GROWING:
             larger[:, column] = 1 - np.clip(1 - values[:, column], 0, 1) ** np.sqrt(intensity)
-    spread = generation.changed_spread(lambda rows: rows * factor[:, None] ** 2)
+    spread = generation.change_frames(lambda rows: rows * factor[:, None] ** 2)
     return replace(generation, motion=replace(motion, values=larger), spread=spread)
 
 
@@ -204,7 +204,7 @@ def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = 
     return replace(
         generation,
         motion=replace(motion, values=np.repeat(values, lengths, axis=0)),
-        spread=generation.changed_spread(lambda rows: rows[middle]),
+        spread=generation.change_frames(lambda rows: rows[middle]),
         trace=StateTrace(generation.trace.states, generation.trace.frames[middle]),
     )
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import CLOSED_OPENING, smooth_step
 from lipmotion.errors import InputError
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
-from lipmotion.types.voice_event import BREATH, LAUGHTER
+from lipmotion.types.audio import BREATH, LAUGHTER
 from lipmotion.units import SILENCE, is_silent, mark_closing_phones
 
 Curve = NDArray[np.float64]

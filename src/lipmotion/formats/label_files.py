@@ -40,9 +40,8 @@ from lipmotion.storage.files import read_text_file
 from lipmotion.storage.sources import check_kind
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
-from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 from lipmotion.units.mood_tags import parse_tagged_text, remove_known_tags
-from lipmotion.units.text_normalisation import require_tokens
+from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES, require_tokens
 from lipmotion.units.written_forms import list_readings
 
 LOG = logging.getLogger("lipmotion")

@@ -11,8 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
-from lipmotion.stats.rounding import varies
+from lipmotion.stats.curves import measure_modulation_spectrum, varies
 
 Array = NDArray[np.float64]
 Clips = Sequence[Array]

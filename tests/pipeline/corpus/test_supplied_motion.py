@@ -51,7 +51,7 @@ def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "tracker_named", lambda _: SimpleNamespace(versions=missing))
+    monkeypatch.setattr(module, "make_tracker", lambda _: SimpleNamespace(versions=missing))
     folder = tmp_path / "studio"
     (folder / "anna").mkdir(parents=True)
     for seed, (name, suffix) in enumerate((("a", ".npz"), ("b", ".json"), ("anna/c", ".csv"))):
@@ -175,7 +175,7 @@ def cut_array(content: bytes, rows: int) -> bytes:
 @pytest.mark.recordings
 def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
-    monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 100)
+    monkeypatch.setattr(acoustic_network, "MIN_STEPS", 100)
     monkeypatch.setattr(posterior_network, "STEPS", 6.0)
     from lipmotion import animate, evaluate, load_model, save_model, train
 
