@@ -43,7 +43,7 @@ from lipmotion.formats.sound import write_sound  # noqa: E402
 from lipmotion.kernels.compiler import numba_works  # noqa: E402
 from lipmotion.meshes.fitting.driven import load_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
-from lipmotion.pipeline.edits import step_of  # noqa: E402
+from lipmotion.pipeline.edits import parse_step  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
 from lipmotion.pipeline.request import Request  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
@@ -265,7 +265,7 @@ def edit_for_ever(line: OpenRecording, chance: Random, writing: int) -> NoReturn
                 line.undo(line.revision, len(steps))
             else:
                 step = random_edit(chance, line.state())
-                tell(tried=[*steps, str(step_of(step))])
+                tell(tried=[*steps, str(parse_step(step))])
                 line.edit(line.revision, (step,))
             tell(done=list(line.file.edits.sentences))
 

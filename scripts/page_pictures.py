@@ -13,7 +13,7 @@ from matplotlib import pyplot as plt
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion_faces import Staging, stage_face
 
 IMAGES = Path(__file__).parent.parent / "docs" / "images"
@@ -85,7 +85,7 @@ def strip(sheet: lipmotion.CueSheet, mouths: dict[str, Frame]) -> None:
 
 def curves(spoken: lipmotion.Generation, frames: list[Frame]) -> None:
     """Plot blendshape weights below the head that shows the same motion."""
-    weights = curves_of(spoken.motion, spoken.units, "arkit")
+    weights = make_curves(spoken.motion, spoken.units, "arkit")
     from_s, to_s, shown = 0.3, 2.7, 8
     figure, (above, below) = plt.subplots(2, 1, figsize=(12, 4), dpi=100, height_ratios=(1, 1.2))
     times = from_s + (np.arange(shown) + 0.5) * (to_s - from_s) / shown

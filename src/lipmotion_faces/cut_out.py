@@ -24,7 +24,7 @@ Picture = NDArray[np.uint8]
 SUFFIXES = (".png", ".webp", ".jpg", ".jpeg")
 BASE = "base"
 REQUIRED = "".join(name for name, shape in SHAPES.items() if not shape.fallback)
-LARGEST_PX, MOST_PIXELS = 4096, 1 << 26
+LARGEST_PX, MAX_PIXELS = 4096, 1 << 26
 """Largest side of a picture, and most pixels of all together."""
 LARGEST_BYTES = 1 << 26
 MOST_FILES = 1000
@@ -84,10 +84,8 @@ def read_cut_out(folder: Path) -> CutOut:
         if picture.shape != first.shape:
             sizes = " and ".join(f"{each.shape[1]} × {each.shape[0]}" for each in (first, picture)) + " pixels large"
             raise InputError(f"{chosen[name]}: the pictures are {sizes}, required one size; export them alike")
-        if (len(pictures) + 1) * picture.shape[0] * picture.shape[1] > MOST_PIXELS:
-            raise InputError(
-                f"{folder}: the pictures have more than {MOST_PIXELS} pixels together; export them smaller"
-            )
+        if (len(pictures) + 1) * picture.shape[0] * picture.shape[1] > MAX_PIXELS:
+            raise InputError(f"{folder}: the pictures have more than {MAX_PIXELS} pixels together; export them smaller")
         pictures[name] = picture if below is None else _over(picture, below)
     return CutOut(pictures)
 

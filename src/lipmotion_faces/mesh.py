@@ -18,7 +18,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.meshes.model.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import (
     SMALLEST_PX,
@@ -131,7 +131,7 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
     from PIL import Image
 
     picture = MeshStage(character, WIDTH, HEIGHT).picture(character.mesh.vertices)
-    with whole_file(path) as unfinished:
+    with atomic_file(path) as unfinished:
         Image.fromarray(picture).save(unfinished, format="PNG")
 
 

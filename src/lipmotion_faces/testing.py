@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import make_folder, whole_file
+from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.testing.contract import require, require_error
 from lipmotion.testing.examples import example
 from lipmotion.testing.toy import CAMERA_HZ, MOTION_HZ, toy_motion, toy_sentences
@@ -84,5 +84,5 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
 
 
 def _write_lines(path: Path, lines: list[str]) -> None:
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

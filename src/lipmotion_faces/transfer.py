@@ -16,10 +16,11 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import resample_track
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.motion.transfer_map import count_speech_s, fit_transfer_map, select_channels
+from lipmotion.pipeline.analysis.read_request import read_recording
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.generation import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request
-from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source
@@ -30,7 +31,7 @@ from lipmotion_faces.tracking.track import track
 
 MOST_FOOTAGE_S = 60.0
 """Seconds of footage that are used: the first of a video, utterances spread evenly over a corpus."""
-LEAST_SPEECH_S = 0.5
+MIN_SPEECH_S = 0.5
 """Fewest seconds of speech, with the face measured, of which a map is made."""
 
 
@@ -73,9 +74,9 @@ def map_onto(
         source.append(pair[0])
         target.append(pair[1])
     spoken_s = count_speech_s(target)
-    if spoken_s < LEAST_SPEECH_S:
+    if spoken_s < MIN_SPEECH_S:
         raise InputError(
-            f"{where}: {spoken_s:.2f} s of speech with a measured face, required {LEAST_SPEECH_S} s or more; give a "
+            f"{where}: {spoken_s:.2f} s of speech with a measured face, required {MIN_SPEECH_S} s or more; give a "
             "recording in which the person speaks, with sound"
         )
     return fit_transfer_map(source, target)
@@ -101,14 +102,14 @@ def measure_pair(
     Raises InputError: the person's motion has other channels.
     """
     try:
-        speech = understand(model, request)
+        speech = analyse(model, request)
     except AlignmentError:  # its transcript cannot be aligned
-        speech = understand(model, replace(request, transcript=None))
+        speech = analyse(model, replace(request, transcript=None))
     generated = generate_for(person, model.engine, model.learned, speech).motion
     if isinstance(measured, Track):
         motion, valid = resample_track(measured, len(speech.features.values))
     else:
-        same = understand(measured, Request(audio_of(request), units=speech.units))
+        same = analyse(measured, Request(read_recording(request), units=speech.units))
         of_speaker = speaker_map(measured.speakers, speaker)
         motion = generate_for(of_speaker, measured.engine, measured.learned, same).motion
         valid = np.ones(len(motion.values), bool)

@@ -29,7 +29,7 @@ from lipmotion_lab.evaluation import evaluate as evaluation_figures
 FOLDER = Path(__file__).parents[2] / "recipes"
 INDEX = FOLDER / "README.md"
 PAGES = sorted(page for page in FOLDER.glob("*.md") if page != INDEX)
-MOST_LINES = 40
+MAX_LINES = 40
 PEOPLE = ("6331559613336179781", "anna", "ben")
 
 
@@ -44,7 +44,7 @@ def test_a_recipe_is_a_short_page_with_three_commands() -> None:
     assert len(PAGES) >= 6
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
-        assert len(text.splitlines()) <= MOST_LINES
+        assert len(text.splitlines()) <= MAX_LINES
         assert f"({page.name})" in index
         prepare, train, folds = map(understood.parse_args, commands(page))
         assert (prepare.verb, train.verb, folds.verb) == ("corpus", "train", "experiment")

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import find_phrases
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import parse_clock, parse_number
@@ -178,7 +178,7 @@ UNCLOSED_COST, UNBITTEN_COST = 10_000.0, 100.0
 """Cost where the one frame of a p b m, or f v, does not show its shape: where only one fits, p b m win."""
 LARGEST_OPENING = 1.2
 """Largest relative opening that is distinguished."""
-LEAST_OPENING = 1e-4
+MIN_OPENING = 1e-4
 """Least mean opening, in the unit of the motion, that scales: a mouth that stays closed is not amplified."""
 LINE_PAUSE_S, SHORT_S, NEAR_S = 0.5, 1.5, 1.5
 """A longer pause divides lines; one shorter than the second belongs to another one nearer than the third."""
@@ -284,7 +284,7 @@ def _relative_opening(opening: Array, nominal: Array, voiced: Array) -> Array:
     There is no offset, because closed lips have opening 0; so "boo" alone does not count as a mouth wide open.
     """
     wanted = voiced * nominal
-    least = LEAST_OPENING * max(float(wanted.sum()), 1.0)
+    least = MIN_OPENING * max(float(wanted.sum()), 1.0)
     return np.clip(opening * (wanted @ wanted) / max(float(wanted @ opening), least), 0.0, LARGEST_OPENING)
 
 
@@ -385,7 +385,7 @@ def parse_shape(name: str, names: dict[str, str], place: str) -> str:
     found = names.get(name.strip().lower().removeprefix(PREFIX))
     if found is None:
         known = " ".join(dict.fromkeys(names))
-        raise InputError(f"{place}: no mouth shape is {shortened(name)!r}; the shapes are: {known}")
+        raise InputError(f"{place}: no mouth shape is {shorten(name)!r}; the shapes are: {known}")
     return found
 
 

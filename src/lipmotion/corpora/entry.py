@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import check_regular, portable_name, read_text_file, whole_folder
+from lipmotion.storage.files import atomic_folder, check_regular, portable_name, read_text_file
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.schema import ArraySpec, checked_sizes
+from lipmotion.storage.schema import ArraySpec, check_sizes
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Audio,
@@ -84,7 +84,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
             f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder, on Windows, too"
         )
     check_curves(utterance.track.motion)
-    with whole_folder(folder) as unfinished:
+    with atomic_folder(folder) as unfinished:
         for name, array in _arrays(utterance).items():
             np.save(unfinished / f"{name}.npy", array)
         text = as_json(_description(utterance, settings), indent=1, sort_keys=True, ensure_ascii=False)
@@ -127,7 +127,7 @@ def read_utterance(folder: Path) -> Utterance:
     try:
         channels = tuple(Channel(**channel) for channel in entry["channels"])
         arrays = {name: _load(folder, name) for name in UTTERANCE_ARRAYS if name != "crops" or entry["crops"]}
-        sizes = checked_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
+        sizes = check_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
         audio = Audio(from_sixteen_bits(arrays["audio"]), entry["audio_rate_hz"])
         expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
         if sizes["T"] != expected:

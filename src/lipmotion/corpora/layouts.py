@@ -13,7 +13,7 @@ from pathlib import Path
 from lipmotion.corpora.folder import gather_recordings, list_files
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, filter_videos
 from lipmotion.corpora.splits import LISTS, assign_splits
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.storage.files import read_text_file
 from lipmotion.units import split_words
@@ -101,9 +101,9 @@ def read_aligned_words(path: Path) -> tuple[str, ...]:
     rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
     for number, row in enumerate(rows, 1):
         if len(row) != 3 or not re.fullmatch(r"[0-9]+ [0-9]+", " ".join(row[:2])):
-            raise InputError(f"{path}: line {number} is {shortened(' '.join(row))!r}; required: start end word")
+            raise InputError(f"{path}: line {number} is {shorten(' '.join(row))!r}; required: start end word")
         if not WORD.fullmatch(row[2]):
-            raise InputError(f"{path}: line {number} has {shortened(row[2])!r} where its word should be")
+            raise InputError(f"{path}: line {number} has {shorten(row[2])!r} where its word should be")
     words = tuple(row[2].lower() for row in rows if row[2].lower() not in SILENCES)
     if not words:
         raise InputError(f"{path}: holds no word; remove the file if the words are not known")

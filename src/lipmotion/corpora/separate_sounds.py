@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, RecordingFolder, SourceRecording
-from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.text_table import read_table
 
@@ -69,12 +69,12 @@ def read_offsets(path: Path) -> dict[str, float]:
     try:
         table = read_table(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES), newline=""))
         if table.plain_names != COLUMNS:
-            raise InputError(f"{path}: the columns are {shortened(','.join(table.names))!r}, required name,offset_ms")
+            raise InputError(f"{path}: the columns are {shorten(','.join(table.names))!r}, required name,offset_ms")
         found: dict[str, float] = {}
         for number, row in table.rows:
             name, offset_s = row[0].strip().replace("/", "-"), _offset_s(row, f"{path}: line {number}")
             if found.setdefault(name, offset_s) != offset_s:
-                raise InputError(f"{path}: line {number}: {shortened(name)!r} has another offset above; keep one")
+                raise InputError(f"{path}: line {number}: {shorten(name)!r} has another offset above; keep one")
     except ValueError as error:
         raise CorpusError(str(error)) from error
     return found
@@ -86,7 +86,7 @@ def _offset_s(row: list[str], where: str) -> float:
             raise ValueError(f"{len(row)} fields")
         offset_s = float(row[1].replace(",", ".")) / 1000
     except ValueError as error:
-        raise InputError(f"{where}: {shortened(str(error))}, required a name and milliseconds") from error
+        raise InputError(f"{where}: {shorten(str(error))}, required a name and milliseconds") from error
     _check(offset_s)
     return offset_s
 

@@ -10,7 +10,7 @@ from typing import Any
 from lipmotion.corpora.entry import LARGEST_NUMBER, is_utterance_name, read_entry, read_utterance, write_utterance
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import TEMPORARY, confined, make_folder, read_text_file, remove_unfinished, whole_file
+from lipmotion.storage.files import TEMPORARY, atomic_file, confine, make_folder, read_text_file, remove_unfinished
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Utterance
 from lipmotion.types.values import any_members, members, number, one_of, text
@@ -85,7 +85,7 @@ class Corpus:
             make_folder(path)
             cls(path, {})._write_manifest()
         corpus = cls.open(path)
-        with confined(path):
+        with confine(path):
             make_folder(path / UTTERANCES)
         remove_unfinished(path)
         remove_unfinished(path / UTTERANCES)
@@ -197,7 +197,7 @@ class Corpus:
         Raises InputError: its name cannot be a folder's. Raises ExportError: it cannot be written.
         """
         folder = self.folder(utterance.name)
-        with confined(self.path):
+        with confine(self.path):
             write_utterance(folder, utterance, settings or {})
         self._index[utterance.name] = _summary(read_entry(folder))
         self._write_manifest()
@@ -211,7 +211,7 @@ class Corpus:
 
     def _write_manifest(self) -> None:
         content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
-        with confined(self.path), whole_file(self.path / MANIFEST) as unfinished:
+        with confine(self.path), atomic_file(self.path / MANIFEST) as unfinished:
             text = as_json(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
 

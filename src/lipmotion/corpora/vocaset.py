@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import gather_recordings
 from lipmotion.corpora.source_recordings import MotionFile, RecordingFolder, SourceRecording
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.markers import measure_markers, to_head_frame
 from lipmotion.types import Motion
@@ -130,7 +130,7 @@ def read_vertices(path: Path, chosen: Sequence[int]) -> NDArray[np.float64]:
             texts = [lines_of_text[vertex].split() for vertex in chosen]
             found = np.array([[float(row[names.index(axis)]) for axis in "xyz"] for row in texts])
     except (ValueError, KeyError, IndexError, TypeError) as error:
-        raise InputError(f"{path}: not a mesh of FLAME in .ply ({shortened(str(error))}); export it again") from error
+        raise InputError(f"{path}: not a mesh of FLAME in .ply ({shorten(str(error))}); export it again") from error
     if not np.isfinite(found).all():
         raise InputError(f"{path}: has vertices that are not finite; export it again")
     return found

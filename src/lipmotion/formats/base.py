@@ -22,7 +22,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.storage.files import check_regular, whole_file
+from lipmotion.storage.files import atomic_file, check_regular
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.sources import check_kind
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
@@ -179,7 +179,7 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
     Raises ExportError: unknown suffix, values that are not finite, or the file cannot be written.
     """
     check_motion(path, generation.motion)
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         _format_of(path).write(temporary, generation, source, model)
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, mouth_template
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.markers import MARKER, MILLIMETRES, measure_markers, to_head_frame
 from lipmotion.meshes.files.steady_rate import exact_rate
@@ -36,7 +36,7 @@ BLOCK = 512
 MARK = 0x50
 INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
 """The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
-MOST_FRAMES, OVERFLOW = 65_535, 65_536
+MAX_FRAMES, OVERFLOW = 65_535, 65_536
 """Most frames that the header can number, and after how many it may begin at 0 again."""
 LARGEST_FILE_BYTES = 1 << 28
 """Most bytes of a file that is read."""
@@ -142,7 +142,7 @@ def _frames(found: dict[str, Values], numbered: int, held: int, spare: int) -> i
     for over in range(frames + OVERFLOW, held + 1, OVERFLOW):
         if held < over + spare:  # a number that began at 0 again
             frames = over
-    if frames == MOST_FRAMES and held > frames + spare:  # the end of what can be counted, and nothing beside it
+    if frames == MAX_FRAMES and held > frames + spare:  # the end of what can be counted, and nothing beside it
         frames = held
     if frames != stated[-1]:
         LOG.warning("it states %s frames and holds %d: %d are read", " or ".join(map(str, stated)), held, frames)
@@ -193,7 +193,7 @@ def _parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
         if step == 0:
             break
         if step < 0:
-            raise InputError(f"the parameter {shortened(name)!r} is before its own place; export the capture again")
+            raise InputError(f"the parameter {shorten(name)!r} is before its own place; export the capture again")
         at = body + step
     return {f"{groups.get(group, '')}.{name}": values for group, name, values in found}
 
@@ -219,7 +219,7 @@ def write_c3d(path: Path, content: C3dFile) -> None:
     More frames than the header can number stand in ``TRIAL`` as two whole numbers each, and in ``POINT:LONG_FRAMES``.
     """
     frames, points = content.points.shape[:2]
-    numbered = min(frames, MOST_FRAMES)
+    numbered = min(frames, MAX_FRAMES)
     curves = len(content.analog_labels)
     groups: dict[str, dict[str, int | float | Values]] = {
         "POINT": {

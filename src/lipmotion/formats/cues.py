@@ -20,7 +20,7 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import papagayo, rhubarb, spine
 from lipmotion.printable import is_line
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.files import atomic_file, read_text_file
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE
 from lipmotion.units.mouth_chart import REST, SHAPES
@@ -69,7 +69,7 @@ def format_of(path: Path) -> str:
 
 def write_cue_file(path: Path, sheet: CueSheet, sound_file: str, form: str) -> None:
     """Write cues to a file; after a failure there is no partial file. Raises ExportError: it cannot be written."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text(CUE_FORMATS[form].text(sheet, sound_file), encoding="utf-8", newline="\n")
 
 

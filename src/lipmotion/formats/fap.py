@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.meshes.files.steady_rate import exact_rate
 from lipmotion.meshes.fitting.point_motion import move_points
@@ -63,14 +63,14 @@ MANY_VALUES = {1: 4, 2: 6}
 NAMES = {number: f"fap{number}_{name}" for number, name, *_ in PARAMETERS}
 LARGEST_VALUE = 1_000_000
 LONGEST_LINE = 1 << 14
-MOST_FRAMES = 10_000_000
+MAX_FRAMES = 10_000_000
 
 
 def check(motion: Motion) -> None:
     """Raise ExportError if motion holds anything but these parameters."""
     others = [name for name in motion.names if _number(name) is None]
     if others or not motion.names:
-        raise ExportError(f"no parameters of MPEG-4 but {shortened(', '.join(others[:4])) or 'nothing'}; write .json")
+        raise ExportError(f"no parameters of MPEG-4 but {shorten(', '.join(others[:4])) or 'nothing'}; write .json")
     if len({_number(name) for name in motion.names}) < len(motion.names):
         raise ExportError("two channels are the same parameter of MPEG-4, required each once; write .json")
 
@@ -98,7 +98,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
             head = next(lines, "").split()
             if len(head) < 4 or not head[0].startswith("2."):
-                raise ValueError(f"it begins with {shortened(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
+                raise ValueError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
             rate, frames = head[-2:]
             held, used = _frames(lines, int(frames))
     except ValueError as error:
@@ -112,8 +112,8 @@ def _frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArra
     """Return the values of all parameters [shape=(T, 68)], and which of them are given in any frame [shape=(68,)]."""
     rows: list[NDArray[np.int32]] = []
     current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
-    if not 0 < count <= MOST_FRAMES:
-        raise ValueError(f"{count} frames, required 1 to {MOST_FRAMES}")
+    if not 0 < count <= MAX_FRAMES:
+        raise ValueError(f"{count} frames, required 1 to {MAX_FRAMES}")
     for frame in range(count):
         marks, values = next(lines, "").split(), next(lines, "").split()[1:]
         if len(marks) != COUNT or set(marks) - {"0", "1"}:

@@ -9,7 +9,7 @@ from io import StringIO
 from itertools import islice
 from pathlib import Path
 
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import motion_suffix
 from lipmotion.formats.base import read_units as read_units_of_motion
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, service_tiers
@@ -297,7 +297,7 @@ def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "
 def _refuse(kind: str, name: str, known: list[str], where: str) -> list[LabelTier]:
     """Raise InputError: there is no such speaker or tier."""
     names = ", ".join(map(repr, list(dict.fromkeys(filter(None, known)))[:NAMED_TIERS])) or "none with a name"
-    raise InputError(f"{where}: has no {kind} {shortened(name)!r}; it has: {names}")
+    raise InputError(f"{where}: has no {kind} {shorten(name)!r}; it has: {names}")
 
 
 def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
@@ -335,7 +335,7 @@ def _name_speakers(tiers: list[LabelTier], where: str) -> None:
     """Log a warning if tiers are of several speakers."""
     speakers = [tier.speaker for tier in tiers if tier.speaker]
     if len(speakers) > 1:
-        names = ", ".join(map(shortened, speakers[:NAMED_TIERS]))
+        names = ", ".join(map(shorten, speakers[:NAMED_TIERS]))
         LOG.warning("%s: %d people speak: %s; all are read; --tier NAME chooses one", where, len(speakers), names)
 
 
@@ -369,13 +369,13 @@ def check_plain_text(text: str, where: str) -> None:
 def _check_no_labels(text: str, where: str) -> None:
     """Raise InputError for labels, subtitles and documents in forms that are not read."""
     start, found = text[:200].lstrip(), NO_ARROW.search(text)
-    line = shortened(found[0].strip()) if found else ""
+    line = shorten(found[0].strip()) if found else ""
     clock = "00:00:01,000 --> 00:00:02,500"
     timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
     forms = {
         "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
         "is a master label file of many recordings; write a .lab beside each": start.startswith(MASTER),
-        f"begins with {shortened(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
+        f"begins with {shorten(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
         "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),
         f"has the line {line!r}, two times as in subtitles; required: times as in {clock}, or the words alone": found,
         f"{timed}; save it in one of these forms, or give the words alone": _seems_timed(text),
@@ -441,8 +441,6 @@ def write_labels(path: Path, units: Timeline[Unit]) -> None:
     """
     for label in [span.label for span in units]:
         if not is_line(label.phone + label.unit + label.word):
-            raise ExportError(
-                f"{path}: {shortened(repr(label))} has a line end, a control character or half a character"
-            )
+            raise ExportError(f"{path}: {shorten(repr(label))} has a line end, a control character or half a character")
     write = next(write for suffix, write in _WRITERS.items() if suffix.lower() == path.suffix.lower())
     write(path, units)

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import next_at
 from lipmotion.formats.label_tiers import (
     EARLIEST_S,
@@ -206,7 +206,7 @@ def describe_json(text: str, where: str) -> str:
     for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
         if name in names:
             return f"holds {what}, which is motion and no labels; render it"
-    named = ", ".join(map(shortened, names[:8])) or "no names"
+    named = ", ".join(map(shorten, names[:8])) or "no names"
     return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
 
 
@@ -276,13 +276,13 @@ def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
     text = next((text for name in TEXTS if name in item and (text := _text(item[name])) is not None), None)
     role = WORDS if "word" in item or name in WORD_LISTS else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
-        found = shortened(repr(item.get("text") or item.get("word"))[:200])
+        found = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {found}, required a text")
     if "visemeid" in item or item.get("type") == "viseme":
         text, role = _viseme(item.get("visemeid", item.get("value")), f"{where}: {place}"), PHONE_LABELS
     if text is not None and "markname" in item and not MARK.fullmatch(text):
         raise InputError(
-            f"{where}: {place} is the mark {shortened(text)!r}, which is no word; name every mark as the word that "
+            f"{where}: {place} is the mark {shorten(text)!r}, which is no word; name every mark as the word that "
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
         )
     start, end, times = _times(item, f"{where}: {place}")
@@ -389,7 +389,7 @@ def _viseme(value: Any, where: str) -> str:
     if isinstance(value, str):
         if value not in POLLY_VISEMES:
             known = " ".join(POLLY_VISEMES)
-            raise InputError(f"{where}: no viseme of Polly is {shortened(value)!r}; known are: {known}")
+            raise InputError(f"{where}: no viseme of Polly is {shorten(value)!r}; known are: {known}")
         return POLLY_VISEMES[value]
     return AZURE_VISEMES[require(values.whole(0, len(AZURE_VISEMES) - 1), value, f"{where}: the viseme")]
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, sort_lines
 from lipmotion.types.values import parse_number
@@ -400,7 +400,7 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
         unknown = "" if pause else read_ipa(label.text)[1]
         if unknown:
             raise InputError(
-                f"{where}: {label.position} is {shortened(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
+                f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
                 f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
             )
     begun: dict[int, list[str]] = defaultdict(list)

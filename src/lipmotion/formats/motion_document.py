@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import MotionFormat, read_members, write_json
 from lipmotion.printable import is_line
 from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
@@ -103,7 +103,7 @@ def _span(row: Any) -> Span[Unit]:
     unit = Unit(row["phone"], row.get("unit", ""), row.get("word", ""), again=row.get("again", False))
     span = Span(row["start_s"], row["end_s"], unit)
     if not is_line(span.label.phone + span.label.unit + span.label.word):
-        label = shortened(repr(span.label))
+        label = shorten(repr(span.label))
         raise InputError(f"{label} has a line end, a control character or half a character in it; correct it")
     if not span.start_s >= 0 or span.end_s == float("inf"):
         raise InputError(

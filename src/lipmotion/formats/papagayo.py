@@ -19,7 +19,7 @@ from lipmotion.articulation.cue_sheets import (
     parse_cue_time,
     parse_shape,
 )
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
 from lipmotion.units.mouth_chart import REST, SHAPES
@@ -153,7 +153,7 @@ def _word(lines: _Lines) -> tuple[str, int, int, int]:
     fields = line.rsplit(maxsplit=3)
     if len(fields) != 4:
         raise InputError(
-            f"{lines.place} is {shortened(line)!r}, required a word, its frames and the number of its shapes"
+            f"{lines.place} is {shorten(line)!r}, required a word, its frames and the number of its shapes"
         )
     first, last, count = (int(parse_cue_time(field, lines.place)) for field in fields[1:])
     return fields[0], first, last, count

@@ -11,9 +11,9 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import LINES, LabelTier, TimedLabel, check_count
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.values import parse_clock
 from lipmotion.units import group_words, is_silent
@@ -117,7 +117,7 @@ def _cues(text: str, where: str) -> Iterator[TimedLabel]:
         times = (TIMES.fullmatch(line) or SBV.fullmatch(line)) if ":" in line else None
         if times is None and (CUE.match(line) or NO_ARROW.match(line)):
             wanted = "00:00:01,000 --> 00:00:02,500"
-            raise InputError(f"{where}: line {number} is {shortened(line.strip())!r}; required times as in {wanted}")
+            raise InputError(f"{where}: line {number} is {shorten(line.strip())!r}; required times as in {wanted}")
         if times is None:
             lines.append(line)
             continue
@@ -153,7 +153,7 @@ def _rows(text: str, where: str) -> Iterator[TimedLabel]:
         check_count(number, where)
         found = ROW.fullmatch(line)
         if found is None:
-            raise InputError(f"{where}: line {number} is {shortened(line)!r}; required: start, end and text, with tabs")
+            raise InputError(f"{where}: line {number} is {shorten(line)!r}; required: start, end and text, with tabs")
         yield TimedLabel(int(found[1]) / 1000, int(found[2]) / 1000, found[3], f"line {number}")
 
 
@@ -213,7 +213,7 @@ def _dialogue(text: str, where: str) -> Iterator[TimedLabel]:
             start, end = (re.fullmatch(TIME, by_name.get(edge, "").strip()) for edge in ("start", "end"))
             if start is None or end is None or len(values) < len(fields):
                 wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
-                raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
+                raise InputError(f"{where}: line {number} is {shorten(line)!r}; required a line as {wanted}")
             shown, drawing = "", False
             for place, part in enumerate(STYLES.split(by_name.get("text", values[-1]))):
                 modes = DRAWING_MODE.findall(part) if place % 2 else []  # of a tag
@@ -249,7 +249,7 @@ def write_subrip(path: Path, units: Timeline[Unit]) -> None:
     lines: list[str] = []
     for number, (start_s, end_s, text) in enumerate(list_shown_labels(path, units), 1):
         lines += [f"{number}", f"{clock(start_s, ',')} --> {clock(end_s, ',')}", text, ""]
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
 
 
@@ -262,5 +262,5 @@ def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
     for start_s, end_s, text in list_shown_labels(path, units):
         shown = "".join(_ESCAPES.get(letter, letter) for letter in text)
         lines += [f"{clock(start_s, '.')} --> {clock(end_s, '.')}", shown, ""]
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text("\n".join(lines), encoding="utf-8", newline="\n")

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat, format_rows
 from lipmotion.meshes.files.steady_rate import (
     TIME_COLUMN,
@@ -84,7 +84,7 @@ def check_table(motion: Motion) -> None:
     """Raise ExportError if a channel's name would break the header."""
     for name in motion.names:
         if set(name) & set(',;"') or not name.isprintable():
-            raise ExportError(f"the channel name {shortened(name)!r} does not fit in a table; write .json or .npz")
+            raise ExportError(f"the channel name {shorten(name)!r} does not fit in a table; write .json or .npz")
     if len(",".join([TIME, *motion.names])) >= LONGEST_LINE:
         raise ExportError(f"the channel names do not fit in a line of {LONGEST_LINE} letters; write .json or .npz")
 
@@ -219,7 +219,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
             used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
             if timed is None or not 0 < len(used) <= MOST_CURVES:
                 raise ValueError(
-                    f"the first line is {shortened(','.join(names))!r}, required 'time_s,opening,...', or curves "
+                    f"the first line is {shorten(','.join(names))!r}, required 'time_s,opening,...', or curves "
                     "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
                 )
             times, names, values = _rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
@@ -262,7 +262,7 @@ def _rows(
             if of_names:
                 return _of_single_scores(chain([(line, fields)], rows), names, timed, of_names[0], used)
             if texts:
-                named = ", ".join(shortened(names[column]) for column in texts)
+                named = ", ".join(shorten(names[column]) for column in texts)
                 LOG.warning("%d columns hold text, not numbers, and are left out: %s", len(texts), named)
                 found = [fields[column] for column in used]
         faces.append(len(times) - 1)
@@ -304,7 +304,7 @@ def _timecode(text: str, line: int) -> Timecode:
     found = _TIMECODE.fullmatch(text)
     if found is None or int(found[2]) > 59 or int(found[3]) > 59:
         raise ValueError(
-            f"line {line} begins with {shortened(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
+            f"line {line} begins with {shorten(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
             "shorten it: take the file as it was recorded"
         )
     seconds = (int(found[1]) * 60 + int(found[2])) * 60 + int(found[3])

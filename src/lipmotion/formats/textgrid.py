@@ -9,9 +9,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, find_tier, require_time
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
 
@@ -53,13 +53,13 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
         for number in range(1, tier_count + 1):
             place = f"tier {number}"
             kind, name = _take(tokens, "text"), _take(tokens, "text")
-            place = f"tier {shortened(name)!r}"
+            place = f"tier {shorten(name)!r}"
             _take(tokens, "number"), _take(tokens, "number")
             count = _count(tokens)
             total += count
             check_count(total, where)
             if count and kind not in (INTERVALS, POINTS):
-                raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
+                raise _DamagedError(f"its kind is {shorten(kind)!r}, required {INTERVALS} or {POINTS}")
             labels = []
             for position in (f"{place}, interval {i + 1}" for i in range(count)):
                 start_s = require_time(_take(tokens, "number"), position, where)
@@ -133,7 +133,7 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
             quoted = text.replace('"', '""')
             lines += [f"        intervals [{place}]:", f"            xmin = {start_s}", f"            xmax = {stop_s}"]
             lines.append(f'            text = "{quoted}"')
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

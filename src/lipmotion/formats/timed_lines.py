@@ -13,7 +13,7 @@ from itertools import islice
 from pathlib import Path
 from statistics import median
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import (
     LINES,
     MOST_LABELS,
@@ -106,7 +106,7 @@ def _fitted(text: str, form: re.Pattern[str], wanted: str, where: str) -> Iterat
         check_count(count, where)
         match = form.fullmatch(line)
         if match is None and not (wanted.startswith("recording") and line.startswith(COMMENT)):
-            raise InputError(f"{where}: line {number} is {shortened(line)!r}; required, as in line 1: {wanted}")
+            raise InputError(f"{where}: line {number} is {shorten(line)!r}; required, as in line 1: {wanted}")
         if match is not None:
             yield number, tuple(group for group in match.groups(default="") if group or form is not SECONDS)
 
@@ -149,7 +149,7 @@ def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
     for number, (name, speaker, start, end, words) in _fitted(text, form, wanted, where):
         recording = recording or name
         if name != recording:
-            names = f"{shortened(recording)!r} and {shortened(name)!r}"
+            names = f"{shorten(recording)!r} and {shorten(name)!r}"
             raise InputError(f"{where}: line {number}: words of two recordings, {names}; keep those of one")
         start_s, end_s = (require_time(time, f"line {number}", where) for time in (start, end))
         if form is CTM and end_s < 0:
@@ -202,7 +202,7 @@ def _table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
             }
             times = (row["start"], row.get("end") or row["duration"])
         except (ValueError, IndexError, KeyError, csv.Error) as error:
-            raise InputError(f"{where}: {place} is {shortened(line)!r}; required, as in line 1: {header}") from error
+            raise InputError(f"{where}: {place} is {shorten(line)!r}; required, as in line 1: {header}") from error
         start_s, end_s = (require_time(time, place, where) for time in times)
         end_s += 0.0 if row.get("end") else start_s
         key = (row.get("kind", named), row.get("speaker", ""))

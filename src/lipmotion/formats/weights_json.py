@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import MotionFormat, read_members, write_json
 from lipmotion.meshes.files.steady_rate import TIME_COLUMN, column_key, resample_rows, tabulate_frames, times_to_seconds
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
@@ -43,7 +43,7 @@ TICKS_PER_S = 1e7
 ANIMATION, AUDIO_OFFSET = ("animation", "privanimation"), ("audiooffset", "privaudiooffset")
 RATES = ("fps", "framerate", "exportfps", "ratehz")
 NAMED, SCORED = ("categoryname", "blendshape", "blendshapename", "name", "shape"), ("score", "value", "weight")
-DEEPEST, MOST_FRAMES = 6, 1 << 22
+DEEPEST, MAX_FRAMES = 6, 1 << 22
 _DECODER = json.JSONDecoder()
 
 
@@ -138,8 +138,8 @@ def _of_azure(pieces: list[dict[str, Any]]) -> Motion:
     if len(set(starts)) < len(starts) == len(offsets):  # every event counts from 0: its place is its time
         starts = [round(offset / TICKS_PER_S * AZURE_HZ) for offset in offsets]
     count = max(start + len(table) for start, table in zip(starts, rows, strict=True))
-    if min(starts) < 0 or count > MOST_FRAMES:
-        raise InputError(f"the frames are {min(starts)} to {count}, required 0 to {MOST_FRAMES}")
+    if min(starts) < 0 or count > MAX_FRAMES:
+        raise InputError(f"the frames are {min(starts)} to {count}, required 0 to {MAX_FRAMES}")
     values = np.full((count, len(AZURE_NAMES)), np.nan)
     for start, table in sorted(zip(starts, rows, strict=True), key=lambda each: each[0]):
         place = values[start : start + len(table)]
@@ -195,6 +195,6 @@ def _named(value: Any) -> dict[str, float] | None:
         name = next((str(keyed[key]) for key in NAMED if keyed.get(key)), None)
         score = next((keyed[key] for key in SCORED if key in keyed), None)
         if name is None or score is None:
-            raise InputError(f"{shortened(repr(each)[:200])} is no blendshape, required a name and a score")
+            raise InputError(f"{shorten(repr(each)[:200])} is no blendshape, required a name and a score")
         found[name] = float(score)
     return found if isinstance(value, list) else None

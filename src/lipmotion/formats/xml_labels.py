@@ -8,7 +8,7 @@ from collections import defaultdict
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, find_tier
 from lipmotion.types.values import parse_clock
 
@@ -130,5 +130,5 @@ def _seconds(value: str, per_s: dict[str, float], where: str) -> float:
     if not math.isnan(clock_s):
         return clock_s
     if offset is None:
-        raise InputError(f"{where}: a time is {shortened(value)!r}, required as in 00:00:01.500, 1.5s or 36f")
+        raise InputError(f"{where}: a time is {shorten(value)!r}, required as in 00:00:01.500, 1.5s or 36f")
     return float(offset[1]) / {"h": 1 / 3600, "m": 1 / 60, "ms": 1000, **per_s}.get(offset[2] or "s", 1)

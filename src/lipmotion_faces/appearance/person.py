@@ -26,7 +26,7 @@ from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.coded_video import decode_pictures, encode_pictures
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
@@ -411,7 +411,7 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
         _check_size("mouth", mouth, (MOUTH_HEIGHT, MOUTH_WIDTH))
         _check_size("jaw", jaw, (HEIGHT, WIDTH))
         codes, jaw_codes = len(mouth.channels), len(jaw.channels)
-        stored = checked_arrays(named, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
+        stored = check_arrays(named, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
         scale = int(stored["scale"])
         half_width_px, bottom_px = stored["shape"].tolist()
         if not NARROWEST_PX <= half_width_px <= WIDEST_PX or not CORNER[1] < bottom_px < CORNER[1] + HEIGHT:

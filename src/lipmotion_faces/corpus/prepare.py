@@ -23,7 +23,7 @@ from lipmotion.extensions import installed_version
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import confined, locked, portable_name, remove_unfinished, sha256_of
+from lipmotion.storage.files import confine, lock_folder, portable_name, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
@@ -156,7 +156,7 @@ def prepare(
     chosen = make_tracker(tracker)
     packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
-    with locked(output):
+    with lock_folder(output):
         corpus = Corpus.create(output)
         folder, parts = divide_long_videos(folder, place, monitor, tracker)
         collection = "/".join(place.resolve().parts[-2:]).strip("/")
@@ -265,7 +265,7 @@ def _process(job: _Job) -> _Outcome:
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _make_utterance(job, source)
-        with confined(job.folder.parent.parent):  # the corpus, in this worker
+        with confine(job.folder.parent.parent):  # the corpus, in this worker
             write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
         raise  # all other recordings would fail in the same way

@@ -194,7 +194,7 @@ MOST_PICTURES_HZ = 30.0
 """Every second frame, or fewer, of faster video is learned from."""
 SPOKEN_TAKES_S = 20.0
 """Seconds of speech that are kept, for motion of other people's models."""
-LEAST_SPOKEN_S = 0.5
+MIN_SPOKEN_S = 0.5
 """Shorter parts of a take are not kept for that."""
 JAW_ENDS = ("x_150", "x_379")
 """The ends of the tracked jaw line, right and left."""
@@ -396,7 +396,7 @@ def select_speech(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:
     takes: list[SpokenTake] = []
     left_s = SPOKEN_TAKES_S
     for take in filmed:
-        if take.sound is None or min(left_s, take.sound.duration_s) < LEAST_SPOKEN_S:
+        if take.sound is None or min(left_s, take.sound.duration_s) < MIN_SPOKEN_S:
             continue
         footage = take.footage
         count = min(len(footage), round(left_s * footage.rate_hz))

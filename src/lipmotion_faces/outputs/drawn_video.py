@@ -14,7 +14,7 @@ from lipmotion.errors import ExportError
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.outputs.prosody import measure_prosody
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
@@ -55,7 +55,7 @@ class VideoOutput(Output):
         if settings.recording is None and not settings.sounded:
             raise ExportError(f"{self.path}: a video needs the recording: write(..., speech=FILE)")
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         face = self.settings.face
         face.check_drawable(self.path, performance.generation)
         return partial(face.write_video, self.path, performance)
@@ -122,7 +122,7 @@ def write_drawn_face(  # noqa: PLR0913
     monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
-    staged, drawn = stage_face(face, staging, prosody or prosody_of_speech(sound)), None
+    staged, drawn = stage_face(face, staging, prosody or measure_prosody(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:

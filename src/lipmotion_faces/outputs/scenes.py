@@ -24,10 +24,10 @@ from lipmotion.meshes.model.bones import head_quaternions
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
-from lipmotion.pipeline.outputs.curve_sets import edited_weights, known_names
-from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_drawn_channels
+from lipmotion.pipeline.outputs.curve_sets import edit_weights, known_names
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import recorded_prosody
+from lipmotion.pipeline.outputs.prosody import measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT
@@ -56,7 +56,7 @@ class SceneOutput(Output):
         if sound is not None and self.path.suffix.lower() == USD:
             asset(sound_reference(sound, self.path))  # refuses names that such a file cannot hold
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         check_drawable(self.path, performance.generation.motion)
         return lambda: write_scene(self.path, performance.cached(delivered_scene), sound=performance.sound_file)
 
@@ -68,9 +68,9 @@ def delivered_scene(performance: Performance, frames: slice | None = None) -> Sc
              the whole; None: all
     """
     settings, delivery = performance.settings, performance.settings.delivery
-    moved = with_drawn_channels(delivered(performance.generation, delivery))
+    moved = with_drawn_channels(deliver(performance.generation, delivery))
     part = None if delivery.hold_ms else frames
-    scene = settings.face.scene(moved, settings, performance.cached(recorded_prosody), part)
+    scene = settings.face.scene(moved, settings, performance.cached(measure_recorded_prosody), part)
     thinning = Thinning(delivery.key_tolerance, tuple(find_closed_times(moved)) if delivery.key_tolerance else ())
     scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
     weights = scene.weights
@@ -78,7 +78,7 @@ def delivered_scene(performance: Performance, frames: slice | None = None) -> Sc
         return scene
     states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
     held = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
-    steps = held_mouth(held, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
+    steps = hold_mouth(held, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
     return replace(scene, weights=steps.motion, stepped=steps.stepped)
 
 
@@ -139,7 +139,7 @@ def head_scene(
     names = [name for name in mesh.shape_names if name in curves]
     table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
-    weights = edited_weights(Motion(table, hertz, channels), units, generation.curve_edits)
+    weights = edit_weights(Motion(table, hertz, channels), units, generation.curve_edits)
     weights = replace(weights, values=weights.values[around][wanted])
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
@@ -179,7 +179,7 @@ def character_scene(
     table = np.zeros((len(motion.values), len(solved.names)))
     table[around] = solved.values[there]
     known = known_names(character.mesh)
-    weights = edited_weights(replace(solved, values=table), units, generation.curve_edits, known)
+    weights = edit_weights(replace(solved, values=table), units, generation.curve_edits, known)
     living = compute_living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
     extra = character.weigh_others(others, len(living.values))

@@ -11,9 +11,9 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
-from lipmotion.pipeline.outputs.delivered import shown
+from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
-from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.pipeline.outputs.prosody import measure_prosody, shift_prosody
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
 from lipmotion.types.moods import MOODS
@@ -231,12 +231,12 @@ def _seen(performance: Performance) -> Generation:
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
     if performance.generation.curve_edits:
         character = character or settings.face.character
-    return shown(performance.generation, settings.delivery, _frame_rate(settings), character)
+    return deliver_to_face(performance.generation, settings.delivery, _frame_rate(settings), character)
 
 
 def _played_prosody(performance: Performance) -> Prosody:
     """Return loudness and pitch of the sound track, in the time of the motion."""
-    return moved_prosody(prosody_of_speech(performance.cached(sound_track)), performance.settings.delivery)
+    return shift_prosody(measure_prosody(performance.cached(sound_track)), performance.settings.delivery)
 
 
 def _frame_rate(settings: OutputSettings) -> float:

@@ -11,7 +11,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.kernels.painting import warp_bytes
@@ -166,7 +166,7 @@ class LayeredFace(Face):
         unknown = sorted(name for name in names if name.startswith(MOUTH) and name[len(MOUTH) :] not in MOUTHS)
         if unknown:
             known = ", ".join(MOUTH + name for name in MOUTHS)
-            raise InputError(f"{path}: unknown layer {shortened(unknown[0])!r}; the mouths are: {known}")
+            raise InputError(f"{path}: unknown layer {shorten(unknown[0])!r}; the mouths are: {known}")
         if "rest" not in self.mouths:
             raise InputError(f"{path}: no layer {MOUTH}rest; name the group of the closed mouth so")
 

@@ -58,10 +58,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_prepare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.prepare``; report what was prepared, kept and skipped."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion_faces.corpus.prepare import prepare
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         done = prepare(
             options.recordings,
             options.output,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.files import as_text, atomic_file
 from lipmotion.storage.media import x264_instructions
 from lipmotion.types import Audio
 
@@ -107,7 +107,7 @@ def write_mp4(
         height, width, *colours = shape
         return not width % 2 and (not height % 2 if colours == [3] else not colours and not height % 3)
 
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         checked = check_frames(frames, path, "RGB", is_even)
         _encode(temporary, path, checked, frame_rate(fps), audio, texts)
         if xmp is not None:

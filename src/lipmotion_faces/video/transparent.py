@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import SOUND_HZ, check_frames, frame_rate, mux_streams, open_output, sound_parts
 
@@ -56,7 +56,7 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
         raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
     if not len(audio.samples):
         raise ExportError(f"{path}: the sound has no samples")
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         _encode(temporary, path, check_frames(frames, path, "RGB or RGBA", _is_even), frame_rate(fps), audio)
 
 
@@ -69,7 +69,7 @@ def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
     from PIL import Image
 
     for number, frame in enumerate(check_frames(frames, path, "RGB or RGBA", _is_even)):
-        with whole_file(path.with_name(path.name % number)) as temporary:
+        with atomic_file(path.with_name(path.name % number)) as temporary:
             Image.fromarray(frame).save(temporary, compress_level=4)
 
 

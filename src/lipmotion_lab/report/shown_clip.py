@@ -15,7 +15,7 @@ from PIL.Image import Resampling
 from lipmotion.corpora.store import Corpus
 from lipmotion.formats.web_page import Html
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
 from lipmotion_faces import Staging, stage_face
@@ -67,7 +67,7 @@ class ClipKeeper:
             content |= {"channels": [recordings.channels[column] for column in columns], "spoken": clip.spoken}
             content |= {"time_s": rounded(clip.time_s), RECORDED: rounded(clip.original[:, columns])}
         content["systems"][system] = rounded(clip.generated[:, columns])
-        with whole_file(self.path) as unfinished:
+        with atomic_file(self.path) as unfinished:
             unfinished.write_text(as_json(content) + "\n", encoding="utf-8")
 
     def content(self) -> dict[str, Any]:

@@ -247,13 +247,13 @@ def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 
 def run_all(options: argparse.Namespace) -> None:
     """Call ``experiment_report``; print what was found, and the page. Raises the error of an experiment that failed."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus
     from lipmotion.units import Lexicon
     from lipmotion_lab.report.report import describe_error, experiment_report
     from lipmotion_lab.runner import ExperimentSettings
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=report.receive)
         found = experiment_report(

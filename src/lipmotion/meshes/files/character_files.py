@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_scene import read_gltf
 from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
@@ -176,9 +176,7 @@ def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
     text = str(error)
     if text.startswith(str(path)):
         return InputError(text)
-    return InputError(
-        f"{path}: {shortened(text)}{f' in line {number}' if number else ''}; export the mesh as OBJ again"
-    )
+    return InputError(f"{path}: {shorten(text)}{f' in line {number}' if number else ''}; export the mesh as OBJ again")
 
 
 def _lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
@@ -210,7 +208,7 @@ def _index(word: bytes, count: int) -> int:
     number = int(word)
     index = number - 1 if number > 0 else count + number
     if number == 0 or not 0 <= index < count:
-        raise ValueError(f"a polygon names vertex {shortened(_text([word]))} of {count}")
+        raise ValueError(f"a polygon names vertex {shorten(_text([word]))} of {count}")
     return index
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_document import (
     GltfArrays,
     GltfDocument,
@@ -374,7 +374,7 @@ class _SceneSurface:
                 continue
             size = self._arrays.count(target["POSITION"])
             if size != count:
-                raise InputError(f"the target {shortened(name)!r} moves {size} of {count} vertices; export it again")
+                raise InputError(f"the target {shorten(name)!r} moves {size} of {count} vertices; export it again")
             moved = _map_vectors(linear, self._arrays.floats(target["POSITION"], 3))
             rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > MIN_DISPLACEMENT)
             self._budget.spend("displacements", len(rows))

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError, shortened
+from lipmotion.errors import ExportError, shorten
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
 from lipmotion.meshes.model.scene import Scene, ShadingNormals, compute_shading_normals
 from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion.printable import is_line
-from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.files import as_text, atomic_file
 
 INDENT = "    "
 _CONTROL = re.compile("[\x00-\x1f\x7f]")
@@ -90,7 +90,7 @@ def asset(path: str) -> str:
     ('@./welcome.flac@', '@@@../a@b.wav@@@', '@@@./a\\\\@@@b.wav@@@')
     """
     if not is_line(path):
-        raise ExportError(f"the name {shortened(path)!r} has a character that .usda cannot refer to; rename the file")
+        raise ExportError(f"the name {shorten(path)!r} has a character that .usda cannot refer to; rename the file")
     mark = "@@@" if "@" in path else "@"
     absolute = path.startswith(("/", "../")) or ":" in path
     return mark + ("" if absolute else "./") + path.replace("@@@", "\\@@@") + mark
@@ -147,7 +147,7 @@ def write_usda(path: Path, scene: Scene) -> None:
         *(f"    endTimeCode = {last}", f"    framesPerSecond = {rate}", f"    metersPerUnit = {scene.metres:.9g}"),
         *("    startTimeCode = 0", f"    timeCodesPerSecond = {rate}", '    upAxis = "Y"', ")", ""),
     ]
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
         root = prim("SkelRoot", ROOT, character, schemas=bound, kind="component")
         file.writelines(line + "\n" for line in chain(head, root))
 

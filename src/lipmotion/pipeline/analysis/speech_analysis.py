@@ -16,17 +16,17 @@ import numpy as np
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.pipeline.model import Model, with_prior
-from lipmotion.pipeline.request import DETECTED, Request
-from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
-from lipmotion.pipeline.understand.spoken_language import warn_of_another_language
-from lipmotion.pipeline.understand.transcribe import (
-    heard_phones,
-    named_places,
+from lipmotion.pipeline.analysis.language import warn_of_another_language
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
+from lipmotion.pipeline.analysis.transcribe import (
+    compute_phone_posteriors,
+    format_places,
     transcribe,
     warn_of_guesses,
     warn_of_label_misfit,
 )
+from lipmotion.pipeline.model import Model, with_prior
+from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
@@ -52,7 +52,7 @@ from lipmotion.speech.recognition.recogniser import (
     voice_knowledge,
 )
 from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -75,14 +75,7 @@ from lipmotion.types import (
 )
 from lipmotion.types.languages import ENGLISH
 from lipmotion.types.moods import MoodTag
-from lipmotion.units import (
-    SILENCE,
-    UNKNOWN_PHONES,
-    check_phones,
-    check_text,
-    close_gaps,
-    is_silent,
-)
+from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import require_tokens
 
@@ -101,7 +94,7 @@ REACH_S = 0.1
 """Phones are recognised so far around the first and the last one that is heard."""
 LATEST_S = 1e15
 """Later units are refused: frames of such times cannot be counted."""
-LEAST_SPEECH_S = 0.2
+MIN_SPEECH_S = 0.2
 """A shorter time of recognised speech is none: the edge of a tone or of noise, taken as a consonant."""
 WORDS = (0.2, 0.9)
 """Shares of the work at which the recognition of words begins and ends, in reports."""
@@ -109,7 +102,7 @@ LOG = logging.getLogger("lipmotion")
 
 
 @dataclass(frozen=True, eq=False)
-class UnderstoodSpeech:
+class SpeechAnalysis:
     """The speech of a recording as input of an engine, and what was recognised in it.
 
     recognition : None where words or phones were given, or the engine's own model recognised the speaker
@@ -134,77 +127,80 @@ class UnderstoodSpeech:
     @property
     def is_without_speech(self) -> bool:
         """Whether no speech was recognised."""
-        return not self.speech.units_known and self.speech_s < LEAST_SPEECH_S
+        return not self.speech.units_known and self.speech_s < MIN_SPEECH_S
 
 
-def understand(model: Model, request: Request, each: ParallelMap = map) -> Speech:
+def analyse(model: Model, request: Request, each: ParallelMap = map) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
     each : applies a function to many items, perhaps in several processes
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
-    return understood_speech(model, request, each).speech.with_arrays()
+    return analyse_speech(model, request, each).speech.with_arrays()
 
 
-def understood_speech(
+def analyse_speech(
     model: Model, request: Request, each: ParallelMap = map, monitor: Monitor = silent_monitor
-) -> UnderstoodSpeech:
-    """Return the speech of a request as ``understand`` does, with what was recognised.
+) -> SpeechAnalysis:
+    """Return the speech of a request as ``analyse`` does, with what was recognised.
 
     monitor : receives reports of the progress; the share is that of recognition, up to ``WORDS[1]``
     """
     request = read_request(request, is_typed=False)
     monitor(Progress("reading the sound", 0, 1, 0.0))
-    audio = analysed(audio_of(request))
+    audio = analysed(read_recording(request))
     monitor(Progress("recognising phones", 0, 1, 0.02))
-    understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
+    analysis = _find_phones(model, request, audio, _report_progress(each, audio.duration_s, monitor))
+    speech, recognition = analysis.speech, analysis.recognition
     if request.manner == DETECTED:
-        understood = _detected(understood, audio)
-    if understood.is_without_speech and not understood.events:
+        events = voice_events(audio, speech.units)
+        units = without_laughter(speech.units, events)  # phones that were recognised in laughter are silence
+        speech = with_units(speech, units) if units != speech.units else speech
+        analysis = replace(analysis, speech=speech, events=events)
+    if analysis.is_without_speech and not analysis.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     elif audio.tones:
         places = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
-        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", named_places(places))
-    speech, found = understood.speech, understood.recognition
-    if found is not None and request.language == ENGLISH:
-        warn_of_another_language(found)
-    given = request.units is not None or understood.fit is not None
-    speech = with_voice(model.phones, audio, speech, found, given=given)
-    return replace(understood, speech=with_prior(model.prior, speech))
+        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(places))
+    if recognition is not None and request.language == ENGLISH:
+        warn_of_another_language(recognition)
+    given = request.units is not None or analysis.fit is not None
+    speech = with_voice(model.phones, audio, speech, recognition, given=given)
+    return replace(analysis, speech=with_prior(model.prior, speech))
 
 
 def with_voice(
-    phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None, *, given: bool = False
+    phones: UnitHmm, audio: Audio, speech: Speech, recognition: Recognition | None, *, given: bool = False
 ) -> Speech:
-    """Return speech that says how well a model knows its voice, that of the recording and that of each passage.
+    """Return speech that says how well a model knows its voice, 0 to 1, that of the recording and of each passage.
 
-    phones, found, given : as of ``known_voice``
+    phones      : the model's own phone models
+    recognition : of the speech; None: words or phones were given, or the engine recognised the speaker
+    given       : whether the phones in time were given
+    It is 1 where the engine recognised the speaker, and for silence.
     """
-    voice, parts = known_voice(phones, audio, speech, found, given=given), speech.parts
+
+    def knowledge_of(sound: Audio) -> float:
+        return voice_knowledge(speaker_similarity(phones, analysed(sound)).score)
+
+    by_engine, parts = recognition is None and not given and not speech.units_known, speech.parts
+    if by_engine or not speech.features.values.any():
+        voice = 1.0
+    elif recognition is not None and recognition.similarity is not None:
+        voice = voice_knowledge(recognition.similarity)
+    else:
+        voice = knowledge_of(audio)
     if parts is not None:
         sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
         is_recognised = not given and not speech.units_known
         parts = tuple(
             part
             if is_recognised and part.speech.voice == 1
-            else part._replace(speech=replace(part.speech, voice=_voice_of(phones, sounds[part.first])))
+            else part._replace(speech=replace(part.speech, voice=knowledge_of(sounds[part.first])))
             for part in parts
         )
     return replace(speech, voice=voice, parts=parts)
-
-
-def _voice_of(phones: UnitHmm, audio: AnalysedAudio) -> float:
-    return voice_knowledge(speaker_similarity(phones, audio).score)
-
-
-def _detected(understood: UnderstoodSpeech, audio: AnalysedAudio) -> UnderstoodSpeech:
-    """Return understood speech with its voice events; phones that were recognised in laughter are silence."""
-    events = voice_events(audio, understood.speech.units)
-    units = without_laughter(understood.speech.units, events)
-    changed = units != understood.speech.units
-    speech = with_units(understood.speech, units) if changed else understood.speech
-    return replace(understood, speech=speech, events=events)
 
 
 def prepare_search(request: Request) -> None:
@@ -215,29 +211,11 @@ def prepare_search(request: Request) -> None:
             english_words()
 
 
-def known_voice(
-    phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None, *, given: bool = False
-) -> float:
-    """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker.
-
-    phones : the model's own phone models
-    speech : of the recording
-    found  : what was recognised in it; None: words or phones were given, or the engine recognised the speaker
-    given  : whether the phones in time were given
-    """
-    recognised_by_engine = found is None and not given and not speech.units_known
-    if recognised_by_engine or not speech.features.values.any():
-        return 1.0
-    if found is not None and found.similarity is not None:
-        return voice_knowledge(found.similarity)
-    return _voice_of(phones, analysed(audio))
-
-
-def aligned_within(
+def align_between(
     model: Model,
     request: Request,
     audio: AnalysedAudio,
-    word: str,
+    text: str,
     start_s: float,
     end_s: float,
     *,
@@ -249,18 +227,13 @@ def aligned_within(
     pauses : whether silence before and after the words stays; else the first and the last phone take its time
     Raises AlignmentError: the words do not fit in there.
     """
-    installed = request.recogniser in INSTALLED_RECOGNISERS
-    phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
-    (first, stop), lexicon = (
-        (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
-        lexicon_of(request),
-    )
-    words = require_tokens(word)
+    first, stop = (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s))
+    lexicon, words = read_lexicon(request), require_tokens(text)
     warn_of_guesses(words, lexicon)
-    piece = audio.stretch(first, stop)
     if stop > len(audio.samples) // HOP:
         raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
-    spans = list(phones.align(piece, piece.mfcc(), words, lexicon).shifted(start_s))
+    segment = audio.stretch(first, stop)
+    spans = list(_recogniser(model, request).align(segment, segment.mfcc(), words, lexicon).shifted(start_s))
     while not pauses and len(spans) > 1 and is_silent(spans[0].label.phone):
         del spans[0]
     while not pauses and len(spans) > 1 and is_silent(spans[-1].label.phone):
@@ -269,10 +242,15 @@ def aligned_within(
     return spans
 
 
-def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
+def _recogniser(model: Model, request: Request) -> Recogniser:
+    kind = "auto" if request.recogniser in INSTALLED_RECOGNISERS else request.recogniser
+    return cached_recogniser(model.phones, kind, model.adaptation)
+
+
+def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
     """Return a map over stretches of samples (16 bit, 16 kHz) that reports how far into the sound it is."""
 
-    def mapped(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+    def map_with_reports(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         lengths_s: deque[float] = deque()
 
         def measured() -> Iterator[ItemT]:
@@ -287,58 +265,46 @@ def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> Paralle
             monitor(Progress("recognising words, seconds", int(done_s), int(duration_s), share))
             yield result
 
-    return mapped
+    return map_with_reports
 
 
-def _understood(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> UnderstoodSpeech:
-    """Return the speech of a request, without what the model that this one stands on makes of it."""
+def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
+    """Return the speech of a request with phones that are given, aligned or recognised."""
     kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
     if request.recogniser not in kinds:
         raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
     range_db = level_range_db(audio.log_energy)
-    installed = request.recogniser in INSTALLED_RECOGNISERS
-    phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
-    features, fit = audio.joined_mfcc(), None
-    found: list[Recognition] = []
+    phones, features, fit = _recogniser(model, request), audio.joined_mfcc(), None
+    results: list[Recognition] = []
 
     def recognise() -> Recognition:
-        found.append(phones.recognition(audio, features, each, english=request.language == ENGLISH))
-        return found[-1]
+        results.append(phones.recognition(audio, features, each, english=request.language == ENGLISH))
+        return results[-1]
 
     @cache
     def recognised() -> Speech:
-        return recognised_speech(model.engine, model.learned, audio, features, phones, recognise, each)
+        return recognise_speech(model.engine, model.learned, audio, features, phones, recognise, each)
 
     if request.units is not None:
         if request.transcript is not None:
             LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
-        units, fit = _followed(model, request, audio, phones.kind, lambda: recognised().units)
-        speech = speech_of(model.engine, audio, features, units, phones.kind, each)
-        return UnderstoodSpeech(replace(speech, times_given=True), None, range_db, fit)
-    words = _words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
-    if installed and words is None:
+        units, fit = _follow_units(model, request, audio, phones.kind, lambda: recognised().units)
+        speech = build_speech(model.engine, audio, features, units, phones.kind, each)
+        return SpeechAnalysis(replace(speech, times_given=True), None, range_db, fit)
+    words = _read_words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
+    if words is None and request.recogniser in INSTALLED_RECOGNISERS:
         words = recognise_words(audio, request.recogniser)
     if words is not None:
-        said, fit = transcribe(phones, audio, audio.mfcc(), words, lexicon_of(request), lambda: recognised().units)
-        if said is not None:
-            speech = speech_of(model.engine, audio, features, said, phones.kind, each)
+        lexicon = read_lexicon(request)
+        aligned, fit = transcribe(phones, audio, audio.mfcc(), words, lexicon, lambda: recognised().units)
+        if aligned is not None:
+            speech = build_speech(model.engine, audio, features, aligned, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
-            return UnderstoodSpeech(speech, None, range_db, fit, tags)
-    return UnderstoodSpeech(recognised(), found[0] if found else None, range_db, fit)
+            return SpeechAnalysis(speech, None, range_db, fit, tags)
+    return SpeechAnalysis(recognised(), results[0] if results else None, range_db, fit)
 
 
-def audio_of(request: Request) -> Audio:
-    """Return the samples of a request's recording. Raises InputError: it cannot be read."""
-    recording = request.recording
-    if isinstance(recording, Audio):
-        return recording
-    if not isinstance(recording, str | Path):
-        kind = type(recording).__name__
-        raise InputError(f"the recording is a {kind}, required a path, or samples as lipmotion.Audio(samples, rate_hz)")
-    return read_audio(Path(recording))
-
-
-def speech_of(
+def build_speech(
     engine: Animator[Any],
     audio: Audio,
     features: Features,
@@ -361,10 +327,15 @@ def speech_of(
     parts = None
     if not audio.is_passage:
         parts = tuple(
-            SpeechPart(first, own, speech_of(engine, sound, sound.mfcc(), Timeline(()), kind, each))
+            SpeechPart(first, own, build_speech(engine, sound, sound.mfcc(), Timeline(()), kind, each))
             for first, own, sound in audio.passages
         )
-    speech = Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, parts=parts)
+    encoding: Any = None
+    if inputs.encoding:
+        encoding = audio.encoding if audio.is_passage else audio.joined_rows(lambda sound: sound.encoding)
+    speech = Speech(
+        features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts
+    )
     return with_units(speech, units) if len(units) else speech
 
 
@@ -375,19 +346,19 @@ def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
     Every passage has those in its time; where phones are said outside of all, the recording is one passage.
     """
     if speech.parts is not None:
-        speech = replace(speech, parts=_parts_with(speech.parts, units))
+        speech = replace(speech, parts=_place_in_parts(speech.parts, units))
         speech = speech.with_arrays() if speech.parts is None else speech
-    found = [span.label.confidence for span in units]
-    first = found[0] if found else None
-    if found.count(first) == len(found):
+    confidences = [span.label.confidence for span in units]
+    first = confidences[0] if confidences else None
+    if confidences.count(first) == len(confidences):
         return replace(speech, units=units, units_known=first is None, confidence=1.0 if first is None else first)
-    confidence = np.ones(len(speech.features.values))
-    for span, sure in zip(units, found, strict=True):
-        confidence[slice(*frames_of(span, len(confidence)))] = 1.0 if sure is None else sure
-    return replace(speech, units=units, units_known=False, confidence=confidence)
+    by_frame = np.ones(len(speech.features.values))
+    for span, confidence in zip(units, confidences, strict=True):
+        by_frame[slice(*frames_of(span, len(by_frame)))] = 1.0 if confidence is None else confidence
+    return replace(speech, units=units, units_known=False, confidence=by_frame)
 
 
-def _parts_with(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[SpeechPart, ...] | None:
+def _place_in_parts(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[SpeechPart, ...] | None:
     """Return the passages with the phones in their time; None where phones are said outside of them."""
     covered = np.zeros(max((part.first + part.frames for part in parts), default=0), bool)
     for part in parts:
@@ -411,7 +382,7 @@ def _parts_with(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[S
     return tuple(spoken)
 
 
-def recognised_speech(
+def recognise_speech(
     engine: Animator[Any],
     learned: Any,
     audio: Audio,
@@ -430,7 +401,7 @@ def recognised_speech(
     training were; else the result of ``recognise`` is used.
     """
     audio = analysed(audio, features)
-    speech = speech_of(engine, audio, features, Timeline(()), phones.kind, each)
+    speech = build_speech(engine, audio, features, Timeline(()), phones.kind, each)
     passages = (SpeechPart(0, slice(0, len(features.values)), speech),) if speech.parts is None else speech.parts
     units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
@@ -446,7 +417,7 @@ def recognised_speech(
         if within is None:
             found = found or recognise()
             within = part.between(relied_on(found.units, found.reliability))
-        if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < LEAST_SPEECH_S:
+        if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < MIN_SPEECH_S:
             continue  # a click, a knock
         spoken.append(part._replace(speech=replace(part.speech, voice=float(knows_voice))))  # else ``with_voice`` says
         units.append(placed_units(within, part.first, part.own))
@@ -456,7 +427,7 @@ def recognised_speech(
     return with_units(speech, joined_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
 
 
-def _words(text: str | TimedTranscript | None, duration_s: float) -> tuple[str, ...] | TimedTranscript | None:
+def _read_words(text: str | TimedTranscript | None, duration_s: float) -> tuple[str, ...] | TimedTranscript | None:
     """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
     if text is None or isinstance(text, TimedTranscript):
         return text
@@ -468,7 +439,7 @@ def _words(text: str | TimedTranscript | None, duration_s: float) -> tuple[str, 
     return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
 
 
-def _followed(
+def _follow_units(
     model: Model, request: Request, audio: AnalysedAudio, kind: str, recognised: Callable[[], Timeline[Unit]]
 ) -> tuple[Timeline[Unit], TranscriptFit | None]:
     """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
@@ -487,31 +458,32 @@ def _followed(
             continue
         try:
             word = span.label.word
-            inside = aligned_within(model, request, audio, word, span.start_s, end_s) if word else []
-            aligned += [f"{word!r} at {span.start_s:.1f} s"] if inside else []
+            inside = align_between(model, request, audio, word, span.start_s, end_s) if word else []
+            if inside:
+                aligned.append(f"{word!r} at {span.start_s:.1f} s")
         except (AlignmentError, InputError):
             inside = []
         if not inside:
             guessed.append((span.start_s, end_s))
-        spans += inside or _within(recognised(), span.start_s, end_s)
+        spans += inside or _cut_phones(recognised(), span.start_s, end_s)
     if aligned:
         LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
     if guessed:
-        LOG.warning("the units do not say which phones are said at %s: they are recognised", named_places(guessed))
+        LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
     units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
     if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
     name = network_of(kind) if request.language == ENGLISH else None
-    heard, sure = heard_phones(name, audio) if name is not None else (None, 0.0)
+    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
     is_sure = sure >= WORD_POSTERIORS[0]
-    fit = label_fit(audio, units, heard if is_sure else None)
+    fit = label_fit(audio, units, posteriors if is_sure else None)
     edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), audio.duration_s]
     filling = [
         phone
         for open_s, close_s in zip(edges_s[::2], edges_s[1::2], strict=True)
         for start_s, end_s in (fit.missing if is_sure else ())
         if min(close_s, end_s) - max(open_s, start_s) >= LEAST_GAP_S
-        for phone in _within(recognised(), max(open_s, start_s - REACH_S), min(close_s, end_s + REACH_S))
+        for phone in _cut_phones(recognised(), max(open_s, start_s - REACH_S), min(close_s, end_s + REACH_S))
     ]
     warn_of_label_misfit(fit, filled=bool(filling))
     spans = sorted([*spans, *filling], key=lambda span: span.start_s)
@@ -519,7 +491,7 @@ def _followed(
     return units, replace(fit, missing=(*fit.missing, *guessed))
 
 
-def _within(units: Timeline[Unit], start_s: float, end_s: float) -> list[Span[Unit]]:
+def _cut_phones(units: Timeline[Unit], start_s: float, end_s: float) -> list[Span[Unit]]:
     """Return the phones, without silence, whose middle is within some time, cut to it."""
     return [
         replace(span, start_s=max(span.start_s, start_s), end_s=min(span.end_s, end_s))

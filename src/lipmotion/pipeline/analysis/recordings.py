@@ -14,7 +14,7 @@ NAME = "{name}"
 """In the path of an output, the name of the recording without its suffix."""
 
 
-def recordings_of(given: Sequence[Path]) -> list[Path]:
+def list_recordings(given: Sequence[Path]) -> list[Path]:
     """Return recordings: files as they are given, and of folders the sounds and videos in them, sorted by name.
 
     Raises InputError: a folder without recordings, or one that cannot be read.
@@ -41,7 +41,7 @@ def is_for_several(output: str) -> bool:
     return NAME in output or output.endswith(("/", os.sep)) or (is_folder and not Path(output).suffix)
 
 
-def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: Sequence[str]) -> list[list[str]]:
+def plan_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: Sequence[str]) -> list[list[str]]:
     """Return the outputs of each recording.
 
     outputs : folders, for which every kind is written, and paths with ``{name}``; of one recording, files, too

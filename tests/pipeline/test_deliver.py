@@ -13,10 +13,10 @@ from lipmotion import Delivery, read_motion, write
 from lipmotion.articulation.contact import find_closures
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.driven import load_character
-from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
-from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
+from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
+from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import moved_prosody
+from lipmotion.pipeline.outputs.prosody import shift_prosody
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey
@@ -57,9 +57,9 @@ def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
     character = load_character(tmp_path / "head.glb")
     larger = Delivery(intensity=2)
     both = with_curves(generation, "arkit")[0]
-    before, after = both.motion["jawOpen"], shown(both, larger, 25.0, character).motion["jawOpen"]
+    before, after = both.motion["jawOpen"], deliver_to_face(both, larger, 25.0, character).motion["jawOpen"]
     assert after.max() > 1.3 * before.max()
-    plain, doubled = (shown(generation, each, 25.0).motion["opening"] for each in (Delivery(), larger))
+    plain, doubled = (deliver_to_face(generation, each, 25.0).motion["opening"] for each in (Delivery(), larger))
     assert doubled.max() > 1.5 * plain.max()
 
 
@@ -84,7 +84,7 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
 @pytest.mark.parametrize("offset_ms", [30.0, -30.0, 0.0])
 def test_loudness_and_pitch_move_together(offset_ms: float) -> None:
     prosody = Prosody(np.arange(10.0) - 40, np.arange(10.0) / 10)
-    moved, by = moved_prosody(prosody, Delivery(offset_ms=offset_ms)), round(offset_ms / 10)
+    moved, by = shift_prosody(prosody, Delivery(offset_ms=offset_ms)), round(offset_ms / 10)
     assert len(moved.level_db) == len(moved.log_f0) == 10 + by
     assert moved.level_db[max(by, 0) :] == pytest.approx(prosody.level_db[max(-by, 0) :])
     assert moved.log_f0[max(by, 0) :] == pytest.approx(prosody.log_f0[max(-by, 0) :])
@@ -112,7 +112,7 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(
 def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, tmp_path: Path) -> None:
     smooth, delivery = with_curves(generation, "face")[0], Delivery(min_hold_ms=400)
     assert max(np.abs(smooth.motion[name]).max() for name in ("eyeBlinkLeft", "headYaw")) > 1e-3
-    steps = held_mouth(smooth, delivery.hold_frames(100), [])
+    steps = hold_mouth(smooth, delivery.hold_frames(100), [])
     for name in ("eyeBlinkLeft", "headYaw", "browInnerUp"):
         assert steps.motion[name] == pytest.approx(smooth.motion[name])
         assert name not in steps.stepped
@@ -125,23 +125,23 @@ def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, t
 
 
 def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(generation: Generation) -> None:
-    found = delivered(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
+    found = deliver(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
     assert found.names == (*generation.motion.names, "mood_happy")
     assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
-    again = delivered(replace(generation, motion=found), Delivery())
+    again = deliver(replace(generation, motion=found), Delivery())
     assert np.array_equal(again.motion.values, found.values)
 
 
 def test_words_say_the_mood_after_the_one_that_is_asked_for(generation: Generation) -> None:
     tagged = replace(generation, moods=(MoodKey(1.0, "sad"),))
-    assert delivered(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
-    both = delivered(tagged, Delivery(mood="happy")).motion
+    assert deliver(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
+    both = deliver(tagged, Delivery(mood="happy")).motion
     assert (both["mood_happy"][0], both["mood_sad"][-1]) == (1, 1)
     assert both["mood_happy"][-1] == pytest.approx(0)
 
 
 def test_neutral_is_what_no_mood_is(generation: Generation) -> None:
-    plain, neutral = (delivered(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
+    plain, neutral = (deliver(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)
 
@@ -156,9 +156,9 @@ def test_a_filmed_face_has_the_mood_of_its_footage(generation: Generation, caplo
 
 
 def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation: Generation) -> None:
-    afraid = delivered(generation, Delivery(mood="afraid"))
-    curves = curves_of(afraid.motion, afraid.units, "vowels")
-    assert {*curves.names} - {*curves_of(generation.motion, generation.units, "vowels").names} >= {"sad", "surprised"}
+    afraid = deliver(generation, Delivery(mood="afraid"))
+    curves = make_curves(afraid.motion, afraid.units, "vowels")
+    assert {*curves.names} - {*make_curves(generation.motion, generation.units, "vowels").names} >= {"sad", "surprised"}
     assert (curves["sad"][0], curves["surprised"][0]) == pytest.approx((0.5, 0.5))
     pressed = curves["closed"] > 0
     assert pressed.any()
@@ -166,6 +166,6 @@ def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation:
 
 
 def test_moods_move_on_while_the_mouth_is_held(generation: Generation) -> None:
-    found = shown(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
+    found = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
     assert "mood_sad" not in found.stepped
     assert len(np.unique(found.motion["mood_sad"])) > 6

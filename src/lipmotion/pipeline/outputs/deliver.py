@@ -68,7 +68,7 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
     return generation
 
 
-def delivered(generation: Generation, delivery: Delivery) -> Generation:
+def deliver(generation: Generation, delivery: Delivery) -> Generation:
     """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``hold_poses``).
 
     Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
@@ -77,24 +77,26 @@ def delivered(generation: Generation, delivery: Delivery) -> Generation:
     Raises InputError: the offset leaves nothing.
     """
     keys = with_detected(sort_moods((*delivery.moods, *generation.moods)), generation.events)
-    larger = _larger(with_manners(generation, keys), delivery.intensity)
+    generation = with_manners(generation, keys)
+    if delivery.intensity != 1:
+        motion = generation.motion
+        opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
+        generation = intensify(generation, delivery.intensity, opening)
     if not all(key.is_manner for key in keys):
-        moods = with_moods(larger.motion, keys)
-        larger = larger.selected(tuple(n for n in larger.motion.names if not is_mood(n))).with_motion(moods)
-    return shift_in_time(larger, delivery)
+        moods = with_moods(generation.motion, keys)
+        names = tuple(name for name in generation.motion.names if not is_mood(name))
+        generation = generation.selected(names).with_motion(moods)
+    return shift_in_time(generation, delivery)
 
 
-def shown(
-    generation: Generation,
-    delivery: Delivery,
-    fps: float,
-    character: DrivenCharacter | None = None,
+def deliver_to_face(
+    generation: Generation, delivery: Delivery, fps: float, character: DrivenCharacter | None = None
 ) -> Generation:
     """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
 
-    character : whose weights are shown, if the face is a character with blendshapes
+    character : whose weights are deliver_to_face, if the face is a character with blendshapes
     """
-    moved = with_drawn_channels(delivered(generation, delivery))
+    moved = with_drawn_channels(deliver(generation, delivery))
     if moved.curve_edits and character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
     frames = delivery.hold_frames(fps)
@@ -104,7 +106,7 @@ def shown(
     closed_s, moved = find_closed_times(moved), close_on_frame_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
-    return held_mouth(moved.resampled(fps), frames, closed_s)
+    return hold_mouth(moved.resampled(fps), frames, closed_s)
 
 
 def with_drawn_channels(generation: Generation) -> Generation:
@@ -114,7 +116,7 @@ def with_drawn_channels(generation: Generation) -> Generation:
     return generation.with_motion(with_mouth(generation.motion))
 
 
-def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
+def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
     """Return a generation whose mouth is held (``hold_poses``); eyes, brows, cheeks and head move as before.
 
     frames : 0: everything moves as before; 1: every frame is a pose, which formats that can say so hold
@@ -134,11 +136,3 @@ def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     values, variance = motion.values.astype(np.float64), np.array(generation.variance)
     values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance
     return replace(mouth, motion=replace(motion, values=values), spread=variance)
-
-
-def _larger(generation: Generation, intensity: float) -> Generation:
-    if intensity == 1:
-        return generation
-    motion = generation.motion
-    opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
-    return intensify(generation, intensity, opening)

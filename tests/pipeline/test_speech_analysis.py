@@ -13,15 +13,10 @@ import pytest
 from lipmotion import Model
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generation import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, outlook_of
-from lipmotion.pipeline.request import Request, request_of
-from lipmotion.pipeline.understand import understood_speech as pipeline_understand
-from lipmotion.pipeline.understand.understood_speech import (
-    recognised_speech,
-    speech_of,
-    understand,
-    understood_speech,
-)
+from lipmotion.pipeline.analysis import speech_analysis as pipeline_analysis
+from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognise_speech
+from lipmotion.pipeline.generation import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, predict_outlook
+from lipmotion.pipeline.request import Request, as_request
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.agreement import TranscriptFit
@@ -58,7 +53,7 @@ RECOGNITION = Recognition(RECOGNISED, Timeline(()), 0.0, 0.0, None)
 
 def recognised(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
     phones, features = Recogniser(model.phones, kind), analysed(sentence.audio).mfcc()
-    return recognised_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
+    return recognise_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
 
 
 def test_phones_that_the_engine_recognises_are_aligned_as_in_training(
@@ -96,7 +91,7 @@ def test_phones_that_do_not_fit_are_not_taken(toy_model: Model, toy_sentence: To
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> None:
     features = analysed(toy_sentence.audio).mfcc()
-    found = speech_of(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0
+    found = build_speech(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0
     assert found is not None
     np.testing.assert_allclose(found, log_f0(toy_sentence.audio), rtol=1e-5)
 
@@ -105,14 +100,14 @@ def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> N
         def inputs(self, motion_s: float = np.inf) -> Inputs:  # noqa: ARG002
             return Inputs()
 
-    assert speech_of(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None
+    assert build_speech(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None
 
 
 def test_the_name_of_a_file_is_no_transcript(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
     (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
     request = Request(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
     with pytest.raises(InputError, match="is the name of a file; give Path"):
-        understand(toy_model, request)
+        analyse(toy_model, request)
 
 
 def group_words(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
@@ -131,10 +126,10 @@ def test_subtitles_are_aligned_within_their_times(toy_model: Model, toy_sentence
         f"00:00:00,300 --> 00:00:02,600\n<i>{' '.join(toy_sentence.words)}</i>\n", encoding="utf-8"
     )
     plain = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
-    wanted = understand(toy_model, plain)
+    wanted = analyse(toy_model, plain)
     text = (tmp_path / "said.srt").read_text(encoding="utf-8")
     for transcript in (tmp_path / "said.srt", text, group_words(toy_sentence), group_words(toy_sentence, 0.4)):
-        found = understand(toy_model, replace(plain, transcript=transcript))
+        found = analyse(toy_model, replace(plain, transcript=transcript))
         assert found.units == wanted.units
         assert found.units_known
 
@@ -143,7 +138,7 @@ def test_times_decide_where_words_alone_do_not(toy_model: Model, toy_sentence: T
     """The sentence twice, and a transcript of the second time alone."""
     twice = Audio(np.tile(toy_sentence.audio.samples, 2), 16_000)
     second = group_words(toy_sentence, toy_sentence.audio.duration_s)
-    found = understand(toy_model, Request(twice, transcript=second, recogniser="own")).units
+    found = analyse(toy_model, Request(twice, transcript=second, recogniser="own")).units
     starts_s = [span.start_s for span in found if span.label.word]
     true_s = [span.start_s + toy_sentence.audio.duration_s for span in toy_sentence.units if span.label.word]
     assert starts_s == pytest.approx(true_s, abs=0.06)
@@ -153,29 +148,29 @@ def test_words_of_an_installed_recogniser_are_aligned(
     toy_model: Model, toy_sentence: ToySentence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = [group_words(toy_sentence), None]
-    monkeypatch.setattr(pipeline_understand, "recognise_words", lambda _, kind: said.pop(0) if kind == "vosk" else None)
+    monkeypatch.setattr(pipeline_analysis, "recognise_words", lambda _, kind: said.pop(0) if kind == "vosk" else None)
     request = Request(toy_sentence.audio, recogniser="vosk")
-    found = understand(toy_model, request)
+    found = analyse(toy_model, request)
     words = tuple(span.label.word for span in found.units if span.label.word)
     assert tuple(word for word, _ in groupby(words)) == toy_sentence.words
     assert found.units_known
-    nothing = understand(toy_model, request)  # no words: phones are recognised
+    nothing = analyse(toy_model, request)  # no words: phones are recognised
     assert not nothing.units_known
-    known = understand(toy_model, replace(request, transcript=" ".join(toy_sentence.words)))
+    known = analyse(toy_model, replace(request, transcript=" ".join(toy_sentence.words)))
     assert known.units == found.units
     assert not said
 
 
 def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other() -> None:
-    assert request_of(Request("a.wav"), "papa").transcript == "papa"
-    assert request_of("a.wav", "papa").transcript == "papa"
+    assert as_request(Request("a.wav"), "papa").transcript == "papa"
+    assert as_request("a.wav", "papa").transcript == "papa"
     with pytest.raises(InputError, match="give one"):
-        request_of(Request("a.wav", "mama"), "papa")
+        as_request(Request("a.wav", "mama"), "papa")
 
 
 def test_every_recogniser_is_named(toy_model: Model, toy_sentence: ToySentence) -> None:
     with pytest.raises(InputError) as refused:
-        understand(toy_model, Request(toy_sentence.audio, recogniser="best"))
+        analyse(toy_model, Request(toy_sentence.audio, recogniser="best"))
     required = "required one of: auto, words, fast, own, general, whisper, vosk"
     assert str(refused.value) == f"unknown recogniser 'best'; {required}"
 
@@ -183,11 +178,11 @@ def test_every_recogniser_is_named(toy_model: Model, toy_sentence: ToySentence) 
 @pytest.mark.parametrize("kind", ["own", "auto"])
 def test_a_recording_without_speech(toy_model: Model, kind: str, caplog: pytest.LogCaptureFixture) -> None:
     request = Request(Audio(np.zeros(16_000, np.float32), 16_000), recogniser=kind)
-    understood = understood_speech(toy_model, request)
+    understood = analyse_speech(toy_model, request)
     (text,) = caplog.messages
     assert text.startswith("no speech found in the recording: the mouth rests; give a recording in which something")
     assert understood.is_without_speech
-    outlook = outlook_of(request, understood)
+    outlook = predict_outlook(request, understood)
     assert (outlook.words, outlook.advice, outlook.text) == ("no speech", (), "no speech found; levels 0 dB apart")
 
 
@@ -195,7 +190,7 @@ def test_a_transcript_beside_units_is_not_used(
     toy_model: Model, toy_sentence: ToySentence, caplog: pytest.LogCaptureFixture
 ) -> None:
     request = Request(toy_sentence.audio, transcript="hello", units=toy_sentence.units)
-    assert understand(toy_model, request).units == toy_sentence.units
+    assert analyse(toy_model, request).units == toy_sentence.units
     assert caplog.messages == [
         "the transcript is not used: the units already say what is spoken; leave one of them out"
     ]
@@ -216,20 +211,20 @@ def test_unsure_words_are_asked_for_first(
     request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
     words = Timeline((Span(0.0, 1.0, RecognisedWord("papa", confidence)),))
     recognition = Recognition(RECOGNISED, words, word_s, 3.0 - word_s, -60.0)
-    understood = replace(understood_speech(toy_model, request), recognition=recognition, range_db=range_db, fit=None)
-    outlook = outlook_of(request, understood)
+    understood = replace(analyse_speech(toy_model, request), recognition=recognition, range_db=range_db, fit=None)
+    outlook = predict_outlook(request, understood)
     assert outlook.advice == advice
     assert outlook.text.endswith(f"would help most: {advice[0]}")
 
 
 def test_the_outlook_says_how_much_of_the_speech_a_transcript_fits(toy_model: Model, toy_sentence: ToySentence) -> None:
     request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
-    understood = replace(understood_speech(toy_model, request), range_db=30.0)
+    understood = replace(analyse_speech(toy_model, request), range_db=30.0)
     assert understood.fit is not None
-    whole = outlook_of(request, understood)
+    whole = predict_outlook(request, understood)
     assert (whole.confidence, whole.text) == (pytest.approx(1), "words: transcript; levels 30 dB apart")
-    part = outlook_of(request, replace(understood, fit=TranscriptFit(-2.0, ((0.0, 3.0),), 4.0)))
+    part = predict_outlook(request, replace(understood, fit=TranscriptFit(-2.0, ((0.0, 3.0),), 4.0)))
     assert (part.confidence, part.advice) == (pytest.approx(0.25), (WHOLE_TRANSCRIPT,))
     assert part.text.startswith("words: transcript, which fits 25% of the speech; levels 30 dB apart; would help most")
-    wrong = outlook_of(request, replace(understood, fit=TranscriptFit(-7.0, (), 4.0)))
+    wrong = predict_outlook(request, replace(understood, fit=TranscriptFit(-7.0, (), 4.0)))
     assert wrong.confidence == pytest.approx(0)

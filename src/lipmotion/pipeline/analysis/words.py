@@ -8,14 +8,14 @@ from typing import Any
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.analysis.read_request import read_recording
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.understand.understood_speech import audio_of
+from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, cached_recogniser
-from lipmotion.storage.files import check_distinct, check_target, whole_file
+from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Span, Timeline
 
@@ -35,24 +35,24 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     Raises InputError: the recording is not usable, or the recogniser does not recognise words.
     Raises MissingDependencyError: pocketsphinx is not installed.
 
-    >>> from lipmotion.pipeline.understand.words import recognise_words
+    >>> from lipmotion.pipeline.analysis.words import recognise_words
     >>> found = recognise_words("examples/welcome.flac")
     >>> found.words[0].label.text, found.word_s > found.phone_s
     ('please', True)
     """
-    request = request_of(speech)
+    request = as_request(speech)
     chosen = model if isinstance(model, Model) else load_model(model or request.model)
     if request.recogniser in WITHOUT_WORDS:
         raise InputError(
             f"the recogniser {request.recogniser!r} recognises phones, not words; required one of: "
             f"{', '.join(USING_WORDS)}"
         )
-    audio = analysed(audio_of(request))
+    audio = analysed(read_recording(request))
     recogniser = cached_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
     return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))
 
 
-def words_as_text(words: Timeline[RecognisedWord]) -> str:
+def format_words(words: Timeline[RecognisedWord]) -> str:
     """Return words as a transcript, a line for what is said without a long pause."""
     lines: list[list[str]] = []
     end_s = float("-inf")
@@ -64,7 +64,7 @@ def words_as_text(words: Timeline[RecognisedWord]) -> str:
     return "".join(" ".join(line) + "\n" for line in lines)
 
 
-def word_record(span: Span[RecognisedWord]) -> dict[str, Any]:
+def describe_word(span: Span[RecognisedWord]) -> dict[str, Any]:
     """Return a word for JSON: ``word``, ``start`` and ``end`` in seconds, and its confidence ``conf``, as Vosk's."""
     return {
         "word": span.label.text,
@@ -84,11 +84,11 @@ def write_words(
     """
     paths = check_word_outputs(outputs, speech)
     for path in paths:
-        text = words_as_text(words)
+        text = format_words(words)
         if path.suffix.lower() == JSON:
-            document = {"result": [word_record(span) for span in words], "text": " ".join(text.split())}
+            document = {"result": [describe_word(span) for span in words], "text": " ".join(text.split())}
             text = as_json(document, indent=1) + "\n"
-        with whole_file(path) as unfinished:
+        with atomic_file(path) as unfinished:
             unfinished.write_text(text, encoding="utf-8")
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
-from lipmotion.storage.sources import check_kind
-from lipmotion.types import TimedTranscript, Timeline, Unit
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.storage.sources import check_kind, is_folder
+from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LABEL_SUFFIXES = (".textgrid", ".eaf", ".lab", ".phn", ".txt", ".json", ".jsonl", ".marks", ".csv", ".tsv")
@@ -35,7 +36,7 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
     transcript, units = request.transcript, request.units
     spoken_by = _speaker_of_labels(request, is_typed=is_typed)
     if is_typed and isinstance(transcript, str):
-        transcript = text_or_file_content(transcript, request.tier, spoken_by)
+        transcript = read_text_or_file(transcript, request.tier, spoken_by)
     elif isinstance(transcript, Path) or (isinstance(transcript, str) and ":" in transcript):  # perhaps subtitles
         transcript = _read_words(transcript, request.tier, spoken_by)
     if isinstance(units, Path):
@@ -50,12 +51,12 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
         request,
         transcript=transcript,
         units=units,
-        lexicon=None if request.lexicon is None else lexicon_of(request),
+        lexicon=None if request.lexicon is None else read_lexicon(request),
         speaker="" if spoken_by else request.speaker,
     )
 
 
-def lexicon_of(request: Request) -> Lexicon:
+def read_lexicon(request: Request) -> Lexicon:
     """Return the pronunciations of a request; those of the dictionary alone, where it has none.
 
     Raises InputError: its file cannot be read.
@@ -64,11 +65,22 @@ def lexicon_of(request: Request) -> Lexicon:
     return Lexicon.from_file(lexicon) if isinstance(lexicon, str | Path) else lexicon or Lexicon()
 
 
+def read_recording(request: Request) -> Audio:
+    """Return the samples of a request's recording. Raises InputError: it cannot be read."""
+    recording = request.recording
+    if isinstance(recording, Audio):
+        return recording
+    if not isinstance(recording, str | Path):
+        kind = type(recording).__name__
+        raise InputError(f"the recording is a {kind}, required a path, or samples as lipmotion.Audio(samples, rate_hz)")
+    return read_audio(Path(recording))
+
+
 def _speaker_of_labels(request: Request, *, is_typed: bool) -> str:
     """Return the speaker of a request if its labels have one of that name: it then is whose words are read."""
-    named = (request.transcript, request.units) if request.speaker else ()
+    sources = (request.transcript, request.units) if request.speaker else ()
     kinds = (str, Path) if is_typed else Path
-    files = [Path(name) for name in named if isinstance(name, kinds) and _file_exists(Path(name))]
+    files = [Path(name) for name in sources if isinstance(name, kinds) and _file_exists(Path(name))]
     if not files:
         return ""
     from lipmotion.formats.label_files import speakers_in
@@ -77,7 +89,7 @@ def _speaker_of_labels(request: Request, *, is_typed: bool) -> str:
     return request.speaker if request.speaker.lower() in speakers else ""
 
 
-def text_or_file_content(argument: str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
+def read_text_or_file(argument: str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
     """Return the content of the file that the argument names, else the argument itself.
 
     tier, speaker : of a file of labels, which tier and whose words
@@ -85,9 +97,15 @@ def text_or_file_content(argument: str, tier: str = "", speaker: str = "") -> st
     Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
-    looks_like_path = _may_be_name(argument) and (_SUFFIX.fullmatch(path.suffix) or _is_in_a_folder(argument))
-    if not looks_like_path and not _file_exists(path):
-        return argument
+    if not _file_exists(path):
+        parts = argument.encode("utf-8", "surrogatepass").split(b"/")
+        may_be_name = " " not in argument and "\0" not in argument and len(argument) < LONGEST_PATH
+        if not may_be_name or max(map(len, parts)) > LONGEST_NAME:
+            return argument
+        folder, separator, name = argument.rpartition("/")
+        in_folder = bool(separator and name) and not any(map(str.isspace, argument))  # as subtitles/take1
+        if not _SUFFIX.fullmatch(path.suffix) and not (in_folder and is_folder(Path(folder or "/"))):
+            return argument
     return _read_words(path, tier, speaker)
 
 
@@ -98,26 +116,6 @@ def _read_words(words: Path | str, tier: str, speaker: str) -> str | TimedTransc
     if isinstance(words, Path):
         check_kind(words, "text", "transcript")
     return read_transcript(words, tier, speaker)
-
-
-def _may_be_name(argument: str) -> bool:
-    """Return whether the system may have a file of that name: no blank in it, and no part too long."""
-    parts = argument.encode("utf-8", "surrogatepass").split(b"/")
-    return (
-        " " not in argument
-        and "\0" not in argument
-        and max(map(len, parts)) <= LONGEST_NAME
-        and len(argument) < LONGEST_PATH
-    )
-
-
-def _is_in_a_folder(argument: str) -> bool:
-    """Return whether an argument without blanks names a place in a folder that exists, as ``subtitles/take1``."""
-    folder, separator, name = argument.rpartition("/")
-    try:
-        return bool(separator and name) and not any(map(str.isspace, argument)) and Path(folder or "/").is_dir()
-    except (OSError, ValueError):  # too long for a path, or with a character that no path has
-        return False
 
 
 def _file_exists(path: Path) -> bool:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import AlignmentError, shortened
+from lipmotion.errors import AlignmentError, shorten
 from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
@@ -41,23 +41,16 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscrip
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.phones import count_phone_edits
 
-__all__ = [
-    "Transcription",
-    "guesses",
-    "phones_in_time",
-    "transcribe",
-    "warn_of_guesses",
-]
 LOG = logging.getLogger("lipmotion")
-MOST_WARNINGS = 20
+MAX_WARNINGS = 20
 """Largest number of guessed pronunciations that are reported one by one."""
-FOREIGN_SHARE, LEAST_FOREIGN = 0.25, 3
+FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
 """A text of which so large a share, and so many different words, are not in the dictionary is not English."""
-MOST_STRETCHES = 3
+MAX_STRETCHES = 3
 """Largest number of stretches without words that are named in one warning."""
 REACH_S = 0.1
 """A phone of a word may be heard so far from the middle that its recognition has."""
-LEAST_INSERTED = 2
+MIN_INSERTED = 2
 """Fewer phones between words than this belong to them: recognition errs by one."""
 ALIKE_SHARE = 0.34
 """Words are said all the same where recognition finds their phones, but for so small a share."""
@@ -106,28 +99,34 @@ def transcribe(
     name = None if isinstance(lexicon, LanguageLexicon) else network_of(phones.kind)
     refused: AlignmentError | None = None
     try:
-        units = phones_in_time(phones, audio, features, words, lexicon)
+        units = align_or_recognise(phones, audio, features, words, lexicon)
     except AlignmentError as error:  # too much for the recording: some of the words may be said all the same
         check_words(spoken, audio.duration_s)
-        if name is None or recognised is None or heard_phones(name, analysed(audio))[1] < PHONE_POSTERIORS[0]:
+        if (
+            name is None
+            or recognised is None
+            or compute_phone_posteriors(name, analysed(audio))[1] < PHONE_POSTERIORS[0]
+        ):
             raise
         refused = error
-        units = _evenly_spread(spoken, lexicon, audio.duration_s)
+        labels = [Unit(phone, word=word) for word in spoken for phone in lexicon.pronunciations(word)[0]]
+        edges_s = np.linspace(0, audio.duration_s, len(labels) + 1).tolist()  # each for the same time
+        units = Timeline(tuple(map(Span, edges_s[:-1], edges_s[1:], labels)))
     if words is None or phones.kind == "own":
         return Transcription(units, None)
     fit = transcript_fit(audio, units)
     if name is None:
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    heard, sure = heard_phones(name, analysed(audio))
+    posteriors, sure = compute_phone_posteriors(name, analysed(audio))
     costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
-    evidence = transcript_evidence(heard, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
+    evidence = transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
     if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
         fit = fit.with_evidence(evidence)
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    found = recognised()
-    evidence = _compared(evidence, found)
+    phones_recognised = recognised()
+    evidence = _compare(evidence, phones_recognised)
     fit = fit.with_evidence(evidence)
     warn_of_misfit(fit, corrected=True)
     if fit.is_doubtful:
@@ -135,19 +134,11 @@ def transcribe(
     if refused is not None and not evidence.unsaid:
         raise refused
     if evidence.gaps or evidence.unsaid:
-        units = _corrected(phones, audio, features, evidence, found, lexicon)
+        units = _correct(phones, audio, features, evidence, phones_recognised, lexicon)
     return Transcription(units, fit)
 
 
-def _evenly_spread(words: Sequence[str], lexicon: Lexicon, duration_s: float) -> Timeline[Unit]:
-    """Return the phones of words, each for the same time."""
-    said = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
-    edges_s = np.linspace(0, duration_s, len(said) + 1).tolist()
-    timed = zip(edges_s[:-1], edges_s[1:], said, strict=True)
-    return Timeline(tuple(Span(start_s, end_s, Unit(phone, word=word)) for start_s, end_s, (phone, word) in timed))
-
-
-def heard_phones(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
+def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
     """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
     posteriors = recording_posteriors(name, audio)
     hears = any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
@@ -155,7 +146,7 @@ def heard_phones(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], 
     return posteriors.of_phones.astype(float), sure
 
 
-def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
+def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
     """Return evidence of a transcript that is wrong somewhere, compared with what is recognised.
 
     Words are said, and there, where recognition finds most of their phones; words that were doubted together, if it
@@ -164,26 +155,26 @@ def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Trans
     transcript is known to leave out something, recognised phones between those of its words are more of it.
     """
     spans = [span for span in recognised if not is_silent(span.label.phone)]
-    words, taken = _found_words(evidence, spans)
-    beside = [span for place, span in enumerate(spans) if place not in taken]
-    middles_s = [(span.start_s + span.end_s) / 2 for span in beside]
+    words, taken = _match_words(evidence, spans)
+    others_said = [span for place, span in enumerate(spans) if place not in taken]
+    middles_s = [(span.start_s + span.end_s) / 2 for span in others_said]
     known = {(other.first, other.stop) for other in evidence.others}
     said = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
     others = []
     for before, after in pairwise(said):
         before_s = words[before].end_s if before >= 0 else 0.0
         after_s = words[after].start_s if after < len(words) else np.inf
-        between = beside[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
+        between = others_said[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
         lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
-        is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= LEAST_INSERTED)
+        is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= MIN_INSERTED)
         if after > before + 1 or (lasts and is_more):
             start_s, end_s = (between[0].start_s, between[-1].end_s) if between else (before_s, before_s)
             others.append(OtherSpeech(start_s, end_s, before + 1, after))
     return TranscriptEvidence(tuple(words), tuple(others))
 
 
-def _found_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
-    """Return the words of ``_compared``, those that are found with the times that they have there, and their phones.
+def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
+    """Return the words of ``_compare``, those that are found with the times that they have there, and their phones.
 
     spans : recognised phones; those of the words that are found are returned by their numbers
     """
@@ -215,7 +206,7 @@ def _found_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
     return words, taken
 
 
-def _recognised_within(
+def _select_recognised(
     recognised: Timeline[Unit], evidence: TranscriptEvidence, other: OtherSpeech
 ) -> list[list[Span[Unit]]]:
     """Return the recognised phones where something else is said than the transcript has, by words.
@@ -238,19 +229,18 @@ def _recognised_within(
         stop = int(np.searchsorted(middles_s, after_s))
         near = range(*np.searchsorted(middles_s, [after_s - REACH_S, after_s + REACH_S]))
         stop = min([n for n in near if spans[n].label.phone == words[other.stop].phones[0]], default=stop)
-    found: list[list[Span[Unit]]] = []
-    numbered = groupby(enumerate(spans), key=lambda pair: pair[1].label.word)
-    for word, group in numbered:
+    runs: list[list[Span[Unit]]] = []
+    for word, group in groupby(enumerate(spans), key=lambda pair: pair[1].label.word):
         run = list(group)
         middle_s = (run[0][1].start_s + run[-1][1].end_s) / 2
         if word and (before_s + other.start_s) / 2 <= middle_s <= (other.end_s + after_s) / 2:
-            found.append([span for _, span in run])
+            runs.append([span for _, span in run])
         elif not word and (inside := [span for number, span in run if first <= number < stop]):
-            found.append(inside)
-    return found
+            runs.append(inside)
+    return runs
 
 
-def _corrected(
+def _correct(
     phones: Recogniser,
     audio: Audio,
     features: Features,
@@ -266,7 +256,7 @@ def _corrected(
     variants: dict[str, tuple[Pronunciation, ...]] = {}
     for number, word in enumerate((*evidence.words, None)):
         for other in (each for each in evidence.others if each.first == number):
-            for run in _recognised_within(recognised, evidence, other):
+            for run in _select_recognised(recognised, evidence, other):
                 variants[str(len(labels))] = (tuple(span.label.phone for span in run),)
                 labels.append((run[0].label.word, run[0].label.confidence))
         if word is not None and word.is_said:
@@ -280,7 +270,7 @@ def _corrected(
     return Timeline(tuple(spans))
 
 
-def phones_in_time(
+def align_or_recognise(
     phones: Recogniser,
     audio: Audio,
     features: Features,
@@ -302,26 +292,31 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
 
     corrected : whether what is said instead is recognised
     """
+    places = f"at {format_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
     if fit.is_doubtful:
+        why = f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
+        if fit.evidence is not None:
+            said = sum(word.is_said for word in fit.evidence.words)
+            why = f"{said} of its {len(fit.evidence.words)} words are heard"
         LOG.warning(
             "the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out",
-            *(_judgement(fit), f" or to leave out words {_places(fit)}" if fit.missing else ""),
+            *(why, f" or to leave out words {places}" if fit.missing else ""),
             "the sound is recognised instead: " if corrected else "",
         )
         return
     if fit.unsaid:
-        named = [f"{shortened(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MOST_STRETCHES]]
-        more = len(fit.unsaid) - MOST_STRETCHES
+        words = [f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES]]
+        more = len(fit.unsaid) - MAX_STRETCHES
         LOG.warning(
             "the transcript seems to have words that are not said: %s%s%s; correct it",
-            *(", ".join(named), f" and {more} more" if more > 0 else ""),
+            *(", ".join(words), f" and {more} more" if more > 0 else ""),
             ", which are left out" if corrected else "",
         )
     if fit.missing:
         done = "what is said there is recognised" if corrected else "the lips are wrong there"
         LOG.warning(
             "the transcript seems to leave out words %s: %s; add the words, or leave the whole transcript out",
-            *(_places(fit), done),
+            *(places, done),
         )
 
 
@@ -335,50 +330,34 @@ def warn_of_label_misfit(fit: TranscriptFit, filled: bool) -> None:
     for problem, places in problems.items():
         if places:
             done = "; what is said there is recognised" if filled and places is fit.missing else ""
-            LOG.warning("the units %s at %s%s; correct them, or leave them out", problem, named_places(places), done)
+            LOG.warning("the units %s at %s%s; correct them, or leave them out", problem, format_places(places), done)
 
 
-def named_places(places: Sequence[tuple[float, float]]) -> str:
+def format_places(places: Sequence[tuple[float, float]]) -> str:
     """Return the longest of some stretches of time, for a message."""
-    longest = sorted(places, key=lambda place: place[0] - place[1])[:MOST_STRETCHES]
+    longest = sorted(places, key=lambda place: place[0] - place[1])[:MAX_STRETCHES]
     named = ", ".join(f"{start_s:.1f} to {end_s:.1f} s" for start_s, end_s in sorted(longest))
-    more = len(places) - MOST_STRETCHES
+    more = len(places) - MAX_STRETCHES
     return named + (f" and at {more} more places" if more > 0 else "")
-
-
-def _judgement(fit: TranscriptFit) -> str:
-    """Return why a transcript is doubtful: value found, value required."""
-    if fit.evidence is not None:
-        said = sum(word.is_said for word in fit.evidence.words)
-        return f"{said} of its {len(fit.evidence.words)} words are heard"
-    return f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
-
-
-def _places(fit: TranscriptFit) -> str:
-    """Return where words are missing, the longest stretches, and how much of the speech that is, for a message."""
-    return f"at {named_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
 
 
 def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:
     """Return whether words seem to be of another language than their lexicon."""
     unknown = [word for word in words if not lexicon.known(word)]
-    return len({*unknown}) >= LEAST_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
+    return len({*unknown}) >= MIN_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
 
 
-def guesses(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
-    """Return the first ``MOST_WARNINGS`` words whose pronunciation is a guess, with it."""
-    return {word: lexicon.pronunciations(word)[0] for word in _unknown(words, lexicon)[:MOST_WARNINGS]}
-
-
-def _unknown(words: Sequence[str], lexicon: Lexicon) -> list[str]:
-    return [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+def guess_pronunciations(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
+    """Return the first ``MAX_WARNINGS`` words whose pronunciation is a guess, with it."""
+    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+    return {word: lexicon.pronunciations(word)[0] for word in unknown[:MAX_WARNINGS]}
 
 
 def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
-    """Log a warning for every word whose pronunciation is a guess; after ``MOST_WARNINGS``, for how many more."""
-    for word, guessed in guesses(words, lexicon).items():
-        told = map(shortened, (word, " ".join(guessed)))
-        LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *told)
-    more = len(_unknown(words, lexicon)) - MOST_WARNINGS
+    """Log a warning for every word whose pronunciation is a guess; after ``MAX_WARNINGS``, for how many more."""
+    for word, guess in guess_pronunciations(words, lexicon).items():
+        shown = map(shorten, (word, " ".join(guess)))
+        LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *shown)
+    more = sum(not lexicon.known(word) for word in dict.fromkeys(words)) - MAX_WARNINGS
     if more > 0:
         LOG.warning("%d more words are not in the dictionary; a lexicon file can say better", more)
