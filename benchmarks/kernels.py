@@ -55,10 +55,10 @@ def mlpg(options: Any) -> Work:
     """Return the work: trajectory and variance of every frame (the peers compute no variance)."""
     import numba  # noqa: F401  (loaded: so the compiled form is taken at once)
 
-    from lipmotion.kernels.banded import generate
+    from lipmotion.kernels.banded import solve_mlpg
 
     mean, precision = (np.ascontiguousarray(a.transpose(1, 0, 2)) for a in _harness("get")(options))
-    return lambda: generate(mean, precision)[0]
+    return lambda: solve_mlpg(mean, precision)[0]
 
 
 def em(options: Any) -> Work:
@@ -166,8 +166,8 @@ import time, numpy as np
 start = time.perf_counter()
 import numba
 imported = time.perf_counter()
-from lipmotion.kernels.banded import generate
-generate(np.ones((3, 3, 2)), np.ones((3, 3, 2)))
+from lipmotion.kernels.banded import solve_mlpg
+solve_mlpg(np.ones((3, 3, 2)), np.ones((3, 3, 2)))
 print(imported - start, time.perf_counter() - imported)
 """
     environment = os.environ | {"PYTHONPATH": str(HERE.parent / "src")}

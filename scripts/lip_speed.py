@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import lipmotion
-from lipmotion.motion.resample import resample_to_model
+from lipmotion.motion.space import resample_to_model
 from lipmotion.speech.features.lip_speed import (
     FRAME_OFFSETS,
     STATIC_FEATURES,

@@ -110,7 +110,7 @@ def short_training() -> Iterator[None]:
     """The toy's motion follows so simply from its sound that a third of the steps of one network are enough."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(posterior_network, "STEPS", posterior_network.STEPS / 3)
-        patched.setattr(posterior_network, "_trained_recurrent", lambda *_: None)
+        patched.setattr(posterior_network, "_train_recurrent", lambda *_: None)
         yield
 
 

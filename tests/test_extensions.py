@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.cli.terminal.status import outcome
-from lipmotion.corpora.discover import READERS
+from lipmotion.corpora.folder import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry, install_command

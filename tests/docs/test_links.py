@@ -90,7 +90,7 @@ def test_named_files_of_the_source_exist() -> None:
 def test_no_page_uses_a_former_name_of_an_option() -> None:
     configurations = [ENGINES.load(name).Config for name in ENGINES.built_in]
     present = {field.name for config in configurations for field in fields(config)}
-    former = {old for config in configurations for old in config.former} - present - {*ENGINES.built_in}
+    former = {old for config in configurations for old in config.aliases} - present - {*ENGINES.built_in}
     assert {"listens", "follows", "full_range", "crosses", "recognises"} <= former
     setting = re.compile(rf"`(?:--set )?({'|'.join(sorted(former))})`|\b({'|'.join(sorted(former))}) ?= ?\w")
     found = {

@@ -85,7 +85,7 @@ FORMER = {
 def test_former_names_of_options_are_understood() -> None:
     for name, values in FORMER.items():
         config = engine_named(name, values).config
-        assert [getattr(config, config.former[option]) for option in values] == list(values.values())
-        assert set(values) == set(config.former)
+        assert [getattr(config, config.aliases[option]) for option in values] == list(values.values())
+        assert set(values) == set(config.aliases)
         settings = [f"{option}={value}" for option, value in values.items()]
         assert engine_from_settings(name, settings=settings).config == config

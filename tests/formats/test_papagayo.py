@@ -16,7 +16,7 @@ from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.papagayo import UNKNOWN
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units.mouth_chart import SHAPES
+from lipmotion.units.visemes import SHAPES
 
 Word = tuple[str, int, int, list[tuple[int, str]]]
 

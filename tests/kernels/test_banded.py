@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.kernels import banded
-from lipmotion.kernels.banded import generate, normal_equations, pin, solve
+from lipmotion.kernels.banded import normal_equations, pin, solve, solve_mlpg
 from oracles import trajectories
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -105,10 +105,10 @@ def forms(monkeypatch, compute) -> list:
 def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
     pytest.importorskip("numba")
     mean, precision = statistics(frames, frames, channels)
-    plain, fast = forms(monkeypatch, lambda: generate(mean, precision))
+    plain, fast = forms(monkeypatch, lambda: solve_mlpg(mean, precision))
     assert np.array_equal(plain, fast)
     pins = {(frames // 2, 0): 0.5, (frames - 1, channels - 1): -1.0}
-    plain, fast = forms(monkeypatch, lambda: generate(mean, precision, pins))
+    plain, fast = forms(monkeypatch, lambda: solve_mlpg(mean, precision, pins))
     assert np.array_equal(plain, fast)
 
 
@@ -120,7 +120,7 @@ def test_solutions_have_the_shape_of_the_system_where_there_is_nothing_in_it(sha
 
 def test_pins_have_no_variance():
     mean, precision = statistics(6, 8)
-    values, variance = generate(mean, precision, {(3, 1): 0.25})
+    values, variance = solve_mlpg(mean, precision, {(3, 1): 0.25})
     assert values[3, 1] == 0.25
     assert variance[3, 1] == 0
     assert (np.delete(variance[:, 1], 3) > 0).all()

@@ -12,7 +12,7 @@ import pytest
 from children import environment, run_child
 from kernels.networks import network_posteriors, phone_loop
 from lipmotion.kernels import compiler
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.kernels.compiler import compiled
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
@@ -61,7 +61,7 @@ def sequences() -> list[np.ndarray]:
         found += network_posteriors(random.normal(-20, 4, (3, len(arrays["emission"]))).astype(kind), **arrays)
     log_emission, moves = random.normal(0, 3, (5, 2, 3)), np.log(random.uniform(0.2, 0.8, (2, 2, 3)))
     found += chain_posteriors(log_emission, *moves, np.array([5, 4]), np.array([3, 2]))
-    found += generate(*random.uniform(0.5, 1, (2, 4, 3, 2)))
+    found += solve_mlpg(*random.uniform(0.5, 1, (2, 4, 3, 2)))
     return found
 
 

@@ -38,7 +38,7 @@ def example_in_conditions(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tupl
 def trained() -> AcousticNetwork:
     """A small network."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(acoustic_network, "LEAST_STEPS", 60)
+    patch.setattr(acoustic_network, "MIN_STEPS", 60)
     patch.setattr(acoustic_network, "BATCH_SIZE", 4)
     examples, values = zip(*(example_in_conditions(seed, (1.0, 0.8, 1.25)) for seed in range(6)), strict=True)
     result = AcousticNetwork.fit(PredictorTraining(examples, values, 2)).predictor
@@ -94,7 +94,7 @@ def test_a_stopped_training_goes_on_from_its_checkpoint(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     checkpoint = Checkpoint(tmp_path_factory.mktemp("work"), "job")
-    monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 2)
+    monkeypatch.setattr(acoustic_network, "MIN_STEPS", 2)
     examples, values = zip(*(example_in_conditions(seed) for seed in range(2)), strict=True)
     training = PredictorTraining(examples, values, 2, checkpoint=checkpoint)
     first = AcousticNetwork.fit(training).predictor.arrays()

@@ -19,7 +19,7 @@ from lipmotion.motion.articulation import (
     trace_articulators,
 )
 from lipmotion.motion.space import fit_reduced_motion
-from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.stats.curves import with_dynamics
 from lipmotion.testing.examples import examples, timeline
 
 OPENING, WIDTH = ARTICULATORS.index("opening"), ARTICULATORS.index("width")
@@ -80,19 +80,19 @@ def test_unknown_contexts_follow_the_table_and_unreliable_phones_do_not(prior: A
     def statistics(chosen: slice) -> tuple[np.ndarray, np.ndarray]:
         return own[chosen].copy(), own[chosen].copy()
 
-    followed, precisions = prior.blended(statistics, units, frames, 1.0)(slice(0, frames))
+    followed, precisions = prior.blend(statistics, units, frames, 1.0)(slice(0, frames))
     table = with_dynamics(prior.trajectory(units, frames))
     share = (followed - own)[100, 0] / (table - own)[100, 0]
     np.testing.assert_allclose(share, share[0])
     assert 0.7 < share[0] < 0.9
     np.testing.assert_allclose(precisions, own)
-    ignored, _ = prior.blended(statistics, units, frames, 0.0)(slice(0, frames))
+    ignored, _ = prior.blend(statistics, units, frames, 0.0)(slice(0, frames))
     np.testing.assert_allclose(ignored, own)
     beside = replace(prior, known_voice_share=0.3)
-    unknown_voice, _ = beside.blended(statistics, units, frames, 1.0, voice=0.0)(slice(0, frames))
+    unknown_voice, _ = beside.blend(statistics, units, frames, 1.0, voice=0.0)(slice(0, frames))
     np.testing.assert_allclose(unknown_voice, followed)
-    measure_voice_similarity, _ = beside.blended(statistics, units, frames, 1.0)(slice(0, frames))
-    less = (measure_voice_similarity - own)[100, 0] / (table - own)[100, 0]
+    known_voice, _ = beside.blend(statistics, units, frames, 1.0)(slice(0, frames))
+    less = (known_voice - own)[100, 0] / (table - own)[100, 0]
     np.testing.assert_allclose(less / (1 - less), 0.3 * share / (1 - share))
 
 

@@ -48,15 +48,15 @@ def test_each_dimension_has_its_own_filter_without_delay() -> None:
 
 def test_its_strength_is_between_nothing_and_all_of_it() -> None:
     plain, whole = GENERATED[0], FILTER.apply(GENERATED[0])
-    assert FILTER.of_strength(0).apply(plain) == pytest.approx(plain)
-    assert FILTER.of_strength(0.5).apply(plain) == pytest.approx((plain + whole) / 2)
-    assert FILTER.of_strength(2).apply(plain) == pytest.approx(2 * whole - plain)
+    assert FILTER.scale_to(0).apply(plain) == pytest.approx(plain)
+    assert FILTER.scale_to(0.5).apply(plain) == pytest.approx((plain + whole) / 2)
+    assert FILTER.scale_to(2).apply(plain) == pytest.approx(2 * whole - plain)
 
 
 def test_dimensions_may_have_strengths_of_their_own() -> None:
-    some = FILTER.of_strength(np.array([0.0, 2.0]))
+    some = FILTER.scale_to(np.array([0.0, 2.0]))
     assert some.apply(GENERATED[0])[:, 0] == pytest.approx(GENERATED[0][:, 0])
-    assert some.taps[:, 1] == pytest.approx(FILTER.of_strength(2).taps[:, 1])
+    assert some.taps[:, 1] == pytest.approx(FILTER.scale_to(2).taps[:, 1])
 
 
 def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wanted() -> None:
@@ -67,7 +67,7 @@ def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wa
     noisy, freed = fit_modulation_filter(values, smooth), fit_modulation_filter(values, smooth, noise)
     found = learn_filter(0.5, zip(values, smooth, strict=True), training, values)
     assert found is not None
-    errors = [np.abs(found.taps - each.of_strength(0.5).taps).max() for each in (noisy, freed)]
+    errors = [np.abs(found.taps - each.scale_to(0.5).taps).max() for each in (noisy, freed)]
     assert errors[1] < 0.1 * errors[0]
     nothing = learn_filter(1.0, [], training, values)
     assert nothing is not None

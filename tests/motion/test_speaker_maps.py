@@ -204,10 +204,10 @@ def test_an_unknown_name_lists_the_others() -> None:
 def test_channels_in_another_order() -> None:
     _, maps = both(anna(), ben())
     person = maps.of("ben")
-    turned = person.ordered(person.channels[::-1])
+    turned = person.reorder(person.channels[::-1])
     np.testing.assert_allclose(turned.gain, person.gain[::-1])
     with pytest.raises(InputError, match="'jaw'"):
-        person.ordered((Channel("jaw"),))
+        person.reorder((Channel("jaw"),))
 
 
 def test_habits_are_what_is_left_in_each_viseme() -> None:

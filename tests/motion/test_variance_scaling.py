@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.engines import engine_named
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.variance_scaling import LARGEST_FACTOR, VarianceScaling
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin
@@ -17,8 +17,8 @@ def test_the_trajectory_grows_about_rest_and_its_variance_with_it():
     draw = np.random.default_rng(0)
     means, precisions = draw.normal(size=(40, 3, 2)), draw.uniform(1, 9, (40, 3, 2))
     gain, rest = np.array([1.5, 1.0]), np.array([0.3, -1.0])
-    plain, variance = generate(means, precisions)
-    large, larger_variance = generate(*VarianceScaling(gain, rest).apply(means, precisions))
+    plain, variance = solve_mlpg(means, precisions)
+    large, larger_variance = solve_mlpg(*VarianceScaling(gain, rest).apply(means, precisions))
     assert large == pytest.approx(rest + gain * (plain - rest))
     assert larger_variance == pytest.approx(variance * gain * gain)
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, animate
-from lipmotion.articulation.pauses import LAUGH_GAP
+from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.pipeline.outputs.deliver import deliver
 from lipmotion.pipeline.request import Request
 from lipmotion.types import Delivery
-from lipmotion.types.voice_event import LAUGHTER
+from lipmotion.types.audio import LAUGHTER
 from speech.made_voices import laugh, pulses, recording, said, vowels
 
 

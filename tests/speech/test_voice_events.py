@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.speech.features.voice_events import voice_events, without_laughter
 from lipmotion.types import Audio, Timeline, Unit
-from lipmotion.types.voice_event import BREATH, LAUGHTER, SHOUT, WHISPER
+from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from speech.made_voices import RATE_HZ, laugh, noise, pulses, recording, said, vowels
 
 

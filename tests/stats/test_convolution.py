@@ -23,7 +23,7 @@ def test_gradients_are_those_of_differences() -> None:
     network = make_network(3, 5, 2, (1, 2), seed=1)
     batch, weights = [sequence(9), sequence(6, 1)], np.array([0.3, 0.7], np.float32)
     batch[0].valid[2] = False
-    _, gradients = network_training._gradients(network, batch, weights, 0.0, 0)
+    _, gradients = network_training._differentiate(network, batch, weights, 0.0, 0)
     arrays = [array for layer in (*network.layers, network.output) for array in layer]
     rng = np.random.default_rng(0)
     differences, slopes = [], []
@@ -35,7 +35,7 @@ def test_gradients_are_those_of_differences() -> None:
             errors = []
             for value in (before + step, before - step):
                 array[index] = value
-                errors.append(network_training._gradients(network, batch, weights, 0.0, 0)[0])
+                errors.append(network_training._differentiate(network, batch, weights, 0.0, 0)[0])
             array[index] = before
             differences.append((errors[0] - errors[1]) / (2 * step))
             slopes.append(float(gradient[index]))
@@ -93,6 +93,6 @@ def test_steps_that_do_not_count_are_not_learned() -> None:
     valid[10:20] = False
     network = make_network(3, 5, 2, (1,), seed=1)
     weights = np.full(2, 0.5, np.float32)
-    good, _ = network_training._gradients(network, [TrainingSequence(x, y, valid)], weights, 0.0, 0)
-    bad, _ = network_training._gradients(network, [TrainingSequence(x, broken, valid)], weights, 0.0, 0)
+    good, _ = network_training._differentiate(network, [TrainingSequence(x, y, valid)], weights, 0.0, 0)
+    bad, _ = network_training._differentiate(network, [TrainingSequence(x, broken, valid)], weights, 0.0, 0)
     assert bad == pytest.approx(good)

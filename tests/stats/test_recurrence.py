@@ -28,7 +28,7 @@ def test_gradients_are_those_of_differences() -> None:
     network, weights = make_recurrent_network(2, 4, 2, 2, seed=1), np.array([0.3, 0.7], np.float32)
     batch = [sequence(9), sequence(6, 1)]
     batch[0].valid[2] = False
-    _, gradients = network_training._gradients(network, batch, weights, 0.0, 0)
+    _, gradients = network_training._differentiate(network, batch, weights, 0.0, 0)
     rng = np.random.default_rng(0)
     for array, gradient in zip(network.parameters, gradients, strict=True):
         assert gradient.shape == array.shape
@@ -36,14 +36,14 @@ def test_gradients_are_those_of_differences() -> None:
             before, errors = array[index], []
             for value in (before + 5e-3, before - 5e-3):
                 array[index] = value
-                errors.append(network_training._gradients(network, batch, weights, 0.0, 0)[0])
+                errors.append(network_training._differentiate(network, batch, weights, 0.0, 0)[0])
             array[index] = before
             assert (errors[0] - errors[1]) / 1e-2 == pytest.approx(float(gradient[index]), abs=1e-3)
 
 
 def test_dropped_units_have_no_gradient() -> None:
     network, weights = make_recurrent_network(2, 4, 2, 2, seed=1), np.ones(2, np.float32)
-    _, gradients = network_training._gradients(network, [sequence(9)], weights, 1 - 1e-6, 0)
+    _, gradients = network_training._differentiate(network, [sequence(9)], weights, 1 - 1e-6, 0)
     assert not any(gradient.any() for gradient in gradients[:-1])
     assert gradients[-1].any()
 

@@ -22,8 +22,8 @@ class Example(Configuration):
     on: bool = True
     free: str = "anything"
 
-    former: ClassVar[Mapping[str, str]] = {"how_many": "count"}
-    gone: ClassVar[Mapping[str, Any]] = {"steps": 0}
+    aliases: ClassVar[Mapping[str, str]] = {"how_many": "count"}
+    removed: ClassVar[Mapping[str, Any]] = {"steps": 0}
     hints: ClassVar[Mapping[str, str]] = {"amount": "say count"}
 
 

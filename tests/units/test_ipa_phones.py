@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.units import LIP_CLOSING, PHONES
-from lipmotion.units.classes import CLASSES
 from lipmotion.units.ipa_phones import IPA_PHONES, VOWEL_CHART, is_mark, read_ipa, read_tokens
+from lipmotion.units.phones import CLASSES
 
 SPOKEN = set(PHONES) - {"sil", "sp"}
 

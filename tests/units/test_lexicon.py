@@ -1,3 +1,5 @@
+"""Words that are in no dictionary are read by a network, where it is installed, else by rules."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -6,7 +8,7 @@ import pytest
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.units import PHONES, Lexicon, lexicon
-from lipmotion.units.lexicon import LARGEST_LEXICON_BYTES, LONGEST_LINE, MAX_LINES, MOST_VARIANTS
+from lipmotion.units.lexicon import LARGEST_LEXICON_BYTES, LONGEST_LINE, MAX_LINES, MAX_VARIANTS, pronounce_by_network
 
 
 def said(word: str, lexicon: Lexicon | None = None) -> list[str]:
@@ -182,7 +184,7 @@ def test_the_dictionary_is_searched_as_if_line_by_line() -> None:
     [
         ("bim B IH M\n" + "bim B" + " B" * LONGEST_LINE, "line 2: 4005 characters, required at most 2000; write one"),
         (
-            "bim B IH M\n" * (MOST_VARIANTS + 1),
+            "bim B IH M\n" * (MAX_VARIANTS + 1),
             "line 33: more than 32 pronunciations of 'bim'; keep those that are said",
         ),
         ("\n" * MAX_LINES, "1048577 lines, required at most 1048576; keep the words that are said"),
@@ -206,3 +208,23 @@ def test_the_whole_dictionary_can_be_a_user_s_file(lexicon_file: Path) -> None:
 
 def test_without_a_full_vowel_the_second_vowel_keeps_its_stress() -> None:
     assert Lexicon().pronunciations("abducted")[1] == ("ax", "b", "d", "ah", "k", "t", "ix", "d")
+
+
+def test_a_made_up_word_is_read_as_people_read_it() -> None:
+    pytest.importorskip("hama.inference")
+    assert Lexicon().pronunciations("lipmotion") == (tuple("l ih p m ow sh ax n".split()),)
+    assert Lexicon().pronunciations("lípmotion") == Lexicon().pronunciations("lipmotion")
+    assert pronounce_by_network("abc" * 20) == ()
+    with pytest.raises(InputError, match="cannot guess"):
+        Lexicon().pronunciations("лип")
+
+
+def test_without_the_network_rules_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lexicon, "find_spec", lambda _: None)
+    lexicon._network.cache_clear()
+    pronounce_by_network.cache_clear()
+    try:
+        assert Lexicon().pronunciations("lipmotion") == (tuple("l ih p m aa sh ax n".split()),)
+    finally:
+        lexicon._network.cache_clear()
+        pronounce_by_network.cache_clear()

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.units import PHONES, SIMILAR_PHONES, find_similar_phone, is_silent
+from lipmotion.units import PHONES, SIMILAR_PHONES, VISEMES, find_similar_phone, is_silent
 
 SPOKEN = tuple(phone for phone in PHONES if not is_silent(phone))
 VOWELS = frozenset("aa ae ah ao aw ax axr ay eh er ey ih ix iy ow oy uh uw el em en".split())
@@ -38,3 +38,27 @@ def test_vowels_stand_in_for_vowels() -> None:
     for phone in UNSAID_IN_GRID:
         chosen = find_similar_phone(phone, [other for other in SPOKEN if other not in UNSAID_IN_GRID])
         assert (chosen in VOWELS) == (phone in VOWELS)
+
+
+TABLE_1 = """
+sip sil sp
+lr1 ao aa ah er oy aw hh
+lr2 uw uh ow em
+lr3 ae eh ey ay
+lr4 ih iy ax axr ix
+as  l el r y
+af  s z
+al  t d n en
+pa  sh zh ch jh
+bi  p b m
+de  th dh
+ld  f v
+ve  ng k g w
+"""
+"""Xie & Liu 2007, Table 1, copied from the paper line by line."""
+
+
+def test_the_visemes_are_those_of_the_paper() -> None:
+    printed = {line.split()[0]: tuple(line.split()[1:]) for line in TABLE_1.strip().splitlines()}
+    assert printed == VISEMES
+    assert len(VISEMES) == 13

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.units.sentences import LONGEST_SENTENCE, LONGEST_WORD, MOST_CHARACTERS, clean_text, split_sentences
+from lipmotion.units.sentences import LONGEST_SENTENCE, LONGEST_WORD, MAX_CHARACTERS, clean_text, split_sentences
 from lipmotion.units.text_normalisation import find_words
 
 
@@ -60,7 +60,7 @@ def test_what_cannot_be_said() -> None:
         (" \t\n", "holds no word"),
         ("... 🙂 !", "holds no word"),
         ("x" * (LONGEST_WORD + 1), "a word of 201 characters .*required at most 200"),
-        ("a " * MOST_CHARACTERS, "has 100000 characters, required at most 50000, about an hour of speech"),
+        ("a " * MAX_CHARACTERS, "has 100000 characters, required at most 50000, about an hour of speech"),
     ):
         with pytest.raises(InputError, match=message):
             split_sentences(text)

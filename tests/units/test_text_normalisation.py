@@ -6,9 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.errors import InputError
-from lipmotion.units import split_words
-from lipmotion.units.spelling import MOST_MARKS, normalise_text
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.units import check_phones, check_text, check_words, split_words
+from lipmotion.units.spelling import MAX_MARKS, normalise_text
+from lipmotion.units.text_normalisation import (
+    ALWAYS_ALLOWED_CHARACTERS,
+    ALWAYS_ALLOWED_PHONES,
+    CHARACTERS_PER_S,
+    PHONES_PER_S,
+)
 from lipmotion.units.written_forms import ONES, SCALES, TENS, spell_number
 
 
@@ -111,10 +117,40 @@ def test_a_letter_keeps_thirty_marks() -> None:
     """More would be sorted, which takes the square of the time; half-width and Tibetan marks hide what they are."""
     for mark in ("\u0301", "\u0316\u0301", "\u0f73", "\uff9e"):
         many = "a" + mark * 200_000
-        kept = "a" + (mark * 200_000)[:MOST_MARKS]
+        kept = "a" + (mark * 200_000)[:MAX_MARKS]
         assert normalise_text(many) == unicodedata.normalize("NFKC", kept)
         assert normalise_text("e\u0301" * 100) == "é" * 100
 
 
 def test_numbers_of_any_length_are_digits() -> None:
     assert split_words("7" * 10_000) == ("seven",) * 10_000
+
+
+def test_a_text_may_be_as_long_as_can_be_said() -> None:
+    for duration_s in (0.0, 1.0, 3600.0):
+        most = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
+        check_text("a" * most, duration_s)
+        with pytest.raises(
+            AlignmentError, match=f"has {most + 1} characters, required at most {most} for {duration_s:.2f} s"
+        ):
+            check_text("a" * (most + 1), duration_s)
+
+
+def test_words_count_with_the_blanks_between_them() -> None:
+    check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2), 0.0)
+    with pytest.raises(AlignmentError, match=f"has {ALWAYS_ALLOWED_CHARACTERS + 2} characters"):
+        check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2 + 1), 0.0)
+    with pytest.raises(AlignmentError, match="give the words of this recording"):
+        check_words(["a" * ALWAYS_ALLOWED_CHARACTERS], 0.0)
+
+
+def test_the_fastest_speech_on_record_fits() -> None:
+    """655 words a minute, of six characters and a blank, for an hour."""
+    check_text("strong " * 655 * 60, 3600.0)
+
+
+def test_phones_are_no_more_than_frames() -> None:
+    most = ALWAYS_ALLOWED_PHONES + 2 * PHONES_PER_S
+    check_phones(most, 2.0)
+    with pytest.raises(InputError, match=f"{most + 1} units in time, required at most {most} for 2.00 s of sound"):
+        check_phones(most + 1, 2.0)

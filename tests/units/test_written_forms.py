@@ -10,7 +10,7 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.units import Lexicon, find_words, group_words, split_words
 from lipmotion.units.text_normalisation import tokenise
-from lipmotion.units.written_forms import MOST_READINGS, list_readings
+from lipmotion.units.written_forms import MAX_READINGS, list_readings
 
 USUAL = (
     (
@@ -254,7 +254,7 @@ def test_a_form_has_few_readings_and_a_word_has_one() -> None:
     for text, _ in USUAL:
         for token in tokenise(text):
             found = list_readings(token)
-            assert 1 <= len(found) == len(set(found)) <= MOST_READINGS
+            assert 1 <= len(found) == len(set(found)) <= MAX_READINGS
             assert all(word == word.lower() and not any(map(str.isdecimal, word)) for said in found for word in said)
 
 

@@ -20,7 +20,9 @@ Rows = list[Any]
 """A row of each frame: an array of the channels [shape=(P,)], or a number."""
 
 
-def generate(mean: Array, precision: Array, pins: Mapping[tuple[int, int], float] | None = None) -> tuple[Array, Array]:
+def solve_mlpg(
+    mean: Array, precision: Array, pins: Mapping[tuple[int, int], float] | None = None
+) -> tuple[Array, Array]:
     """Return the most probable trajectory and its variance, both [shape=(T, P)].
 
     mean, precision : [shape=(T, 3, P)], of the static value, Δ = (-½, 0, ½) and Δ² = (1, -2, 1)
@@ -124,7 +126,7 @@ def _substituted(inverse: Rows, lower1: Rows, lower2: Rows, x: Rows) -> tuple[Ar
 
 @compiled
 def _generate(mean: Array, precision: Array) -> tuple[Array, Array]:
-    """Do what ``generate`` does, all channels in one loop, without storing the system."""
+    """Do what ``solve_mlpg`` does, all channels in one loop, without storing the system."""
     T, _, P = mean.shape
     values, variance, lower1, lower2, previous = _room(T, P)
     bands = np.empty((4, 1, P))

@@ -12,10 +12,9 @@ from lipmotion.motion.context_window import (
     acoustic_context_to_arrays,
     fit_acoustic_context,
 )
-from lipmotion.motion.fit import fit_motion
 from lipmotion.motion.frame_labels import with_unit_names
-from lipmotion.motion.generation import LearnedMotion
-from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
+from lipmotion.motion.generation import LearnedMotion, fit_motion
+from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 
 __all__ = [
     "LEARNED_MOTION_ARRAYS",

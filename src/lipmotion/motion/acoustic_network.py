@@ -25,7 +25,7 @@ from lipmotion.motion.network_steps import (
 )
 from lipmotion.motion.posterior_network import PosteriorNetwork, have_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
-from lipmotion.motion.reliability import rate_clearness
+from lipmotion.motion.rest import rate_clearness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 SHAPE = ConvolutionalShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
 """Its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
-LEAST_STEPS = 600
-"""Least number of optimiser steps: with few recordings, each is used more often."""
-LEAST_MOTION_S = 120.0
+MIN_STEPS = 600
+"""Smallest number of optimiser steps: with few recordings, each is used more often."""
+MIN_MOTION_S = 120.0
 """Seconds of measured motion from which on a network is trained."""
 POSTERIOR_SHARES = (0.85, 1.0)
 """Share of the network that knows posteriors, for a voice that training knows and for one that it does not. It is
@@ -62,7 +62,7 @@ class AcousticNetwork(Predictor):
     network   : its outputs are Q standardised dimensions of motion, and the distortion of the sound
     mean, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
     variances : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
-    beside    : the network that knows posteriors (None: no phone recogniser was installed in training)
+    posterior_network : the network that knows posteriors (None: no phone recogniser was installed in training)
     encoding  : the regression on the encoding of the sound, for other voices (None: a model of an earlier version)
     """
 
@@ -70,7 +70,7 @@ class AcousticNetwork(Predictor):
     mean: Array
     scale: Array
     variances: Array
-    beside: PosteriorNetwork | None = None
+    posterior_network: PosteriorNetwork | None = None
     encoding: EncodingRegression | None = None
     name: ClassVar[str] = "network"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS
@@ -79,7 +79,7 @@ class AcousticNetwork(Predictor):
     @classmethod
     def conditions(cls, motion_s: float, most: int) -> int:
         """Return all conditions, or 0 with too little motion for a network."""
-        return most if motion_s >= LEAST_MOTION_S else 0
+        return most if motion_s >= MIN_MOTION_S else 0
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
@@ -91,19 +91,19 @@ class AcousticNetwork(Predictor):
         examples = training.examples
         if not all(example.condition_spectra for example in examples):
             raise CorpusError(
-                f"examples without acoustic conditions; a network is trained on {LEAST_MOTION_S:g} s of measured "
+                f"examples without acoustic conditions; a network is trained on {MIN_MOTION_S:g} s of measured "
                 "motion or more, with the option conditions from 1"
             )
         mean, scale = measure_poses(training)
-        network = _trained(replace(training, monitor=sub_monitor(training.monitor, 0, 0.8)), mean, scale)
+        network = _train(replace(training, monitor=sub_monitor(training.monitor, 0, 0.8)), mean, scale)
         trained = cls(network, mean, scale, np.ones((3, len(mean))))
         predicted = (trained._predict(example.condition_spectra[0].values)[0] for example in examples)
         variances = measure_error_variances(training, predicted, scale)
         last = replace(training, monitor=sub_monitor(training.monitor, 0.8, 1))
-        beside = PosteriorNetwork.trained(last) if have_posteriors(examples) else None
+        posterior_network = PosteriorNetwork.train(last) if have_posteriors(examples) else None
         encoded = all(example.speech.encoding is not None for example in examples)
         encoding: Any = EncodingRegression.fit(training).predictor if encoded else None
-        return PredictorFit(cls(network, mean, scale, variances, beside, encoding))
+        return PredictorFit(cls(network, mean, scale, variances, posterior_network, encoding))
 
     def can_predict(self, speech: Speech) -> bool:
         """Return whether speech has a spectrum."""
@@ -117,8 +117,8 @@ class AcousticNetwork(Predictor):
         if speech.spectrum is None:
             raise InputError("the speech has no spectrum; an engine that uses one says so by ``inputs``")
         spectrum = speech.spectrum
-        motion, distortion = speech.once(self, lambda: self._predict(spectrum))
-        network, posteriors, strange = self.beside, speech.posteriors, unseen_share(speech.voice)
+        motion, distortion = speech.cached(self, lambda: self._predict(spectrum))
+        network, posteriors, strange = self.posterior_network, speech.posteriors, unseen_share(speech.voice)
         if network is not None and posteriors is not None:
             (known, unknown), (none, full) = POSTERIOR_SHARES, SURE_POSTERIORS
             sure = np.clip((posteriors.mean - none) / (full - none), 0, 1)
@@ -153,8 +153,10 @@ class AcousticNetwork(Predictor):
         hidden = self.network.hidden(stack_spectrum(speech.spectrum))
         output = self.network.output
         distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
-        if self.beside is not None and speech.posteriors is not None:
-            hidden = np.concatenate([hidden, self.beside.hidden_units(speech.posteriors, len(hidden))], axis=1)
+        if self.posterior_network is not None and speech.posteriors is not None:
+            hidden = np.concatenate(
+                [hidden, self.posterior_network.hidden_units(speech.posteriors, len(hidden))], axis=1
+            )
         return hidden, distortion
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -163,7 +165,7 @@ class AcousticNetwork(Predictor):
             name: array.astype(np.float16) for name, array in SHAPE.arrays(self.network).items()
         }
         arrays |= {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
-        for part in (self.beside, self.encoding):
+        for part in (self.posterior_network, self.encoding):
             arrays |= part.arrays() if part is not None else {}
         return arrays
 
@@ -173,17 +175,15 @@ class AcousticNetwork(Predictor):
         stored = check_arrays(arrays, TARGETS, Q=dimensions)
         mean, scale = stored["network_targets"]
         network = SHAPE.from_arrays(arrays, dimensions + 1)
-        found = not arrays.keys().isdisjoint(PosteriorNetwork.ARRAYS)
-        beside = PosteriorNetwork.from_arrays(arrays, dimensions) if found else None
         scale = check_scale(scale, "network_targets")
-        encoded = not arrays.keys().isdisjoint(EncodingRegression.ARRAYS)
-        encoding = EncodingRegression.from_arrays(arrays, dimensions) if encoded else None
-        return cls(network, mean, scale, stored["network_variances"], beside, encoding)
+        kinds: tuple[Any, Any] = (PosteriorNetwork, EncodingRegression)
+        inner = [None if arrays.keys().isdisjoint(k.ARRAYS) else k.from_arrays(arrays, dimensions) for k in kinds]
+        return cls(network, mean, scale, stored["network_variances"], *inner)
 
 
-def _trained(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
+def _train(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
     """Return the trained network; ``mean`` and ``scale`` standardise its targets."""
-    steps = max(training.epochs * -(-len(training.examples) // BATCH_SIZE), LEAST_STEPS)
+    steps = max(training.epochs * -(-len(training.examples) // BATCH_SIZE), MIN_STEPS)
 
     @cache
     def pieces() -> list[list[TrainingSequence]]:  # not needed where the network comes from its checkpoint
@@ -197,7 +197,7 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
         return cut_random_piece(versions[int(rng.integers(len(versions)))], rng)
 
     plan = TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED)
-    return SHAPE.trained(training, len(mean) + 1, draw, plan)
+    return SHAPE.train(training, len(mean) + 1, draw, plan)
 
 
 def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:

@@ -91,7 +91,7 @@ def motion_from_arrays(
     units : the name of the unit set; the set itself is in the arrays
     Raises KeyError, ValueError, IndexError, TypeError: an array is missing, or has a wrong shape, type or range.
     """
-    space = _space(arrays)
+    space = _restore_space(arrays)
     closure = None
     if OPENING in space.direct_names:
         stored = check_arrays(arrays, CLOSURE, Q=space.dimensions)
@@ -103,7 +103,11 @@ def motion_from_arrays(
         closure = Closure(int(column), float(closed), stored["closure_follow"])
     unit_set = PHONE_SET
     if units != PHONE_SET.name:
-        unit_set = UnitSet(units, _unit_of_phone(check_arrays(arrays, UNITS)["units"]))
+        pairs = check_arrays(arrays, UNITS)["units"]
+        unit_of_phone = {str(phone): str(unit) for phone, unit in pairs}
+        if len(unit_of_phone) != len(pairs):
+            raise ValueError("a phone with two units")
+        unit_set = UnitSet(units, unit_of_phone)
     return unit_set, space, closure, articulation_from_arrays(arrays, space.dimensions)
 
 
@@ -122,7 +126,7 @@ LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTIC
 """Names of the arrays of ``learned_motion_to_arrays``."""
 
 
-def _space(arrays: Arrays) -> MotionSpace:
+def _restore_space(arrays: Arrays) -> MotionSpace:
     stored = check_arrays(arrays, CHANNELS)
     count, direct = stored.sizes["P"], stored["direct"]
     channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
@@ -136,11 +140,3 @@ def _space(arrays: Arrays) -> MotionSpace:
     points = check_arrays(arrays, POINTS, R=count - len(direct))
     check_orthonormal("points_basis", points["points_basis"])
     return MotionSpace(channels, direct, Pca(points["points_mean"], points["points_basis"]))
-
-
-def _unit_of_phone(pairs: NDArray[Any]) -> dict[str, str]:
-    """Return the unit of every phone. Raises ValueError: a phone has two units."""
-    units = {str(phone): str(unit) for phone, unit in pairs}
-    if len(units) != len(pairs):
-        raise ValueError("a phone with two units")
-    return units

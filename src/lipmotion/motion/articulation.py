@@ -18,7 +18,7 @@ from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import with_neighbours
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import MotionSpace
-from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.stats.curves import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
 from lipmotion.units import PHONES, SILENCE, VOWELS, describe_unknown_phone, find_similar_phone, is_silent
@@ -48,7 +48,7 @@ GAIN = 2.0
 are wrong, so that all are drawn towards 0; of 1.3, 1.8 and 2.2, the largest was best for strangers."""
 RIDGE = 1e-2
 """Ridge parameter of the map from articulators to the motion space, as a share of the number of frames."""
-LEAST_DEVIATION = 1e-6
+MIN_DEVIATION = 1e-6
 TABLE_WEIGHT = 4.0
 """Weight of the table beside the means of states, in a context that training never saw."""
 TABLE_WEIGHT_WITH_PREDICTOR = 1.0
@@ -103,7 +103,7 @@ class ArticulationPrior:
         steps[is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), REST_S)] = 1
         return smooth_steps(steps)[:, 0]
 
-    def blended(
+    def blend(
         self,
         statistics: Callable[[slice], Statistics],
         units: Timeline[Unit],
@@ -124,11 +124,11 @@ class ArticulationPrior:
         weight = of_voice * self.weight * (np.asarray(reliability) * unknown) ** POWER
         share = (weight / (1 + weight))[:, None, None]
 
-        def drawn(chosen: slice) -> Statistics:
+        def predict(chosen: slice) -> Statistics:
             means, precisions = statistics(chosen)
             return means + share[chosen] * (slice_dynamics(values, chosen) - means), precisions
 
-        return drawn
+        return predict
 
 
 def slice_dynamics(values: Array, frames: slice) -> Array:
@@ -220,7 +220,13 @@ def fit_articulation_prior(
     """
     if OPENING not in space.direct_names:
         return None
-    poses = np.concatenate([x[_spoken(example)] for x, example in zip(values, examples, strict=True)])
+    spoken_poses = []
+    for x, example in zip(values, examples, strict=True):
+        spoken = np.zeros(len(x), bool)
+        for start_s, end_s in list_speech_intervals(example.speech.units):
+            spoken[int(np.ceil(start_s * FRAME_RATE_HZ)) : int(np.ceil(end_s * FRAME_RATE_HZ))] = True
+        spoken_poses.append(x[spoken & example.valid])
+    poses = np.concatenate(spoken_poses)
     if not len(poses):
         return None
     channels, _ = space.restore(poses, np.zeros_like(poses))
@@ -228,15 +234,15 @@ def fit_articulation_prior(
     known = [number for number, name in enumerate(ARTICULATORS) if name in measured]
     columns = np.stack([measured[ARTICULATORS[number]] for number in known], axis=1)
     centred = columns - columns.mean(axis=0)
-    own = np.maximum(columns.std(axis=0), LEAST_DEVIATION)
-    standard = centred / own
-    deviations = own
+    speaker = np.maximum(columns.std(axis=0), MIN_DEVIATION)
+    standard = centred / speaker
+    deviations = speaker
     if space.channels[space.direct[space.direct_names.index(OPENING)]].unit == EYE_DISTANCE:
-        deviations = np.sqrt(own * [TYPICAL_DEVIATIONS[number] for number in known])
+        deviations = np.sqrt(speaker * [TYPICAL_DEVIATIONS[number] for number in known])
     products = standard.T @ standard + RIDGE * len(poses) * np.eye(len(known))
     matrix = np.zeros((len(ARTICULATORS), poses.shape[1]))
     slopes = np.linalg.solve(products, standard.T @ (poses - poses.mean(axis=0)))
-    matrix[known] = slopes * (deviations / own)[:, None]
+    matrix[known] = slopes * (deviations / speaker)[:, None]
     for column, name in enumerate(space.direct_names):
         if name in ARTICULATORS:
             matrix[:, column] = 0
@@ -296,30 +302,18 @@ def _merged(phone: str) -> str:
     return SILENCE if is_silent(phone) else phone
 
 
-def _spoken(example: Example) -> NDArray[np.bool_]:
-    """Return the valid frames within speech [shape=(T,)]."""
-    spoken = np.zeros(len(example.valid), bool)
-    for start_s, end_s in list_speech_intervals(example.speech.units):
-        spoken[int(np.ceil(start_s * FRAME_RATE_HZ)) : int(np.ceil(end_s * FRAME_RATE_HZ))] = True
-    return spoken & example.valid
-
-
 def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:
     """Return the articulators that can be measured on motion, by name [each shape=(N,)].
 
     motion : values of all channels [shape=(N, P)]
     names  : of the channels
     """
-    column = {name: number for number, name in enumerate(names)}
-
-    def channel(name: str) -> Array:
-        return np.asarray(motion[:, column[name]], float)
-
-    found = {name: channel(name) for name in ARTICULATORS[:3] if name in column}
+    curves = {name: np.asarray(curve, float) for name, curve in zip(names, np.asarray(motion).T, strict=True)}
+    measured = {name: curves[name] for name in ARTICULATORS[:3] if name in curves}
     for name, (points, measure) in _MEASURES.items():
-        if all(point in column for point in points):
-            found[name] = measure(channel)
-    return found
+        if all(point in curves for point in points):
+            measured[name] = measure(curves.__getitem__)
+    return measured
 
 
 _Channel = Callable[[str], Array]

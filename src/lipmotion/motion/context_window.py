@@ -17,7 +17,7 @@ OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
 denser near it."""
 SCALE = 12.0
 """Root mean square length of a reduced feature vector: ridge parameters are relative to it."""
-LEAST_DEVIATION = 1e-3
+MIN_DEVIATION = 1e-3
 """Added to the standard deviation of every input, so that constant inputs can be standardised."""
 FEATURES = 39
 INPUTS = FEATURES * len(OFFSETS)
@@ -45,7 +45,7 @@ class AcousticContext:
 
         features : of the whole recording [shape=(T, D)]; beyond its ends, the first and last frame are repeated
         """
-        inputs = (_stacked(features, frames) - self.mean) / self.scale
+        inputs = (_stack(features, frames) - self.mean) / self.scale
         return np.asarray(inputs @ self.basis, np.float32)
 
 
@@ -57,7 +57,7 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     """
     count, total, products = 0, np.zeros(0), np.zeros(0)
     for features in recordings:
-        rows = _stacked(features, slice(None)).astype(float)
+        rows = _stack(features, slice(None)).astype(float)
         if not count:
             total, products = np.zeros(rows.shape[1]), np.zeros((rows.shape[1],) * 2)
         count += len(rows)
@@ -65,7 +65,7 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
         products += rows.T @ rows
     mean = total / count
     covariance = products / count - np.outer(mean, mean)
-    scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + LEAST_DEVIATION
+    scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + MIN_DEVIATION
     basis = np.ascontiguousarray(
         find_principal_axes(covariance / np.outer(scale, scale), size).T
     )  # stored in this order
@@ -91,7 +91,7 @@ def acoustic_context_from_arrays(arrays: CheckedArrays) -> AcousticContext:
     return AcousticContext(mean, scale, arrays["window_basis"])
 
 
-def _stacked(features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
+def _stack(features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
     """Return the features at ``OFFSETS`` around some frames, concatenated [shape=(N, D·len(OFFSETS))]."""
     centres = np.arange(len(features))[frames]
     indices = np.clip(centres[:, None] + np.array(OFFSETS), 0, len(features) - 1)

@@ -80,7 +80,7 @@ class EncodingRegression(Predictor):
         if speech.encoding is None:
             raise InputError("the speech has no encoding; an engine that uses one says so by ``inputs``")
         frames = len(speech.features.values)
-        return speech.once(self, lambda: self._predict(speech, frames)), np.zeros(frames)
+        return speech.cached(self, lambda: self._predict(speech, frames)), np.zeros(frames)
 
     def _predict(self, speech: Speech, frames: int) -> Array:
         steps = regressors_around(speech) @ self.coefficients.astype(float) + self.centre

@@ -4,30 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.kernels.banded import generate
-from lipmotion.motion.articulation import ArticulationPrior, unseen_share
-from lipmotion.motion.closure import REACH_S, Closure, choose_closed_frames, find_closable_ranges, is_never_negative
-from lipmotion.motion.limits import MotionLimits
-from lipmotion.motion.modulation_filter import ModulationFilter
-from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.unknown_voice import (
-    choose_closing_reach,
-    follow_encoding,
-    open_before_speech,
-    raise_contrast,
-    widen_range,
+from lipmotion.kernels.banded import solve_mlpg
+from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior, unseen_share
+from lipmotion.motion.closure import (
+    REACH_S,
+    Closure,
+    choose_closed_frames,
+    find_closable_ranges,
+    fit_closure,
+    is_never_negative,
 )
+from lipmotion.motion.limits import MotionLimits, measure_limits
+from lipmotion.motion.modulation_filter import ModulationFilter
+from lipmotion.motion.space import MotionSpace, fit_reduced_motion
+from lipmotion.motion.unseen_speaker import UnseenSpeaker, choose_closing_reach, widen_range
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
     Constraints,
+    Example,
     Motion,
     ReducedVariance,
     Timeline,
@@ -40,7 +41,7 @@ BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
 """Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are
 seconds away do not change the result, and the memory does not grow with the recording."""
 DOUBLE_FRAMES = 60_000
-"""The motion of recordings beyond ten minutes is kept in single precision."""
+"""The motion of recordings beyond ten minutes is in single precision."""
 
 Pins = dict[tuple[int, int], float]
 """Pinned values by frame and dimension of the motion space."""
@@ -78,7 +79,7 @@ class LearnedMotion:
         strength = np.full(self.space.dimensions, 1 - unseen_share(voice))
         if "width" in self.space.direct_names:
             strength[self.space.direct_names.index("width")] **= 2
-        return replace(self, modulation=self.modulation.of_strength(strength))
+        return replace(self, modulation=self.modulation.scale_to(strength))
 
     def generate(  # noqa: PLR0913
         self,
@@ -98,7 +99,7 @@ class LearnedMotion:
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
         Voices that training does not know part their lips to speak, follow the encoding of the sound, and have typical
-        talkers' range (``motion.unknown_voice``).
+        talkers' range (``motion.unseen_speaker``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -114,35 +115,19 @@ class LearnedMotion:
         pins = resolve_pins(constraints, self.space, frames)
         scaling, reach_s = self.scaling, REACH_S
         if self.prior is not None:
-            statistics = self.prior.blended(statistics, units, frames, reliability, voice)
+            statistics = self.prior.blend(statistics, units, frames, reliability, voice)
             if voice < 1 and scaling is not None and self.closure is not None:
-                reach_s = choose_closing_reach(voice)
-                statistics = raise_contrast(statistics, self.prior, units, frames, reliability, voice)
-                statistics = open_before_speech(statistics, self.prior, units, frames, reliability, voice)
+                speaker = UnseenSpeaker(self.prior, units, frames, reliability, voice)
+                statistics = speaker.raise_contrast(statistics)
+                statistics = speaker.open_before_speech(statistics)
                 if encoded is not None:
-                    statistics = follow_encoding(statistics, encoded, voice)
+                    statistics = speaker.follow_encoding(statistics, encoded)
                 gain = widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
-                scaling = scaling._replace(factors=scaling.factors * gain)
+                scaling, reach_s = scaling._replace(factors=scaling.factors * gain), choose_closing_reach(voice)
         ranges = find_closable_ranges(units, frames, closing_units, reach_s) if close else []
-        values, variance = self._generated(statistics, frames, ranges, pins, scaling)
-        return Motion(values, FRAME_RATE_HZ, self.space.channels), variance
-
-    def _generated(
-        self,
-        statistics: Callable[[slice], Statistics],
-        frames: int,
-        ranges: Sequence[slice],
-        pins: Pins,
-        scaling: VarianceScaling | None,
-    ) -> tuple[NDArray[np.floating[Any]], ReducedVariance]:
-        """Return values of all channels [shape=(T, P)] and their variance, block by block.
-
-        ranges : the frames of each p, b and m, of which one must be closed
-        """
-        space = self.space
-        precise = np.float32 if frames > DOUBLE_FRAMES else np.float64
-        motion = np.empty((frames, len(space.channels)), precise)
-        spread = np.empty((frames, space.dimensions), precise)
+        space, precision = self.space, np.float32 if frames > DOUBLE_FRAMES else np.float64
+        motion = np.empty((frames, len(space.channels)), precision)
+        spread = np.empty((frames, space.dimensions), precision)
         for inner, outer in split_into_blocks(frames):
             block_pins = {
                 (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
@@ -152,18 +137,46 @@ class LearnedMotion:
                 for closing in ranges
                 if outer.start <= closing.start and closing.stop <= outer.stop
             ]
-            predicted = statistics(outer)
-            if scaling is not None:
-                predicted = scaling.apply(*predicted)
-            result = _generated(self.closure, predicted, block_pins, block_ranges, self.modulation)
-            self.limits.check(result[0], self.closure, block_pins)
-            kept = slice(inner.start - outer.start, inner.stop - outer.start)
-            values, variance = (rows[kept] for rows in result)
-            motion[inner], _ = space.restore(values, variance)
-            spread[inner] = variance
+            predicted = statistics(outer) if scaling is None else scaling.apply(*statistics(outer))
+            values, variance = self._solve_block(predicted, block_pins, block_ranges)
+            self.limits.check(values, self.closure, block_pins)
+            inside = slice(inner.start - outer.start, inner.stop - outer.start)
+            motion[inner], _ = space.restore(values[inside], variance[inside])
+            spread[inner] = variance[inside]
         weights = [channel.unit == WEIGHT for channel in space.channels]
         motion[:, weights] = np.maximum(motion[:, weights], 0)
-        return motion, ReducedVariance(spread, space.mixing.astype(precise))
+        variances = ReducedVariance(spread, space.mixing.astype(precision))
+        return Motion(motion, FRAME_RATE_HZ, space.channels), variances
+
+    def _solve_block(self, statistics: Statistics, pins: Pins, ranges: Sequence[slice]) -> Statistics:
+        """Return values and variances of a block [each shape=(T, Q)], with the lips closed once in every range.
+
+        Where lips are to close, the opening is generated again with pins at the closed frames; the change of the
+        opening is added to all dimensions that the user did not pin, in the proportions of ``closure.follow``.
+        """
+        values, variance = solve_mlpg(*statistics, pins)
+        closed_frames: list[int] = []
+        if self.closure is not None:
+            column = self.closure.column
+            pinned = [frame for frame, dimension in pins if dimension == column]
+            frames = choose_closed_frames(self.closure, values[:, column], ranges, pinned)
+            if frames:
+                opening_pins = {(frame, 0): self.closure.closed for frame in frames}
+                opening_pins |= {(frame, 0): pins[frame, column] for frame in pinned}
+                opening = slice(column, column + 1)
+                means, precisions = (rows[:, :, opening] for rows in statistics)
+                closed, closed_variance = solve_mlpg(means, precisions, opening_pins)
+                follow = self.closure.follow.copy()
+                follow[[dimension for _, dimension in pins]] = 0
+                values += (closed - values[:, opening]) * follow
+                values[:, opening], variance[:, opening] = closed, closed_variance
+            closed_frames = [r.start + int(values[r, column].argmin()) for r in ranges]
+        if self.modulation is not None:
+            values = self.modulation.apply(values, closed_frames, pins)
+        if self.closure is not None:
+            opened = values[:, self.closure.column]
+            np.maximum(opened, 0, out=opened)  # a smooth curve through a closure may overshoot
+        return values, variance
 
 
 def resolve_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:
@@ -200,49 +213,15 @@ def split_into_blocks(frames: int) -> Iterator[tuple[slice, slice]]:
         yield slice(start, stop), slice(max(start - MARGIN_FRAMES, 0), min(stop + MARGIN_FRAMES, frames))
 
 
-def _generated(
-    closure: Closure | None,
-    statistics: Statistics,
-    pins: Pins,
-    ranges: Sequence[slice],
-    modulation: ModulationFilter | None,
-) -> Statistics:
-    """Return values and variances in the motion space [each shape=(T, Q)], with the lips closed in every range."""
-    values, variance = generate(*statistics, pins)
-    if closure is not None:
-        _close_lips(closure, ranges, statistics, pins, (values, variance))
-    if modulation is not None:
-        closed = [r.start + int(values[r, closure.column].argmin()) for r in ranges] if closure is not None else []
-        values = modulation.apply(values, closed, pins)
-    if closure is not None:
-        opening = values[:, closure.column]
-        np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
-    return values, variance
+def fit_motion(examples: Sequence[Example], components: int) -> tuple[LearnedMotion, list[NDArray[np.float64]]]:
+    """Return the learned motion of some examples, and the motion of each in the motion space [each shape=(T, Q)].
 
-
-def _close_lips(
-    closure: Closure,
-    ranges: Sequence[slice],
-    statistics: Statistics,
-    pins: Pins,
-    result: Statistics,
-) -> None:
-    """Change values and variances in place so that the lips meet once in every range of frames.
-
-    The opening is generated again with pins at the closed frames; the change of the opening is added to all dimensions
-    that the user did not pin, in the proportions of ``closure.follow``.
+    components : principal components that all point channels are reduced to
+    The limits are the extremes of the valid frames; there is no variance scaling.
+    Raises CorpusError: no example has valid motion, or the examples have different channels.
     """
-    values, variance = result
-    column = closure.column
-    pinned = [frame for frame, dimension in pins if dimension == column]
-    frames = choose_closed_frames(closure, values[:, column], ranges, pinned)
-    if not frames:
-        return
-    opening_pins = {(frame, 0): closure.closed for frame in frames}
-    opening_pins |= {(frame, 0): pins[frame, column] for frame in pinned}
-    opening = slice(column, column + 1)
-    closed, closed_variance = generate(statistics[0][:, :, opening], statistics[1][:, :, opening], opening_pins)
-    follow = closure.follow.copy()
-    follow[[dimension for _, dimension in pins]] = 0
-    values += (closed - values[:, opening]) * follow
-    values[:, opening], variance[:, opening] = closed, closed_variance
+    space, values = fit_reduced_motion(examples, components)
+    closure = fit_closure(space.direct_names, values, examples)
+    valid = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+    prior = fit_articulation_prior(space, values, examples)
+    return LearnedMotion(space, closure, measure_limits(valid), prior=prior), values

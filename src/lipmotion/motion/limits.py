@@ -28,7 +28,7 @@ NEGATIVE_SHARE = 0.05
 """Share of the span of the opening that may be negative where the opening is larger than ``PLAUSIBLE_OPENING``."""
 LARGEST_REST_DISTANCE = 3.0
 """Largest distance of the rest pose from the range of the poses, in spans of that range."""
-LEAST_SPAN = 1e-3
+MIN_SPAN = 1e-3
 """Smallest span of a dimension, as a share of its largest magnitude or of 1."""
 
 
@@ -84,11 +84,18 @@ def check_poses(limits: MotionLimits, space: MotionSpace, closure: Closure | Non
     for column, channel in enumerate(space.direct):
         check_magnitude(space.channels[channel], float(limits.low[column]), float(limits.high[column]))
     if space.points is not None:
-        largest, span = float(np.abs(space.points.mean).max()), float(limits.span[count:].max(initial=0.0))
-        if largest > max(PLAUSIBLE_OPENING, LARGEST_OFFSET * span):
-            raise ValueError(f"points_mean as large as {largest:g} of points that move by {span:g}")
+        largest, movement = float(np.abs(space.points.mean).max()), float(limits.span[count:].max(initial=0.0))
+        if largest > max(PLAUSIBLE_OPENING, LARGEST_OFFSET * movement):
+            raise ValueError(f"points_mean as large as {largest:g} of points that move by {movement:g}")
     if closure is not None:
-        _check_opening(float(limits.low[closure.column]), float(limits.high[closure.column]), closure.closed)
+        low, high = float(limits.low[closure.column]), float(limits.high[closure.column])
+        span, plausible = high - low, max(-low, high) <= PLAUSIBLE_OPENING
+        if not plausible and (low < -NEGATIVE_SHARE * span or low > LARGEST_EXCESS * span):
+            raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
+        if closure.closed > max(high + LARGEST_EXCESS * span, PLAUSIBLE_OPENING):
+            raise ValueError(
+                f"lips that are closed at {closure.closed:g}, with poses whose {OPENING} is {low:g} to {high:g}"
+            )
 
 
 def check_rest(rest: Array, limits: MotionLimits) -> None:
@@ -104,16 +111,7 @@ def check_rest(rest: Array, limits: MotionLimits) -> None:
 
 def _span(low: Array, high: Array) -> Array:
     """Return ``high - low``; at least a thousandth of the largest magnitude, or of 1."""
-    return np.maximum(high - low, LEAST_SPAN * np.maximum(np.maximum(np.abs(low), np.abs(high)), 1))
-
-
-def _check_opening(low: float, high: float, closed: float) -> None:
-    """Raise ValueError if the opening cannot be from ``low`` to ``high``, with lips closed at ``closed``."""
-    span = high - low
-    if max(-low, high) > PLAUSIBLE_OPENING and (low < -NEGATIVE_SHARE * span or low > LARGEST_EXCESS * span):
-        raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
-    if closed > max(high + LARGEST_EXCESS * span, PLAUSIBLE_OPENING):
-        raise ValueError(f"lips that are closed at {closed:g}, with poses whose {OPENING} is {low:g} to {high:g}")
+    return np.maximum(high - low, MIN_SPAN * np.maximum(np.maximum(np.abs(low), np.abs(high)), 1))
 
 
 def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
-from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
+from lipmotion.stats.curves import measure_modulation_spectrum
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule
 
@@ -24,8 +24,8 @@ REACH = 24
 """Frames before and after a frame that determine it."""
 HIGHEST_HZ, UNCHANGED_HZ = 12.5, 20.0
 """Frequencies up to which cameras of 25 Hz show movement, and from which on it is left as it is."""
-LEAST_GAIN, LARGEST_GAIN = 0.3, 6.0
-LEAST_SHARE = 0.02
+MIN_GAIN, MAX_GAIN = 0.3, 6.0
+MIN_SHARE = 0.02
 """At least this share of recorded power counts as movement, however strong the noise."""
 RESTING_MARGIN_S = 0.3
 """A mouth rests so far from speech, in seconds."""
@@ -45,7 +45,7 @@ class ModulationFilter(NamedTuple):
 
     taps: Array
 
-    def of_strength(self, strength: float | Array) -> ModulationFilter:
+    def scale_to(self, strength: float | Array) -> ModulationFilter:
         """Return a filter between none (0) and this one (1), or beyond it; a strength, or one of each dimension."""
         none = np.zeros_like(self.taps)
         none[REACH] = 1
@@ -89,7 +89,7 @@ def learn_filter(
     if not pairs:
         return fit_modulation_filter(values, values)
     recorded, generated = zip(*pairs, strict=True)
-    return fit_modulation_filter(recorded, generated, select_resting_motion(examples, values)).of_strength(strength)
+    return fit_modulation_filter(recorded, generated, select_resting_motion(examples, values)).scale_to(strength)
 
 
 def select_resting_motion(examples: Sequence[Example], values: Sequence[Array]) -> list[Array]:
@@ -97,12 +97,12 @@ def select_resting_motion(examples: Sequence[Example], values: Sequence[Array]) 
 
     values : motion of the examples in the motion space [each shape=(T, Q)]
     """
-    found = []
+    resting = []
     for example, x in zip(examples, values, strict=True):
         time_s, speech_s = np.arange(len(x)) / FRAME_RATE_HZ, list_speech_intervals(example.speech.units)
         far = example.valid & is_away_from_speech(time_s, speech_s, RESTING_MARGIN_S)
-        found += [x[start:stop] for start, stop in find_runs(far)]
-    return found
+        resting += [x[start:stop] for start, stop in find_runs(far)]
+    return resting
 
 
 def fit_modulation_filter(
@@ -113,37 +113,33 @@ def fit_modulation_filter(
     recorded, generated : motion of the same clips at 100 Hz [each shape=(T_i, Q)]
     resting : recorded motion in silence, ``RESTING_MARGIN_S`` from speech: noise [each shape=(N_i, Q)]
     """
-    frequencies, wanted = _spectrum(recorded)
-    _, made = _spectrum(generated)
+
+    def spectrum(clips: Sequence[NDArray[Any]]) -> tuple[Array, Array]:
+        return measure_modulation_spectrum([clip.astype(float) for clip in clips], FRAME_RATE_HZ)
+
+    frequencies, wanted = spectrum(recorded)
+    _, made = spectrum(generated)
     quiet = [clip for clip in resting if len(clip) > REACH]
     if sum(map(len, quiet)) >= RESTING_FRAMES:
-        noise = _spectrum(quiet)[1]
-        wanted = np.maximum(wanted - noise, LEAST_SHARE * wanted)
+        noise = spectrum(quiet)[1]
+        wanted = np.maximum(wanted - noise, MIN_SHARE * wanted)
     with np.errstate(divide="ignore", invalid="ignore"):
         gains = np.where(made > 0, np.sqrt(wanted / made), 1.0)
     shown = frequencies <= HIGHEST_HZ
-    logs = np.log(np.clip(gains[shown], LEAST_GAIN, LARGEST_GAIN))
+    logs = np.log(np.clip(gains[shown], MIN_GAIN, MAX_GAIN))
     padded = np.pad(logs, ((1, 1), (0, 0)), mode="edge")
     smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
-    return ModulationFilter(np.stack([_taps(frequencies[shown], column) for column in smooth.T], axis=1))
+    size, window = 256, np.hanning(2 * REACH + 3)[1:-1]  # the window method of filter design
+    grid, known = np.fft.rfftfreq(size, 1 / FRAME_RATE_HZ), np.array([0.0, *frequencies[shown], UNCHANGED_HZ])
+    columns = []
+    for log_gains in smooth.T:
+        response = np.fft.irfft(np.exp(np.interp(grid, known, np.array([0.0, *log_gains, 0.0]))), size)
+        taps = np.fft.fftshift(response)[size // 2 - REACH : size // 2 + REACH + 1] * window
+        columns.append(taps + (1 - taps.sum()) / window.sum() * window)
+    return ModulationFilter(np.stack(columns, axis=1))
 
 
-def _spectrum(clips: Sequence[NDArray[Any]]) -> tuple[Array, Array]:
-    return measure_modulation_spectrum([clip.astype(float) for clip in clips], FRAME_RATE_HZ)
-
-
-def _taps(frequencies: Array, log_gains: Array) -> Array:
-    """Return the symmetrical filter with given gains [shape=(2 · REACH + 1,)], by the window method."""
-    size = 256
-    grid = np.fft.rfftfreq(size, 1 / FRAME_RATE_HZ)
-    known = np.concatenate([[0.0], frequencies, [UNCHANGED_HZ]])
-    response = np.fft.irfft(np.exp(np.interp(grid, known, np.concatenate([[0.0], log_gains, [0.0]]))), size)
-    middle, window = size // 2, np.hanning(2 * REACH + 3)[1:-1]
-    taps: Array = np.fft.fftshift(response)[middle - REACH : middle + REACH + 1] * window
-    return taps + (1 - taps.sum()) / window.sum() * window
-
-
-MODULATION = {"modulation": ArraySpec(np.float64, "N Q", -2 * LARGEST_GAIN, 2 * LARGEST_GAIN)}
+MODULATION = {"modulation": ArraySpec(np.float64, "N Q", -2 * MAX_GAIN, 2 * MAX_GAIN)}
 """Filters up to twice their strength."""
 
 

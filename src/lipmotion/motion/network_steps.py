@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.predictors import PredictorTraining
 from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, make_network
-from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
+from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.stats.network_training import (
     LinearMap,
     SequenceNetwork,
@@ -31,7 +31,7 @@ STEP = 4
 """Frames of a time step, 40 ms: about a picture of a video."""
 DIRECT_WEIGHT = 4.0
 """Weight, in training, of the error of a channel that is modelled as it is; that of a principal component is 1."""
-LEAST_DEVIATION = 1e-6
+MIN_DEVIATION = 1e-6
 REPORTED_STEPS = 100
 """Progress of training is reported after so many optimiser steps."""
 LONGEST_STEPS = 250
@@ -63,7 +63,7 @@ def stack_spectrum(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
 def measure_poses(training: PredictorTraining) -> tuple[Array, Array]:
     """Return mean and standard deviation of the measured motion, which standardise it [each shape=(Q,)]."""
     poses = np.concatenate([x[example.valid] for x, example in zip(training.values, training.examples, strict=True)])
-    return poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
+    return poses.mean(axis=0), np.maximum(poses.std(axis=0), MIN_DEVIATION)
 
 
 def measure_error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
@@ -86,8 +86,8 @@ def cut_random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> Tr
     if excess <= 0:
         return sequence
     start = int(rng.integers(excess + 1))
-    kept = slice(start, start + LONGEST_STEPS)
-    return TrainingSequence(sequence.inputs[kept], sequence.targets[kept], sequence.valid[kept])
+    piece = slice(start, start + LONGEST_STEPS)
+    return TrainingSequence(sequence.inputs[piece], sequence.targets[piece], sequence.valid[piece])
 
 
 @dataclass(frozen=True)
@@ -117,12 +117,12 @@ class NetworkShape(ABC, Generic[NetworkT]):
         """Shape of each array, as in ``ArraySpec``, by its name without the prefix; ``output`` is the last one."""
 
     @abstractmethod
-    def stacked(self, network: NetworkT) -> tuple[NDArray[np.float32], ...]:
+    def stack(self, network: NetworkT) -> tuple[NDArray[np.float32], ...]:
         """Return the arrays of a network of this shape, in the order of ``sizes``, but for ``output``."""
 
     @abstractmethod
     def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> NetworkT:
-        """Return the network of the arrays of ``stacked``."""
+        """Return the network of the arrays of ``stack``."""
 
     @abstractmethod
     def initial(self, outputs: int, seed: int) -> NetworkT:
@@ -131,7 +131,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
     def arrays(self, network: NetworkT) -> dict[str, NDArray[np.float32]]:
         """Return the arrays of a network of this shape."""
         output = np.concatenate([network.output.weights, network.output.biases[None]])
-        return dict(zip(self.specs, (*self.stacked(network), output), strict=True))
+        return dict(zip(self.specs, (*self.stack(network), output), strict=True))
 
     def from_arrays(self, arrays: Arrays, outputs: int) -> NetworkT:
         """Return the network of arrays.
@@ -142,7 +142,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
         *stacked, output = (stored[name] for name in self.specs)
         return self.network(stacked, LinearMap(output[:-1], output[-1]))
 
-    def trained(
+    def train(
         self,
         training: PredictorTraining,
         outputs: int,
@@ -185,22 +185,21 @@ class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
 
     @property
     def sizes(self) -> dict[str, str]:  # noqa: D102
-        hidden, later = self.hidden_units, len(self.dilations) - 1
+        hidden, layers = self.hidden_units, len(self.dilations)
         return {
             "first": f"{TAPS * self.inputs} {hidden}",
-            "layers": f"{later} {TAPS * hidden} {hidden}",
-            "biases": f"{later + 1} {hidden}",
+            "layers": f"{layers - 1} {TAPS * hidden} {hidden}",
+            "biases": f"{layers} {hidden}",
             "output": f"{hidden + 1} O",
         }
 
-    def stacked(self, network: ConvolutionalNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
-        layers = network.layers
-        later = np.stack([layer.weights for layer in layers[1:]])
-        return layers[0].weights, later, np.stack([layer.biases for layer in layers])
+    def stack(self, network: ConvolutionalNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
+        first, *others = [layer.weights for layer in network.layers]
+        return first, np.stack(others), np.stack([layer.biases for layer in network.layers])
 
     def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> ConvolutionalNetwork:  # noqa: D102
-        first, later, biases = stacked
-        layers = tuple(LinearMap(each, bias) for each, bias in zip([first, *later], biases, strict=True))
+        first, others, biases = stacked
+        layers = tuple(LinearMap(each, bias) for each, bias in zip([first, *others], biases, strict=True))
         return ConvolutionalNetwork(layers, self.dilations, output)
 
     def initial(self, outputs: int, seed: int) -> ConvolutionalNetwork:  # noqa: D102
@@ -230,13 +229,13 @@ class RecurrentShape(NetworkShape[RecurrentNetwork]):
             "output": f"{2 * self.cells + 1} O",
         }
 
-    def stacked(self, network: RecurrentNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
+    def stack(self, network: RecurrentNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
         weights, memory, biases = zip(*network.layers, strict=True)
         return weights[0], np.stack(weights[1:]), np.stack(memory), np.stack(biases)
 
     def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> RecurrentNetwork:  # noqa: D102
-        first, later, memory, biases = stacked
-        layers = tuple(RecurrentLayer(*each) for each in zip([first, *later], memory, biases, strict=True))
+        first, others, memory, biases = stacked
+        layers = tuple(RecurrentLayer(*each) for each in zip([first, *others], memory, biases, strict=True))
         return RecurrentNetwork(layers, output)
 
     def initial(self, outputs: int, seed: int) -> RecurrentNetwork:  # noqa: D102

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion.articulation import unseen_share
 from lipmotion.motion.network_steps import (
-    LEAST_DEVIATION,
+    MIN_DEVIATION,
     STEP,
     ConvolutionalShape,
     RecurrentShape,
@@ -44,7 +44,7 @@ ROW_FRAMES = STEP // ROWS
 COMPONENTS = 120
 """Principal components of the logarithms of the posteriors: what the network says of phones that are not there tells
 more than the phone that is."""
-LEAST_LOG_POSTERIOR = -12.0
+MIN_LOG_POSTERIOR = -12.0
 """Smaller logarithms count as this: the network does not mean them."""
 INPUT_SCALE = 2.0
 """Standard deviation of the first principal component as input; the others keep their proportions to it."""
@@ -111,34 +111,40 @@ class PosteriorNetwork(Predictor):
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
-        """Return the network of ``trained``. Raises CorpusError."""
-        return PredictorFit(cls.trained(training))
+        """Return the network of ``train``. Raises CorpusError."""
+        return PredictorFit(cls.train(training))
 
     @classmethod
-    def trained(cls, training: PredictorTraining) -> PosteriorNetwork:
+    def train(cls, training: PredictorTraining) -> PosteriorNetwork:
         """Return a network that is trained on examples as recorded; without spectra where one of them has none.
 
         Raises CorpusError: an example without posteriors.
         """
-        found = _posteriors_of(training.examples)
-        if found is None:
+        examples = training.examples
+        posteriors = _list_posteriors(examples)
+        if posteriors is None:
             raise CorpusError(
                 "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
             )
         centre, scale = measure_poses(training)
-        rows = [_limited(posteriors) for posteriors in found]
-        mean, basis = _principal_components(rows)
-        spectra = _spectra_of(training.examples)
-        inputs = [_inputs((row - mean) @ basis, x) for row, x in zip(rows, spectra, strict=True)]
-        sequences = _sequences(training, inputs, centre, scale)
-        network = _trained(training, sequences)
-        recurrent = None if spectra[0] is None else _trained_recurrent(training, sequences)
+        rows = [_limit(each) for each in posteriors]
+        mean, basis = _fit_components(rows)
+        heard = all(example.condition_spectra for example in examples)
+        spectra = [example.condition_spectra[0].values if heard else None for example in examples]
+        inputs = [_stack_inputs((row - mean) @ basis, x) for row, x in zip(rows, spectra, strict=True)]
+        sequences = [
+            [_make_sequence(steps, (x - centre) / scale, example.valid, shift) for shift, steps in enumerate(shifted)]
+            for shifted, x, example in zip(inputs, training.values, examples, strict=True)
+        ]
+        motion_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
+        network = _train_convolutional(training, sequences, motion_s)
+        recurrent = _train_recurrent(training, sequences, motion_s) if heard else None
         predicted = (
-            _outputs(network, shifted, len(values)) * scale + centre
+            _run(network, shifted, len(values)) * scale + centre
             for shifted, values in zip(inputs, training.values, strict=True)
         )
         variances = measure_error_variances(training, predicted, scale)
-        return cls(network, mean, basis, centre, scale, variances, found[0].source, recurrent)
+        return cls(network, mean, basis, centre, scale, variances, posteriors[0].source, recurrent)
 
     def can_predict(self, speech: Speech) -> bool:
         """Return whether speech has posteriors."""
@@ -150,13 +156,13 @@ class PosteriorNetwork(Predictor):
         The spectrum counts as far as training knows the voice.
         Raises InputError: speech without posteriors, or with those of another phone recogniser than in training.
         """
-        posteriors, frames = self._checked(speech.posteriors), len(speech.features.values)
+        posteriors, frames = self._check(speech.posteriors), len(speech.features.values)
         share = 0.0 if speech.spectrum is None else 1 - unseen_share(speech.voice)
         motion = np.zeros((frames, len(self.centre)))
         for spectrum, weight in ((None, 1 - share), (speech.spectrum, share)):
             if weight > 0:
                 key, predict = (self, spectrum is None), partial(self._predict, posteriors, spectrum, frames)
-                motion += weight * speech.once(key, predict)
+                motion += weight * speech.cached(key, predict)
         return motion, np.zeros(frames)
 
     def hidden_units(self, posteriors: TokenPosteriors, steps: int) -> NDArray[np.float32]:
@@ -164,22 +170,22 @@ class PosteriorNetwork(Predictor):
 
         Raises InputError: posteriors of another phone recogniser than in training.
         """
-        rows = self.network.hidden(_shifted_inputs(self._components(self._checked(posteriors)), None, 0))
+        rows = self.network.hidden(_stack_shift(self._components(self._check(posteriors)), None, 0))
         return rows[np.minimum(np.arange(steps), len(rows) - 1)]
 
     def _predict(self, posteriors: TokenPosteriors, spectrum: NDArray[np.floating] | None, frames: int) -> Array:
         """Return motion in the motion space [shape=(frames, Q)], with the spectrum or without."""
-        shifted = _inputs(self._components(posteriors), spectrum)
-        outputs = _outputs(self.network, shifted, frames)
+        shifted = _stack_inputs(self._components(posteriors), spectrum)
+        outputs = _run(self.network, shifted, frames)
         if self.recurrent is not None and spectrum is not None:
-            outputs += RECURRENT_SHARE * (_outputs(self.recurrent, shifted, frames) - outputs)
+            outputs += RECURRENT_SHARE * (_run(self.recurrent, shifted, frames) - outputs)
         return outputs * self.scale + self.centre
 
     def _components(self, posteriors: TokenPosteriors) -> NDArray[np.floating]:
         """Return the principal components of the logarithms of posteriors [shape=(N, 120)]."""
-        return (_limited(posteriors) - self.mean) @ self.basis
+        return (_limit(posteriors) - self.mean) @ self.basis
 
-    def _checked(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
+    def _check(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
         """Return the posteriors; raise InputError where there are none, or those of another phone recogniser."""
         if posteriors is None:
             raise InputError("the speech has no posteriors; an engine that uses them says so by ``inputs``")
@@ -223,121 +229,87 @@ class PosteriorNetwork(Predictor):
 
 def have_posteriors(examples: Sequence[Example]) -> bool:
     """Return whether a posterior network can be trained on examples: whether all of them have posteriors."""
-    return _posteriors_of(examples) is not None
+    return _list_posteriors(examples) is not None
 
 
-def _posteriors_of(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
+def _list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
     """Return the posteriors of examples; None where one of them has none."""
-    found = [example.speech.posteriors for example in examples]
-    known = [posteriors for posteriors in found if posteriors is not None]
-    return known if known and len(known) == len(found) else None
+    known = [example.speech.posteriors for example in examples if example.speech.posteriors is not None]
+    return known if known and len(known) == len(examples) else None
 
 
-def _spectra_of(examples: Sequence[Example]) -> list[NDArray[np.floating] | None]:
-    """Return the spectra of examples as recorded; None for all where one of them has none."""
-    if all(example.condition_spectra for example in examples):
-        return [example.condition_spectra[0].values for example in examples]
-    return [None] * len(examples)
-
-
-def _sequences(
-    training: PredictorTraining, inputs: Sequence[Sequence[NDArray[np.float32]]], centre: Array, scale: Array
-) -> list[list[TrainingSequence]]:
-    """Return the sequences of each example, by shift.
-
-    inputs : of each example in its time steps, by shift [each shape=(N, 400)]
-    """
-    return [
-        [_sequence(rows, (x - centre) / scale, example.valid, shift) for shift, rows in enumerate(shifted)]
-        for shifted, x, example in zip(inputs, training.values, training.examples, strict=True)
-    ]
-
-
-def _trained(training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]]) -> ConvolutionalNetwork:
-    """Return the trained convolutional network."""
-
+def _train_convolutional(
+    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]], motion_s: float
+) -> ConvolutionalNetwork:
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        piece = _drawn(rng, sequences[number])
+        piece = _draw_piece(rng, sequences[number])
         if rng.random() >= SPECTRUM_OFF:
             return piece
         rows = piece.inputs.copy()
         rows[:, :SPECTRUM] = 0
         return piece._replace(inputs=rows)
 
-    plan = TrainingPlan(
-        _steps(STEPS, _seconds(training)), min(BATCH_SIZE, len(sequences)), LEARNING_RATE, DROPOUT, SEED
-    )
-    return SHAPE.trained(training, sequences[0][0].targets.shape[1], draw, plan)
+    steps = max(round(STEPS * math.sqrt(motion_s)), 1)
+    plan = TrainingPlan(steps, min(BATCH_SIZE, len(sequences)), LEARNING_RATE, DROPOUT, SEED)
+    return SHAPE.train(training, sequences[0][0].targets.shape[1], draw, plan)
 
 
-def _trained_recurrent(
-    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]]
+def _train_recurrent(
+    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]], motion_s: float
 ) -> RecurrentNetwork:
-    """Return the trained recurrent network."""
-    motion_s = _seconds(training)
     rate = min(RECURRENT_RATE / math.sqrt(motion_s), LARGEST_RECURRENT_RATE)
-    steps, batch_size = _steps(RECURRENT_STEPS, motion_s), min(RECURRENT_BATCH, len(sequences))
-    plan = TrainingPlan(steps, batch_size, rate, RECURRENT_DROPOUT, SEED)
+    steps = max(round(RECURRENT_STEPS * math.sqrt(motion_s)), 1)
+    plan = TrainingPlan(steps, min(RECURRENT_BATCH, len(sequences)), rate, RECURRENT_DROPOUT, SEED)
     outputs = sequences[0][0].targets.shape[1]
-    return RECURRENT.trained(training, outputs, lambda rng, number: _drawn(rng, sequences[number]), plan)
+    return RECURRENT.train(training, outputs, lambda rng, number: _draw_piece(rng, sequences[number]), plan)
 
 
-def _seconds(training: PredictorTraining) -> float:
-    """Return how many seconds of measured motion the examples have."""
-    return sum(int(example.valid.sum()) for example in training.examples) / FRAME_RATE_HZ
-
-
-def _steps(of_second: float, motion_s: float) -> int:
-    """Return the number of optimiser steps; ``of_second`` is that for one second of motion."""
-    return max(round(of_second * math.sqrt(motion_s)), 1)
-
-
-def _drawn(rng: np.random.Generator, shifted: Sequence[TrainingSequence]) -> TrainingSequence:
+def _draw_piece(rng: np.random.Generator, shifted: Sequence[TrainingSequence]) -> TrainingSequence:
     """Return one of the shifts of an example, or a piece of it."""
     return cut_random_piece(shifted[int(rng.integers(len(shifted)))], rng)
 
 
-def _sequence(rows: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_], shift: int) -> TrainingSequence:
+def _make_sequence(rows: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_], shift: int) -> TrainingSequence:
     """Return inputs of time steps [shape=(N, 400)] with their targets, which are given by frame [shape=(T, Q)]."""
     frames = np.minimum(np.arange(len(rows)) * STEP + shift * ROW_FRAMES, len(targets) - 1)
     return TrainingSequence(rows, targets[frames].astype(np.float32), valid[frames])
 
 
-def _outputs(network: SequenceNetwork, shifted: Sequence[NDArray[np.float32]], frames: int) -> Array:
+def _run(network: SequenceNetwork, shifted: Sequence[NDArray[np.float32]], frames: int) -> Array:
     """Return the outputs of a network, the mean over all shifts of its inputs [shape=(frames, Q)]."""
     outputs = [interpolate_steps(network(x).astype(float), frames, s * ROW_FRAMES) for s, x in enumerate(shifted)]
     mean: Array = np.mean(outputs, axis=0)
     return mean
 
 
-def _principal_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _fit_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the mean of posteriors [shape=(K,)] and a basis, scaled as inputs of the network [shape=(K, 120)]."""
     everything = np.concatenate(rows).astype(float)
     mean = everything.mean(axis=0)
     values, vectors = np.linalg.eigh(np.cov(everything - mean, rowvar=False))
     chosen = vectors[:, ::-1][:, :COMPONENTS]
     basis = np.zeros((len(mean), COMPONENTS))
-    basis[:, : chosen.shape[1]] = chosen * (INPUT_SCALE / max(float(np.sqrt(values[-1])), LEAST_DEVIATION))
+    basis[:, : chosen.shape[1]] = chosen * (INPUT_SCALE / max(float(np.sqrt(values[-1])), MIN_DEVIATION))
     return mean.astype(np.float32), basis.astype(np.float32)
 
 
-def _limited(posteriors: TokenPosteriors) -> NDArray[np.float32]:
+def _limit(posteriors: TokenPosteriors) -> NDArray[np.float32]:
     """Return the logarithms of posteriors within the limit [shape=(N, K)]."""
-    limited: NDArray[np.float32] = np.maximum(posteriors.values, LEAST_LOG_POSTERIOR).astype(np.float32)
+    limited: NDArray[np.float32] = np.maximum(posteriors.values, MIN_LOG_POSTERIOR).astype(np.float32)
     return limited
 
 
-def _inputs(components: NDArray[np.floating], spectrum: NDArray[np.floating] | None) -> list[NDArray[np.float32]]:
+def _stack_inputs(components: NDArray[np.floating], spectrum: NDArray[np.floating] | None) -> list[NDArray[np.float32]]:
     """Return the inputs in every time step, by shift [each shape=(ceil((N - shift) / 2), 400)].
 
     components : of posteriors [shape=(N, 120)]
     spectrum   : normalised log mel spectrum [shape=(T, 40)]; None: switched off
     The spectrum of each time step stands before the components of its two rows. A single row is not shifted.
     """
-    return [_shifted_inputs(components, spectrum, shift) for shift in range(min(SHIFTS, len(components)))]
+    return [_stack_shift(components, spectrum, shift) for shift in range(min(SHIFTS, len(components)))]
 
 
-def _shifted_inputs(
+def _stack_shift(
     components: NDArray[np.floating], spectrum: NDArray[np.floating] | None, shift: int
 ) -> NDArray[np.float32]:
     """Return the inputs in every time step, of which the first begins at a row of posteriors."""

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 PredictorT = TypeVar("PredictorT", bound="Predictor")
 AUTOMATIC = "auto"
 """Stands for the predictor that suits the examples, where no name is given."""
-LEAST_OWN_S = 480.0
+MIN_OWN_S = 480.0
 """From this much measured motion on, a model does not stand on another one."""
 FOLDS = 4
 
@@ -173,7 +173,7 @@ def choose_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] 
     if name != AUTOMATIC:
         return load_predictor(name)
     measured_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
-    if measured_s < LEAST_OWN_S and all(example.speech.prior is not None for example in examples):
+    if measured_s < MIN_OWN_S and all(example.speech.prior is not None for example in examples):
         return load_predictor("prior")
     network = load_predictor("network")
     if network.conditions(measured_s, 1) and all(example.condition_spectra for example in examples):
@@ -237,11 +237,11 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
         raise ValueError(f"the predictors {' and '.join(stored)}, required one of them")
     if not stored:
         return None
-    ((name, own),) = stored.items()
+    ((name, chosen_arrays),) = stored.items()
     if name not in PREDICTORS.names:
         known = ", ".join(PREDICTORS.names)
         raise ModelFormatError(f"no predictor {name!r}; there are: {known}; install the package that adds it")
     chosen = load_predictor(name)
     if name in added:
-        refuse_undeclared(own, chosen.ARRAYS)
-    return chosen.from_arrays(own, dimensions)
+        refuse_undeclared(chosen_arrays, chosen.ARRAYS)
+    return chosen.from_arrays(chosen_arrays, dimensions)

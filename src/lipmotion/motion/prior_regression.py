@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
-from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
+from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
-from lipmotion.types import SPECTRUM_BANDS, Example, Speech
+from lipmotion.types import SPECTRUM_BANDS, Speech
 
 Array = NDArray[np.float64]
 WINDOW = 4
@@ -24,7 +24,7 @@ RIDGES = tuple(10.0**power for power in range(0, 6))
 INITIAL_RIDGE = 1000.0
 """Ridge parameter of all kinds before the choice."""
 ROUNDS = 2
-LEAST_DEVIATION = 1e-3
+MIN_DEVIATION = 1e-3
 KINDS = ("prior", "hidden", "articulation", "spectrum")
 """Kinds of regressors: the articulators of the other model's motion, the last hidden layers of its networks, the table
 of articulation for the phones in time, the spectrum around the frame."""
@@ -76,22 +76,26 @@ class PriorRegression(Predictor):
         everything = [np.concatenate(kind, axis=1) for kind in kinds]
         known = [example.valid[::STEP] for example in examples]
         rows = np.concatenate([x[mask] for x, mask in zip(everything, known, strict=True)])
-        mean, scale = rows.mean(axis=0), rows.std(axis=0) + LEAST_DEVIATION
+        mean, scale = rows.mean(axis=0), rows.std(axis=0) + MIN_DEVIATION
         data = [
             _Fold((x[mask] - mean) / scale, motion[::STEP][mask])
             for x, motion, mask in zip(everything, values, known, strict=True)
         ]
         spread = np.maximum(np.concatenate([each.motion for each in data]).std(axis=0), 1e-6)
-        penalty = np.repeat(_chosen_ridges(data, sizes, (1 / spread**2)[: training.direct]), sizes)
+        penalty = np.repeat(_choose_ridges(data, sizes, (1 / spread**2)[: training.direct]), sizes)
         predictions: list[Array] = [np.zeros(0)] * len(data)
         for inside, outside in split_folds(len(data)):
-            coefficients, centre = _solved([data[n] for n in inside], penalty)
+            coefficients, centre = _solve([data[n] for n in inside], penalty)
             for number in outside:
                 steps = (everything[number] - mean) / scale @ coefficients + centre
                 predictions[number] = interpolate_steps(steps, len(values[number]))
-        coefficients, centre = _solved(data, penalty)
+        coefficients, centre = _solve(data, penalty)
         mean_32, scale_32, coefficients_32 = (x.astype(np.float32) for x in (mean, scale, coefficients))
-        variances = _variances(predictions, values, examples)
+        errors = [
+            with_dynamics(x - predicted)[mark_known_dynamics(example.valid)]
+            for predicted, x, example in zip(predictions, values, examples, strict=True)
+        ]
+        variances = np.square(np.concatenate(errors)).mean(axis=0) + 1e-12
         return PredictorFit(cls(sizes, mean_32, scale_32, coefficients_32, centre, variances), predictions)
 
     def can_predict(self, speech: Speech) -> bool:
@@ -103,14 +107,14 @@ class PriorRegression(Predictor):
 
         Raises InputError: an unknown phone.
         """
-        regressors = (self._known(_regressors(speech)) - self.mean) / self.scale
+        regressors = (self._fill(_regressors(speech)) - self.mean) / self.scale
         steps = (regressors @ self.coefficients).astype(float) + self.centre
         frames = len(speech.features.values)
         distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
         outputs = interpolate_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
         return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
 
-    def _known(self, kinds: Sequence[Array]) -> Array:
+    def _fill(self, kinds: Sequence[Array]) -> Array:
         """Return the regressors [shape=(N, R)]; those that the training had and this speech has not have their mean.
 
         kinds : as of ``_regressors``; of speech without posteriors, or from another version, some columns are missing
@@ -164,7 +168,7 @@ def _regressors(speech: Speech) -> list[Array]:
     return [np.asarray(x, float) for x in (motion, hidden, table, bands[around].reshape(count, -1))]
 
 
-def _solved(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
+def _solve(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
     """Return coefficients [shape=(R, Q)] and centre [shape=(Q,)] of a ridge regression with a penalty a regressor."""
     x = np.concatenate([each.regressors for each in data])
     y = np.concatenate([each.motion for each in data])
@@ -179,7 +183,7 @@ def _solved(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
     return coefficients, centre - shift @ coefficients
 
 
-def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) -> Array:
+def _choose_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) -> Array:
     """Return the ridge parameter of each kind of regressors with the least error of the first dimensions.
 
     weights : of the squared errors of these dimensions [shape=(D,)]
@@ -190,7 +194,7 @@ def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) 
     def error(candidate: Array) -> float:
         total = 0.0
         for inside, outside in split_folds(len(data)):
-            coefficients, centre = _solved([data[n] for n in inside], np.repeat(candidate, sizes))
+            coefficients, centre = _solve([data[n] for n in inside], np.repeat(candidate, sizes))
             for number in outside:
                 missed = data[number].regressors @ coefficients + centre - data[number].motion
                 total += float((np.square(missed) * weights).sum())
@@ -203,12 +207,3 @@ def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) 
             candidates = [np.where(np.arange(len(sizes)) == kind, ridge, ridges) for ridge in RIDGES]
             ridges = min(candidates, key=error)
     return ridges
-
-
-def _variances(predictions: Sequence[Array], values: Sequence[Array], examples: Sequence[Example]) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)]."""
-    errors = [
-        with_dynamics(x - predicted)[mark_known_dynamics(example.valid)]
-        for predicted, x, example in zip(predictions, values, examples, strict=True)
-    ]
-    return np.square(np.concatenate(errors)).mean(axis=0) + 1e-12

@@ -26,11 +26,11 @@ RANGE_PERCENTILES = (5.0, 95.0)
 """The range of a channel lies between these percentiles of the frames of speech."""
 RANGE_PRIOR_S = 2.0
 """Seconds of speech that count as much as the assumption that a person's range is the mean person's."""
-LEAST_GAIN, MOST_GAIN = 0.25, 4.0
+MIN_GAIN, MAX_GAIN = 0.25, 4.0
 """Ranges of people differ by no more; beyond, they are differences of trackers or of units."""
-LEAST_FRAMES = 10
+MIN_FRAMES = 10
 """Fewest frames of silence from which a rest pose is taken."""
-LEAST_RANGE_SHARE = 0.05
+MIN_RANGE_SHARE = 0.05
 """A channel that somebody moves by less than this share of the widest range has a gain of 1 for everyone."""
 VISEME_NAMES = tuple(VISEMES)
 """The order of the visemes in stored habits."""
@@ -68,12 +68,12 @@ class SpeakerMap:
         visemes : from ``weigh_visemes`` [shape=(T, V)]
         Lips that are closed stay closed.
         """
-        moved: Array = visemes @ self.habits
+        change: Array = visemes @ self.habits
         column = next((n for n, channel in enumerate(self.channels) if channel.name == OPENING), None)
         if column is not None:
             closed, opened = self.lips
-            moved *= np.clip((values[:, column : column + 1] - closed) / max(opened - closed, 1e-6), 0, 1)
-        return moved
+            change *= np.clip((values[:, column : column + 1] - closed) / max(opened - closed, 1e-6), 0, 1)
+        return change
 
     def to_person(self, values: NDArray[np.floating[Any]], restful: Array) -> Array:
         """Return the motion of this person, of the mean person's.
@@ -87,7 +87,7 @@ class SpeakerMap:
         """Return the motion of the mean person, of this person's; the inverse of ``to_person``."""
         return (values - self.offset - restful[:, None] * self.rest) / self.gain
 
-    def ordered(self, channels: Sequence[Channel]) -> SpeakerMap:
+    def reorder(self, channels: Sequence[Channel]) -> SpeakerMap:
         """Return the map of some channels, in this order. Raises InputError: a channel without a map."""
         if tuple(channels) == self.channels:
             return self
@@ -129,7 +129,7 @@ class SpeakerMaps:
         parts = (self.gain[number], self.offset[number], self.rest[number], self.habits[number])
         return SpeakerMap(self.channels, *parts, self.lips)
 
-    def selected(self, names: Sequence[str]) -> SpeakerMaps:
+    def select(self, names: Sequence[str]) -> SpeakerMaps:
         """Return the maps of some people."""
         rows = [self.names.index(name) for name in names]
         parts = (self.gain[rows], self.offset[rows], self.rest[rows], self.habits[rows])
@@ -196,14 +196,29 @@ def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> 
     no more. Closed lips map onto closed lips and, in silence, rest pose onto rest pose. Ranges of people who say little
     are drawn towards the mean person's. Points share one gain for each axis, so that faces keep their shape.
     """
-    maps = _fit_maps(examples, speakers)
+    names = tuple(sorted(set(speakers)))
+    channels, motion_names = examples[0].motion.channels, examples[0].motion.names
+    column = motion_names.index(OPENING) if OPENING in motion_names else None
+    groups = [[e for e, speaker in zip(examples, speakers, strict=True) if speaker == name] for name in names]
+    people = [measure_person(group, column) for group in groups]
+    rests, follow = estimate_rest_poses(people), np.mean([person.follow for person in people], axis=0)
+    closed = np.array([person.closed for person in people])
+    parted = rests[:, column] - closed if column is not None else np.zeros(len(people))
+    anchors = rests - parted[:, None] * follow  # the rest poses, but with lips that touch
+    gain = estimate_gains(people, channels)
+    offset = anchors - gain * anchors.mean(axis=0)
+    rest = rests - offset - gain * rests.mean(axis=0)
+    shut = float(closed.mean())
+    wide = float(np.mean([person.range[column] for person in people])) if column is not None else 0.0
+    habits = np.zeros((len(names), len(VISEME_NAMES), len(channels)))
+    maps = SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + FULL_HABIT_SHARE * wide))
     mapped = []
     for example, speaker in zip(examples, speakers, strict=True):
         motion = example.motion
         restful = measure_restfulness(example.speech.units, len(motion.values))
         values = maps.of(speaker).to_mean(motion.values, restful)
         mapped.append(replace(example, motion=replace(motion, values=values)))
-    return mapped, maps.selected([name for name in maps.names if name])
+    return mapped, maps.select([name for name in names if name])
 
 
 def speakers_to_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
@@ -259,26 +274,6 @@ class PersonStatistics:
     speech_s: float
 
 
-def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMaps:
-    """Return the maps of all people, also of the one without a name."""
-    names = tuple(sorted(set(speakers)))
-    channels = examples[0].motion.channels
-    column = examples[0].motion.names.index(OPENING) if OPENING in examples[0].motion.names else None
-    groups = [[e for e, speaker in zip(examples, speakers, strict=True) if speaker == name] for name in names]
-    people = [measure_person(group, column) for group in groups]
-    rests, follow = estimate_rest_poses(people), np.mean([person.follow for person in people], axis=0)
-    closed = np.array([person.closed for person in people])
-    parted = rests[:, column] - closed if column is not None else np.zeros(len(people))
-    anchors = rests - parted[:, None] * follow  # the rest poses, but with lips that touch
-    gain = estimate_gains(people, channels)
-    offset = anchors - gain * anchors.mean(axis=0)
-    rest = rests - offset - gain * rests.mean(axis=0)
-    shut = float(closed.mean())
-    wide = float(np.mean([person.range[column] for person in people])) if column is not None else 0.0
-    habits = np.zeros((len(names), len(VISEME_NAMES), len(channels)))
-    return SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + FULL_HABIT_SHARE * wide))
-
-
 def measure_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
     """Return the statistics of one person's motion.
 
@@ -297,7 +292,7 @@ def measure_person(examples: Sequence[Example], column: int | None) -> PersonSta
             ranges = find_closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
     resting, speech = np.concatenate(silent), np.concatenate(spoken)
-    quiet = next((each for each in (resting, np.concatenate(silence)) if len(each) >= LEAST_FRAMES), None)
+    quiet = next((each for each in (resting, np.concatenate(silence)) if len(each) >= MIN_FRAMES), None)
     if not len(speech):
         speech = np.concatenate(measured)
     if not len(speech):
@@ -326,15 +321,15 @@ def estimate_rest_poses(people: Sequence[PersonStatistics]) -> Array:
 
 
 def estimate_gains(
-    people: Sequence[PersonStatistics], channels: Sequence[Channel], most_gain: float = MOST_GAIN
+    people: Sequence[PersonStatistics], channels: Sequence[Channel], max_gain: float = MAX_GAIN
 ) -> Array:
     """Return the range of each person as a multiple of the mean person's [shape=(S, P)].
 
-    most_gain : gains lie between its inverse and itself
+    max_gain : gains lie between its inverse and itself
     Points share one gain for each axis. Of people who say little, gains are drawn towards 1 (``RANGE_PRIOR_S``).
     """
     ranges = np.stack([person.range for person in people])
-    moves = (ranges > LEAST_RANGE_SHARE * ranges.max(axis=0)).all(axis=0) & (ranges > 0).all(axis=0)
+    moves = (ranges > MIN_RANGE_SHARE * ranges.max(axis=0)).all(axis=0) & (ranges > 0).all(axis=0)
     ratio = np.ones(ranges.shape)
     usual = np.exp(np.log(ranges[:, moves]).mean(axis=0))
     ratio[:, moves] = ranges[:, moves] / usual
@@ -347,13 +342,13 @@ def estimate_gains(
     trust = speech_s / (speech_s + RANGE_PRIOR_S)
     shrunk = np.exp(np.log(ratio) * trust[:, None])
     shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
-    return np.clip(shrunk, 1 / most_gain, most_gain)
+    return np.clip(shrunk, 1 / max_gain, max_gain)
 
 
 SPEAKERS = {
     "channels": ArraySpec(np.str_, "P 2"),
     "names": ArraySpec(np.str_, "S"),
-    "gain": ArraySpec(np.float64, "S P", LEAST_GAIN, MOST_GAIN),
+    "gain": ArraySpec(np.float64, "S P", MIN_GAIN, MAX_GAIN),
     "offset": ArraySpec(np.float64, "S P", -1e6, 1e6),
     "rest": ArraySpec(np.float64, "S P", -1e6, 1e6),
     "habits": ArraySpec(np.float64, "S V P", -1e6, 1e6),

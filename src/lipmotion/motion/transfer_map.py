@@ -13,7 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.speaker_maps import (
-    MOST_GAIN,
+    MAX_GAIN,
     VISEME_NAMES,
     SpeakerMap,
     estimate_gains,
@@ -34,7 +34,7 @@ def fit_transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Sp
     - Closed lips map onto closed lips. The median pose of all other channels in speech maps onto the target's.
     - The range in speech (5th to 95th percentile) maps onto the target's; points share one gain for each axis, so that
       the face keeps the shape of the target. With S seconds of speech the logarithm of a gain counts S / (S + 2), and
-      gains lie between 1 / ``MOST_GAIN`` and ``MOST_GAIN``: a short recording gives place and shape alone.
+      gains lie between 1 / ``MAX_GAIN`` and ``MAX_GAIN``: a short recording gives place and shape alone.
     - In silence away from speech the rest pose maps onto the target's. With S seconds of such silence that counts
       S / (S + 0.5): people rest with closed lips in one pause and with parted lips in the next.
     The map has no habits (``SpeakerMap.habits`` is 0).
@@ -44,7 +44,7 @@ def fit_transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Sp
     names = [channel.name for channel in channels]
     column = names.index(OPENING) if OPENING in names else None
     people = [measure_person(examples, column) for examples in (source, target)]
-    gains, rests = estimate_gains(people, channels, float(np.sqrt(MOST_GAIN))), estimate_rest_poses(people)
+    gains, rests = estimate_gains(people, channels, float(np.sqrt(MAX_GAIN))), estimate_rest_poses(people)
     gain = gains[1] / gains[0]
     offset = people[1].spoken - gain * people[0].spoken
     closed = people[0].closed
@@ -63,7 +63,7 @@ def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
     """
     if first is None:
         return second
-    first = first.ordered(second.channels)
+    first = first.reorder(second.channels)
     gain = second.gain * first.gain
     offset = second.offset + second.gain * first.offset
     rest = second.rest + second.gain * first.rest

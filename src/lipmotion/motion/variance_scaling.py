@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 LARGEST_FACTOR = 2.0
 """No factor is larger: a dimension that hardly depends on speech would be scaled too far."""
-LEAST_DEVIATION = 1e-6
+MIN_DEVIATION = 1e-6
 
 
 def fit_scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Array]) -> Array:
@@ -26,7 +26,7 @@ def fit_scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Ar
     ``LARGEST_FACTOR``.
     """
     wanted, made = (np.mean([clip.std(axis=0) for clip in clips], axis=0) for clips in (recorded, generated))
-    ratio = wanted / np.maximum(made, LEAST_DEVIATION)
+    ratio = wanted / np.maximum(made, MIN_DEVIATION)
     return np.clip(ratio, 1.0, LARGEST_FACTOR)
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.curve_edits import bend_through_pins, find_pinned_frame
-from lipmotion.articulation.pauses import rest_in_pauses
-from lipmotion.articulation.symmetry import make_symmetrical
+from lipmotion.articulation.lip_points import make_symmetrical
+from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
@@ -184,11 +184,11 @@ def _generate_one(
         channel = next((channel for channel in person.channels if channel.name == pin.channel), None)
         if frame is None or channel is None or (is_never_negative(channel) and pin.value < 0):
             return pin
-        value = float(person.ordered([channel]).to_mean(np.array([[pin.value]]), restful[frame : frame + 1])[0, 0])
+        value = float(person.reorder([channel]).to_mean(np.array([[pin.value]]), restful[frame : frame + 1])[0, 0])
         return replace(pin, value=max(value, 0.0) if is_never_negative(channel) else value)
 
     mean = engine.generate(learned, speech, Constraints(tuple(map(to_mean_person, pins))))
-    fitted = person.ordered(mean.motion.channels)
+    fitted = person.reorder(mean.motion.channels)
     visemes = weigh_visemes(speech.units, len(restful))
     values = np.empty_like(mean.motion.values)
     for start in range(0, len(values), BLOCK_FRAMES):
@@ -218,7 +218,7 @@ def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech:
         return explanation
     frames, frame = len(speech.features.values), slice(explanation.frame, explanation.frame + 1)
     channels = tuple(channel for channel in person.channels if channel.name in explanation.motion)
-    fitted = person.ordered(channels)
+    fitted = person.reorder(channels)
     poses = np.array([[explanation.motion[channel.name].value for channel in channels]])
     shift = fitted.shift(poses, weigh_visemes(speech.units, frames)[frame])
     added = fitted.to_person(shift, measure_restfulness(speech.units, frames)[frame])[0]

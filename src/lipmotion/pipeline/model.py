@@ -229,7 +229,7 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
     if not name or name in known:
         raise InputError(f"a person named {name!r}, required another name than: {', '.join(('', *known))}")
     if maps is not None:
-        person = person.ordered(maps.channels)
+        person = person.reorder(maps.channels)
     rows = {
         part: np.concatenate([*([getattr(maps, part)] if maps is not None else []), getattr(person, part)[None]])
         for part in ("gain", "offset", "rest", "habits")

@@ -157,7 +157,7 @@ class Request(Configuration):
     manner: Manner = option(
         "detected",
         Rule(choices=get_args(Manner)),
-        later=True,
+        omit_default=True,
         help="detected: laughter, breaths, whispers and shouts in the sound move the mouth (default); asked: none does",
     )
     asymmetry: float = option(
@@ -182,7 +182,7 @@ class Request(Configuration):
     onto_speaker: str = option(
         "", metavar="NAME", help="which person, if the corpus or the model of --onto has several"
     )
-    spoken_so: bool = option(False, later=True)
+    spoken_so: bool = option(False, omit_default=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()

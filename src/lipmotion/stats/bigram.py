@@ -63,7 +63,17 @@ def estimate_bigram(units: Sequence[str], sentences: Iterable[Sequence[str]]) ->
     counts = np.zeros((len(units), len(units)))
     for (unit, following), count in pairs.items():
         counts[index[unit], index[following]] = count
-    return Bigram(tuple(units), np.log([_row(row, unigram) for row in counts]).astype(np.float32))
+    rows = []
+    for row in counts:
+        total, occurs = row.sum(), row > 0
+        probability = np.where(occurs, (row - DISCOUNT) / total, 0) if total else unigram
+        if total and occurs.all():
+            probability = probability / probability.sum()
+        elif total:
+            backed_off = np.where(occurs, 0, unigram) * (1 - probability.sum()) / unigram[~occurs].sum()
+            probability = probability + backed_off
+        rows.append(probability)
+    return Bigram(tuple(units), np.log(rows).astype(np.float32))
 
 
 def bigram_from_array(units: Sequence[str], stored: NDArray[np.float32]) -> Bigram:
@@ -77,14 +87,3 @@ def check_sums_to_one(name: str, totals: NDArray[np.float64]) -> None:
     worst = float(np.abs(totals - 1).max())
     if worst > ROW_TOLERANCE:
         raise ValueError(f"{name} of probabilities whose sum is {worst:g} off, required 1")
-
-
-def _row(counts: NDArray[np.float64], unigram: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return P(next | unit) [shape=(V,)] from the counts of its pairs."""
-    total, occurs = counts.sum(), counts > 0
-    if not total:
-        return unigram
-    row = np.where(occurs, (counts - DISCOUNT) / total, 0)
-    if occurs.all():
-        return row / row.sum()
-    return row + np.where(occurs, 0, unigram) * (1 - row.sum()) / unigram[~occurs].sum()

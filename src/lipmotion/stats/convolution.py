@@ -71,7 +71,7 @@ class ConvolutionalNetwork(SequenceNetwork):
     ) -> tuple[Array, list[_Pass]]:
         states, passes = inputs, []
         for number, (layer, dilation) in enumerate(zip(self.layers, self.dilations, strict=True)):
-            stacked = _stacked(states, dilation)
+            stacked = _stack(states, dilation)
             result = stacked @ layer.weights
             result += layer.biases
             if dropout is None:
@@ -91,7 +91,12 @@ class ConvolutionalNetwork(SequenceNetwork):
             spread: Array = inner.reshape(rows, -1)
             gradients += [spread.sum(axis=0), passed[number].stacked.reshape(rows, -1).T @ spread]
             if number:
-                slope = slope + _unstacked(inner @ self.layers[number].weights.T, self.dilations[number])
+                parts = (inner @ self.layers[number].weights.T).reshape(*slope.shape[:2], TAPS, -1)
+                dilation, by_states = self.dilations[number], parts[:, :, 1].copy()  # the derivative of ``_stack``
+                if dilation < slope.shape[1]:
+                    by_states[:, :-dilation] += parts[:, dilation:, 0]
+                    by_states[:, dilation:] += parts[:, :-dilation, 2]
+                slope = slope + by_states
         return gradients[::-1]
 
 
@@ -108,7 +113,7 @@ def make_network(inputs: int, hidden: int, outputs: int, dilations: Sequence[int
     return ConvolutionalNetwork((first, *others), tuple(dilations), layer(hidden, outputs, 0.1))
 
 
-def _stacked(states: Array, dilation: int) -> Array:
+def _stack(states: Array, dilation: int) -> Array:
     """Return every time step with those before and after it [shape=(B, T, 3·C)]; zeros beyond the ends."""
     batch, length, width = states.shape
     result = np.zeros((batch, length, TAPS, width), np.float32)
@@ -117,14 +122,3 @@ def _stacked(states: Array, dilation: int) -> Array:
         result[:, dilation:, 0] = states[:, :-dilation]
         result[:, :-dilation, 2] = states[:, dilation:]
     return result.reshape(batch, length, TAPS * width)
-
-
-def _unstacked(slopes: Array, dilation: int) -> Array:
-    """Return the derivative by ``states`` of what ``_stacked`` returns [shape=(B, T, C)], from that by its result."""
-    batch, length, width = slopes.shape
-    parts = slopes.reshape(batch, length, TAPS, width // TAPS)
-    result = parts[:, :, 1].copy()
-    if dilation < length:
-        result[:, :-dilation] += parts[:, dilation:, 0]
-        result[:, dilation:] += parts[:, :-dilation, 2]
-    return result

@@ -46,7 +46,7 @@ def run_em(
     model: ModelT,
     expect: Callable[[ModelT], StatisticsT],
     maximise: Callable[[ModelT, StatisticsT], ModelT],
-    most_steps: int,
+    max_steps: int,
     after_step: Callable[[int, ModelT, StatisticsT], None] = no_report,
     *,
     least_gain: float = -np.inf,
@@ -56,16 +56,16 @@ def run_em(
 
     expect     : the E-step: returns the sufficient statistics of the data under a model
     maximise   : the M-step: returns the model that the statistics make most likely
-    most_steps : stop after so many steps, 1 or more
+    max_steps : stop after so many steps, 1 or more
     after_step : is called after every step with its number (from 1), the new model, and the statistics of the step
     least_gain : stop at the first step whose E-step finds a mean log likelihood per frame that is higher by less than
-                 this than that of the step before; -inf: always take ``most_steps`` steps
+                 this than that of the step before; -inf: always take ``max_steps`` steps
     maximise_converged : whether the step at which EM stops for want of gain still has its M-step; without it, that step
                  is not reported to ``after_step``
     Source: Dempster, Laird & Rubin 1977.
     """
     log_likelihoods: list[float] = []
-    for step in range(1, most_steps + 1):
+    for step in range(1, max_steps + 1):
         statistics = expect(model)
         log_likelihoods.append(statistics.mean_log_likelihood)
         converged = step > 1 and log_likelihoods[-1] - log_likelihoods[-2] < least_gain

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,8 @@ SPLIT_STEP = 0.2
 """The halves of a split component move by so many standard deviations, in opposite directions."""
 BLOCK = 256
 """Frames whose components are computed at a time: these fit into the cache."""
-LEAST_LOG_SHARE = np.float32(-50)
-"""Least logarithm of a component's posterior, relative to the best component."""
+MIN_LOG_SHARE = np.float32(-50)
+"""Smallest logarithm of a component's posterior, relative to the best component."""
 LOG_2PI = float(np.log(2 * np.pi))
 MIXTURES = {
     "log_weights": ArraySpec(np.float32, "G M", -np.inf, 0.1),
@@ -23,7 +23,7 @@ MIXTURES = {
     "variances": ArraySpec(np.float32, "G M D", POSITIVE, LARGEST_VARIANCE),
 }
 """How mixtures of standardised values are stored; weights may be rounded to half precision."""
-LEAST_WEIGHT, MOST_WEIGHT = 0.5, 1.5
+MIN_WEIGHT, MAX_WEIGHT = 0.5, 1.5
 """Limits of the sum of a density's stored weights, which is 1 but for rounding."""
 
 
@@ -165,9 +165,7 @@ class Mixtures:
 
     def copy(self) -> Mixtures:
         """Return a copy in new arrays."""
-        return replace(
-            self, log_weights=self.log_weights.copy(), means=self.means.copy(), variances=self.variances.copy()
-        )
+        return Mixtures(self.log_weights.copy(), self.means.copy(), self.variances.copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,14 +209,14 @@ def normalised_components(
     """Return the log density of mixtures [shape=(T, G)], and posteriors of their components [shape=(T, M, G)].
 
     components : log weight + log density of each [shape=(T, M, G)], overwritten by the posteriors
-    With one component the posteriors, all 1, are not returned (None). Posteriors are e^``LEAST_LOG_SHARE`` of the best
+    With one component the posteriors, all 1, are not returned (None). Posteriors are e^``MIN_LOG_SHARE`` of the best
     one at least: products with smaller ones would be denormal, which is slow.
     """
     if components.shape[1] == 1:
         return components[:, 0], None
     best = components.max(axis=1)
     components -= best[:, None]
-    np.exp(np.maximum(components, LEAST_LOG_SHARE, out=components), out=components)
+    np.exp(np.maximum(components, MIN_LOG_SHARE, out=components), out=components)
     total = components.sum(axis=1)
     components /= total[:, None]
     return best + np.log(total), components
@@ -242,6 +240,6 @@ def make_equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
 def mixtures_from_arrays(stored: CheckedArrays) -> Mixtures:
     """Deserialise mixtures, stored as ``MIXTURES``. Raises ValueError: the weights of a density do not sum to 1."""
     total = np.exp(stored["log_weights"]).sum(axis=1)
-    if not ((total > LEAST_WEIGHT) & (total < MOST_WEIGHT)).all():
+    if not ((total > MIN_WEIGHT) & (total < MAX_WEIGHT)).all():
         raise ValueError("log_weights of a density without a Gaussian of a finite weight, or that do not sum to 1")
     return Mixtures(*(stored[name] for name in MIXTURES))

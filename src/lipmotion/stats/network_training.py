@@ -149,7 +149,7 @@ def fit_network(
             current = network.with_parameters(parameters)
             seeds = rng.integers(2**63, size=shards)
             jobs = [
-                threads.submit(_gradients, current, batch[shard::shards], scale / valid, plan.dropout, int(seed))
+                threads.submit(_differentiate, current, batch[shard::shards], scale / valid, plan.dropout, int(seed))
                 for shard, seed in enumerate(seeds)
             ]
             error, gradients = 0.0, [np.zeros_like(array) for array in parameters]
@@ -157,17 +157,11 @@ def fit_network(
                 shard_error, shard_gradients = job.result()
                 error += shard_error
                 gradients = [total + each for total, each in zip(gradients, shard_gradients, strict=True)]
-            optimiser.step(gradients, _rate(plan, step))
+            share = (step + 1) / plan.steps  # one cycle of the learning rate (Smith & Topin 2019)
+            fall = (1 + float(np.cos(np.pi * (share - WARM_UP_SHARE) / (1 - WARM_UP_SHARE)))) / 2
+            optimiser.step(gradients, plan.rate * (share / WARM_UP_SHARE if share < WARM_UP_SHARE else fall))
             report(step + 1, error)
     return network.with_parameters(parameters)
-
-
-def _rate(plan: TrainingPlan, step: int) -> float:
-    """Return the learning rate of a step, from 0: one cycle (Smith & Topin 2019)."""
-    share = (step + 1) / plan.steps
-    if share < WARM_UP_SHARE:
-        return plan.rate * share / WARM_UP_SHARE
-    return plan.rate * (1 + float(np.cos(np.pi * (share - WARM_UP_SHARE) / (1 - WARM_UP_SHARE)))) / 2
 
 
 class _AdamW:
@@ -195,7 +189,7 @@ class _AdamW:
             np.subtract(parameter, np.float32(rate) * change, out=parameter)
 
 
-def _gradients(
+def _differentiate(
     network: SequenceNetwork, batch: Sequence[TrainingSequence], weights: Array, dropout: float, seed: int
 ) -> tuple[float, list[Array]]:
     """Return the weighted squared error of some sequences, and its gradient for every parameter."""

@@ -14,7 +14,7 @@ ROWS = 256
 """Rows of a large table that are centred at a time."""
 SPARE_DIRECTIONS = 16
 """Additional directions of the iteration, which speed up its convergence."""
-TOLERANCE, MOST_PASSES = 1e-4, 12
+TOLERANCE, MAX_PASSES = 1e-4, 12
 """The iteration ends when a pass raises the explained variance by less than this share, or after so many passes."""
 ORTHONORMAL_TOLERANCE = 0.01
 """Largest error of the products of a stored basis' rows."""
@@ -55,13 +55,13 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
     largest = max(float(values.max()), -float(values.min()))  # no copy of a large table
     least = values.size * (largest * CONSTANT) ** 2
     if min(values.shape) > EXACT_ROWS:
-        basis = _leading(values, mean, components)
-    elif values.shape[0] < values.shape[1]:
-        basis = _of_rows(values - mean, components, least)
-    else:
-        centred = values - mean
-        basis = find_principal_axes(centred.T @ centred, components, least)
-    return Pca(mean, _with_signs(basis))
+        return Pca(mean, _fix_signs(_iterate_subspace(values, mean, components)))
+    centred = values - mean
+    if values.shape[0] >= values.shape[1]:
+        return Pca(mean, find_principal_axes(centred.T @ centred, components, least))
+    squares, vectors = np.linalg.eigh(centred @ centred.T)  # XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)
+    chosen = _find_largest(squares, components, least)
+    return Pca(mean, _fix_signs((vectors[:, chosen] / np.sqrt(squares[chosen])).T @ centred))
 
 
 def find_principal_axes(products: NDArray[np.float64], components: int, least: float = 0.0) -> NDArray[np.float64]:
@@ -71,10 +71,10 @@ def find_principal_axes(products: NDArray[np.float64], components: int, least: f
     Signs are those of ``fit_pca``.
     """
     squares, vectors = np.linalg.eigh(products)
-    return _with_signs(vectors[:, _largest(squares, components, least)].T)
+    return _fix_signs(vectors[:, _find_largest(squares, components, least)].T)
 
 
-def _with_signs(basis: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fix_signs(basis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return components [shape=(K, D)] with signs such that the entry furthest from 0 is positive."""
     signs = np.sign(basis[np.arange(len(basis)), np.abs(basis).argmax(axis=1)])
     return basis * signs[:, None]
@@ -87,14 +87,7 @@ def check_orthonormal(name: str, basis: NDArray[Any]) -> None:
         raise ValueError(f"{name} of rows that are not orthonormal (products {worst:g} off)")
 
 
-def _of_rows(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:
-    """Return the first components [shape=(K, D)] from the products of N < D rows: XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)."""
-    squares, vectors = np.linalg.eigh(centred @ centred.T)
-    kept = _largest(squares, components, least)
-    return (vectors[:, kept] / np.sqrt(squares[kept])).T @ centred
-
-
-def _largest(squares: NDArray[np.float64], count: int, least: float) -> NDArray[np.intp]:
+def _find_largest(squares: NDArray[np.float64], count: int, least: float) -> NDArray[np.intp]:
     """Return the indices of the largest of ascending numbers, without those that are rounding errors.
 
     least : largest value that rounding alone may produce
@@ -103,7 +96,7 @@ def _largest(squares: NDArray[np.float64], count: int, least: float) -> NDArray[
     return indices[squares[indices] > max(RANK_TOLERANCE * squares[-1], least)]
 
 
-def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+def _iterate_subspace(values: NDArray[Any], mean: NDArray[np.float64], components: int) -> NDArray[np.float64]:
     """Return the first components of a large table [shape=(K, D)], by block power iteration from some of its own rows.
 
     Source: Halko, Martinsson & Tropp 2011, §4.5 (subspace iteration) and §5.1; Rayleigh-Ritz at its end.
@@ -111,26 +104,18 @@ def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -
     size = min(components + SPARE_DIRECTIONS, *values.shape)
     start = values[choose_evenly(size, len(values))] - mean
     directions = np.linalg.qr(start.T.astype(np.float32))[0]
-    variance = 0.0
-    for _ in range(MOST_PASSES):
-        product = _covariance_times(values, mean, directions)
+    variance, centre = 0.0, mean.astype(np.float32)
+    for _ in range(MAX_PASSES):
+        product = np.zeros_like(directions)  # XᵀX · directions, in blocks of rows
+        for first in range(0, len(values), ROWS):
+            rows = values[first : first + ROWS] - centre
+            product += rows.T @ (rows @ directions)
         squares, rotation = np.linalg.eigh((directions.T @ product).astype(np.float64))
         before, variance = variance, float(squares[-components:].sum())
         if variance - before <= TOLERANCE * variance:
             break
         directions = np.linalg.qr(product)[0]
     return (directions @ rotation[:, ::-1][:, :components].astype(np.float32)).T.astype(np.float64)
-
-
-def _covariance_times(
-    values: NDArray[Any], mean: NDArray[np.float64], directions: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """Return XᵀXQ [shape=(D, K)] of centred values X, in blocks of rows, and directions Q [shape=(D, K)]."""
-    total, centre = np.zeros_like(directions), mean.astype(np.float32)
-    for start in range(0, len(values), ROWS):
-        rows = values[start : start + ROWS] - centre
-        total += rows.T @ (rows @ directions)
-    return total
 
 
 def choose_evenly(count: int, total: int) -> NDArray[np.intp]:

@@ -75,10 +75,8 @@ class RecurrentNetwork(SequenceNetwork):
             pieces = [(max(start - REACH, 0), start) for start in starts[number : number + PIECES]]
             rows = [inputs[first : start + PIECE + REACH] for first, start in pieces]
             length = max(len(each) for each in rows)
-            batch, inside = (
-                np.zeros((len(rows), length, inputs.shape[1]), np.float32),
-                np.zeros((len(rows), length), bool),
-            )
+            batch = np.zeros((len(rows), length, inputs.shape[1]), np.float32)
+            inside = np.zeros((len(rows), length), bool)
             for place, each in enumerate(rows):
                 batch[place, : len(each)], inside[place, : len(each)] = each, True
             states, _ = self.forward(batch, inside, None)
@@ -99,7 +97,7 @@ class RecurrentNetwork(SequenceNetwork):
     ) -> tuple[Array, list[_CellPass]]:
         states, passes, counts = inputs, [], _both_directions(inside[:, :, None].astype(np.float32))
         for layer in self.layers:
-            passed = _layer_pass(layer, _both_directions(states), counts)
+            passed = _run_layer(layer, _both_directions(states), counts)
             forth, back = passed.outputs[0], passed.outputs[1, ::-1]
             states = np.ascontiguousarray(np.concatenate([forth, back], axis=2).transpose(1, 0, 2))
             if dropout is not None:
@@ -111,7 +109,7 @@ class RecurrentNetwork(SequenceNetwork):
     def backward(self, slope: Array, passed: Any) -> list[Array]:  # noqa: D102
         gradients: list[Array] = []
         for layer, each in zip(reversed(self.layers), reversed(passed), strict=True):
-            by_layer, slope = _layer_gradients(layer, each, slope * each.dropped)
+            by_layer, slope = _differentiate_layer(layer, each, slope * each.dropped)
             gradients = [*by_layer, *gradients]
         return gradients
 
@@ -143,7 +141,7 @@ def _both_directions(values: Array) -> Array:
     return np.stack([forward, forward[::-1]])
 
 
-def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPass:
+def _run_layer(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPass:
     """Return the cells of one layer at all time steps; inputs [shape=(2, T, B, I)], inside [shape=(2, T, B, 1)]."""
     _, length, batch, size = inputs.shape
     cells = layer.memory.shape[1]
@@ -153,7 +151,7 @@ def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPas
     gates += biases
     gates = gates.reshape(2, length, batch, GATES, cells)
     memory = layer.memory * scale
-    kept, outputs = (np.empty((2, length, batch, cells), np.float32) for _ in range(2))
+    states, outputs = (np.empty((2, length, batch, cells), np.float32) for _ in range(2))
     cell, output = np.zeros((2, batch, cells), np.float32), np.zeros((2, batch, cells), np.float32)
     for step in range(length):
         gate = gates[:, step]
@@ -162,22 +160,22 @@ def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPas
         gate *= SLOPES
         gate += OFFSETS
         cell = (gate[:, :, 1] * cell + gate[:, :, 0] * gate[:, :, 2]) * inside[:, step]
-        kept[:, step] = cell
+        states[:, step] = cell
         output = gate[:, :, 3] * np.tanh(cell)
         outputs[:, step] = output
-    return _CellPass(inputs, gates, kept, outputs, inside, None)
+    return _CellPass(inputs, gates, states, outputs, inside, None)
 
 
-def _layer_gradients(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> tuple[list[Array], Array]:
+def _differentiate_layer(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> tuple[list[Array], Array]:
     """Return the gradients of the parameters of one layer, and that of its inputs [shape=(B, T, I)].
 
     slope : of its outputs [shape=(B, T, 2·H)]
     """
     _, length, batch, cells = passed.cells.shape
-    own = _both_directions(slope)
-    of_outputs = np.stack([own[0, :, :, :cells], own[1, :, :, cells:]])
+    forth, back = _both_directions(slope)
+    of_outputs = np.stack([forth[:, :, :cells], back[:, :, cells:]])
     gates, bent = passed.gates, np.tanh(passed.cells)
-    before = _before(passed.cells)
+    before = _shift(passed.cells)
     curve = gates * (1 - gates)
     by_cell = np.stack(
         [
@@ -188,7 +186,7 @@ def _layer_gradients(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> 
         axis=3,
     )
     by_output, to_cell = bent * curve[:, :, :, 3], gates[:, :, :, 3] * (1 - np.square(bent))
-    inner, back = np.empty_like(gates), np.ascontiguousarray(layer.memory.transpose(0, 2, 1))
+    inner, memory = np.empty_like(gates), np.ascontiguousarray(layer.memory.transpose(0, 2, 1))
     of_cell, of_output = (np.zeros((2, batch, cells), np.float32) for _ in range(2))
     for step in reversed(range(length)):
         of_output = of_output + of_outputs[:, step]
@@ -197,17 +195,17 @@ def _layer_gradients(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> 
         np.multiply(by_cell[:, step], of_cell[:, :, None], out=here[:, :, :3])
         np.multiply(by_output[:, step], of_output, out=here[:, :, 3])
         of_cell = of_cell * gates[:, step, :, 1]
-        of_output = np.matmul(here.reshape(2, batch, GATES * cells), back)
+        of_output = np.matmul(here.reshape(2, batch, GATES * cells), memory)
     flat = inner.reshape(2, length * batch, GATES * cells)
     inputs, outputs = (
-        values.reshape(2, length * batch, -1).transpose(0, 2, 1) for values in (passed.inputs, _before(passed.outputs))
+        values.reshape(2, length * batch, -1).transpose(0, 2, 1) for values in (passed.inputs, _shift(passed.outputs))
     )
     of_inputs = np.matmul(flat, layer.weights.transpose(0, 2, 1)).reshape(passed.inputs.shape)
     both = (of_inputs[0] + of_inputs[1, ::-1]).transpose(1, 0, 2)
     return [np.matmul(inputs, flat), np.matmul(outputs, flat), flat.sum(axis=1).reshape(-1)], both
 
 
-def _before(values: Array) -> Array:
+def _shift(values: Array) -> Array:
     """Return values at the time step before [shape=(2, T, B, C)], 0 before the first one."""
     result = np.zeros_like(values)
     result[:, 1:] = values[:, :-1]

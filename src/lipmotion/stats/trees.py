@@ -1,4 +1,4 @@
-"""Decision trees that tie states in context: contexts with the same answers to questions share a density."""
+"""Decision trees that tie states in context: contexts with the same answers share a density, or a regression."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 Likelihood = Callable[[Array], Array]
 """Function of N sufficient statistics [shape=(N, K)], the number of frames first: returns the log likelihood of each
 under the density estimated from it [shape=(N,)]."""
-LEAST_VARIANCE = 1e-12
-"""Least variance of a Gaussian."""
+MIN_VARIANCE = 1e-12
+"""Smallest variance of a Gaussian."""
 TIE = 1e-10
 """Gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal."""
 
@@ -116,7 +116,7 @@ POSITIONS = ("left", "unit", "right")
 _STORED_POSITIONS = [str(position) for position in range(len(POSITIONS))]
 
 
-def gaussian_log_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
+def gaussian_log_likelihood(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames under their maximum-likelihood diagonal Gaussian [shape=(N,)].
 
     statistics     : [shape=(N, 1 + 2·D)]: number of frames, sums, sums of squares
@@ -129,7 +129,7 @@ def gaussian_log_likelihood(statistics: Array, least_variance: float = LEAST_VAR
     return -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + spread / variance).sum(axis=1)
 
 
-def multispace_log_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
+def multispace_log_likelihood(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames, some without a value, under their maximum-likelihood density [shape=(N,)].
 
     statistics : [shape=(N, 2 + 2·D)]: number of frames, of frames with a value, and their sums and sums of squares
@@ -137,15 +137,11 @@ def multispace_log_likelihood(statistics: Array, least_variance: float = LEAST_V
     The density is a Gaussian for frames with a value and a point mass for those without one.
     """
     count, voiced = statistics[:, 0], statistics[:, 1]
-    whole = np.maximum(count, 1e-12)
-    likelihood: Array = _share_likelihood(voiced, whole) + _share_likelihood(count - voiced, whole)
+    total = np.maximum(count, 1e-12)
+    likelihood = np.zeros(len(count))
+    for part in (np.maximum(voiced, 0.0), np.maximum(count - voiced, 0.0)):
+        likelihood += part * np.log(np.where(part > 0, part, total) / total)
     return likelihood + np.where(voiced > 0, gaussian_log_likelihood(statistics[:, 1:], least_variance), 0.0)
-
-
-def _share_likelihood(part: Array, whole: Array) -> Array:
-    """Return part · log(part / whole), 0 where there is no part."""
-    part = np.maximum(part, 0.0)
-    return part * np.log(np.where(part > 0, part, whole) / whole)
 
 
 def grow_tree(
@@ -174,12 +170,24 @@ def grow_tree(
     no: list[int] = []
     frames: list[float] = []
 
+    def choose_question(members: NDArray[np.intp]) -> int:
+        """Return the number of the question with the largest gain; -1: no gain exceeds the price."""
+        total = statistics[members].sum(axis=0)
+        yes = answers[:, members] @ statistics[members]
+        allowed = np.nonzero((yes[:, 0] >= least) & (total[0] - yes[:, 0] >= least))[0]
+        if not len(allowed):
+            return -1
+        unsplit = log_likelihood(total[None])
+        gain = log_likelihood(yes[allowed]) + log_likelihood(total - yes[allowed]) - unsplit
+        tolerance = TIE * (np.abs(unsplit[0]) + total[0])
+        best = int(np.argmax(gain >= gain.max() - tolerance))  # the first: rounding must not choose among equal splits
+        return int(allowed[best]) if gain[best] > price else -1
+
     def add(members: NDArray[np.intp]) -> None:
         node = len(asked)
-        inside = statistics[members]
-        asked.append(_best_question(answers[:, members], inside, log_likelihood, price, least))
+        asked.append(choose_question(members))
         no.append(-1)
-        frames.append(float(inside[:, 0].sum()))
+        frames.append(float(statistics[members, 0].sum()))
         if asked[node] >= 0:
             yes = answers[asked[node], members] > 0
             add(members[yes])
@@ -190,35 +198,14 @@ def grow_tree(
     return Tree(questions, np.array(asked, np.int32), np.array(no, np.int32), np.array(frames))
 
 
-def _best_question(answers: Array, statistics: Array, log_likelihood: Likelihood, price: float, least: float) -> int:
-    """Return the number of the question with the largest gain in log likelihood; -1: no gain exceeds the price.
-
-    answers    : of each question for each context [shape=(N, C)], 1 for yes
-    statistics : of the contexts [shape=(C, K)]
-    Of several equal gains the first question's is taken.
-    """
-    total = statistics.sum(axis=0)
-    yes = answers @ statistics
-    allowed = np.nonzero((yes[:, 0] >= least) & (total[0] - yes[:, 0] >= least))[0]
-    if not len(allowed):
-        return -1
-    whole = log_likelihood(total[None])
-    gain = log_likelihood(yes[allowed]) + log_likelihood(total - yes[allowed]) - whole
-    tolerance = TIE * (np.abs(whole[0]) + total[0])
-    best = int(np.argmax(gain >= gain.max() - tolerance))  # the first: rounding must not choose among equal splits
-    return int(allowed[best]) if gain[best] > price else -1
-
-
 def trees_to_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
     """Serialise trees that share their questions, by name; only questions that are asked are stored."""
     questions = next(iter(trees.values())).questions
     asked = np.concatenate([tree.asked for tree in trees.values()])
     used = np.unique(asked[asked >= 0])
-    kept = [questions[number] for number in used]
+    stored = [(str(q.position), q.name, " ".join(sorted(q.members))) for q in (questions[n] for n in used)]
     return {
-        "questions": np.array([(str(q.position), q.name, " ".join(sorted(q.members))) for q in kept], np.str_).reshape(
-            -1, 3
-        ),
+        "questions": np.array(stored, np.str_).reshape(-1, 3),
         "trees": np.array(list(trees)),
         "sizes": np.array([len(tree.asked) for tree in trees.values()], np.int32),
         "asked": np.where(asked >= 0, np.searchsorted(used, asked), -1).astype(np.int32),
@@ -271,3 +258,69 @@ def _check_nodes(asked: NDArray[np.int32], no: NDArray[np.int32], questions: int
             ends.append(int(no[node]))
         elif node + 1 != ends[-1]:
             raise ValueError("a tree whose branches do not meet")
+
+
+@dataclass(frozen=True, eq=False)
+class RegressionStatistics:
+    """Sufficient statistics of a regression of targets r [shape=(P,)] on inputs z [shape=(F,)]; accumulated in place.
+
+    products : Σ z zᵀ [shape=(F, F)]
+    targets  : Σ z rᵀ [shape=(F, P)]
+    """
+
+    products: Array
+    targets: Array
+
+    def add(self, z: NDArray[np.floating[Any]], r: NDArray[np.floating[Any]]) -> None:
+        """Accumulate the statistics of frames [shapes=(N, F), (N, P)]."""
+        np.add(self.products, z.T @ z, out=self.products)
+        np.add(self.targets, z.T @ r, out=self.targets)
+
+    def __add__(self, other: RegressionStatistics) -> RegressionStatistics:
+        return RegressionStatistics(self.products + other.products, self.targets + other.targets)
+
+
+def zero_statistics(inputs: int, outputs: int) -> RegressionStatistics:
+    """Return the statistics of no frames."""
+    return RegressionStatistics(np.zeros((inputs, inputs)), np.zeros((inputs, outputs)))
+
+
+def ridge(moments: RegressionStatistics, prior: Array, strength: float) -> Array:
+    """Return the coefficients of a ridge regression towards a prior [shape=(F, P)].
+
+    prior    : coefficients [shape=(F, P)]
+    strength : weight of the prior, in squared units of z
+    argmin Σ |r - Cᵀz|² + strength |C - prior|²
+    """
+    system = moments.products + strength * np.eye(len(moments.products))
+    return prior + np.linalg.solve(system, moments.targets - moments.products @ prior).astype(float)
+
+
+def fit_regression_node(tree: Tree, path: list[int], least: float) -> int:
+    """Return the last node of a path that has at least ``least`` frames, enough for its own regression; or the root."""
+    return next((node for node in reversed(path) if tree.frames[node] >= least), 0)
+
+
+def fit_tree_regressions(
+    tree: Tree, moments: Mapping[int, RegressionStatistics], shared: Array, strength: float
+) -> dict[int, Array]:
+    """Return the coefficients of every node in ``moments`` [shape=(F, P)]; each has those of the node above as prior.
+
+    moments : by node, the statistics of the leaves whose regression is that of the node (``fit_regression_node``)
+    shared  : the prior of the root
+    """
+    regressions: dict[int, Array] = {}
+
+    def visit(node: int, end: int, prior: Array) -> None:
+        inside = [moments[other] for other in moments if node <= other < end]
+        if not inside:
+            return
+        coefficients = ridge(sum(inside[1:], inside[0]), prior, strength)
+        if node in moments:
+            regressions[node] = coefficients
+        if tree.asked[node] >= 0:
+            visit(node + 1, int(tree.no[node]), coefficients)
+            visit(int(tree.no[node]), end, coefficients)
+
+    visit(0, len(tree.asked), shared)
+    return regressions

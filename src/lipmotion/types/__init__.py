@@ -7,7 +7,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from lipmotion.types.audio import Audio, from_sixteen_bits, to_sixteen_bits
+    from lipmotion.types.audio import Audio, Prosody, VoiceEvent, from_sixteen_bits, to_sixteen_bits
     from lipmotion.types.confidence import SpeechKnowledge
     from lipmotion.types.configuration import Configuration, Rule, option
     from lipmotion.types.delivery import Delivery
@@ -49,14 +49,18 @@ if TYPE_CHECKING:
         StateTrace,
     )
     from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
-    from lipmotion.types.parallel_map import ParallelMap
-    from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor, sub_monitor, with_progress
-    from lipmotion.types.prosody import Prosody
+    from lipmotion.types.progress import (
+        Item,
+        Monitor,
+        ParallelMap,
+        Progress,
+        silent_monitor,
+        sub_monitor,
+        with_progress,
+    )
     from lipmotion.types.staging import Staging
     from lipmotion.types.timeline import Span, Timeline, Unit
-    from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, sort_lines
-    from lipmotion.types.utterance import Track, Utterance
-    from lipmotion.types.voice_event import VoiceEvent
+    from lipmotion.types.utterance import TimedTranscript, TimedWord, Track, TranscriptLine, Utterance, sort_lines
 
 __all__ = [
     "ENERGY_FEATURE",
@@ -128,7 +132,7 @@ __all__ = [
 
 _MODULES = (
     *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "confidence"),
-    *("generation", "progress", "explanation", "parallel_map", "prosody", "transcript", "utterance", "voice_event"),
+    *("generation", "progress", "explanation", "utterance"),
 )
 """Where the names are looked for, in this order."""
 

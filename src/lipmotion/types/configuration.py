@@ -63,19 +63,19 @@ class Rule:
 ANY = Rule()
 
 
-def option(default: Any, rule: Rule = ANY, *, later: bool = False, **told: Any) -> Any:
+def option(default: Any, rule: Rule = ANY, *, omit_default: bool = False, **shown: Any) -> Any:
     """Return a dataclass field with a default value and a rule for its values.
 
-    later : the option was added after models were published: a header leaves it out where it has its default value, so
-            that earlier versions can read the model
-    told  : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
+    omit_default : the option was added after models were published: a header leaves it out where it has its default
+            value, so that earlier versions can read the model
+    shown : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
             ``what``: what messages call it; ``values``: the classes whose values are taken, too, by their names (so
             they need not be imported), and what messages say of them. What the command line shows, of options that
             are there (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are not
             the field's), still (the option that lists what of several is switched off). Of files: reads (what
             it is), replaceable, default_path, writes, all as of cli.arguments.paths
     """
-    return field(default=default, metadata={"rule": rule, "later": later, **told})
+    return field(default=default, metadata={"rule": rule, "omit_default": omit_default, **shown})
 
 
 @dataclass(frozen=True)
@@ -87,25 +87,26 @@ class Configuration:
 
     presets : combinations of options by name
     preset_visual : the kind of motion that a preset is trained on where none is asked for (``train``), by its name
-    former  : former names of options, mapped to the present names; both are accepted
-    gone    : options that no longer exist, mapped to the only value that is still accepted
-    absent  : options that headers of models leave out where they have this value, which is not the default any more
+    aliases : former names of options, mapped to the present names; both are accepted
+    removed : options that no longer exist, mapped to the only value that is still accepted
+    default_if_missing : options that headers of models leave out where they have this value, which is not the default
+              any more
     hints   : names that users might try, mapped to a text that says what to use instead
     Raises InputError: a value has another type than its option, or its rule does not allow it.
     """
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     preset_visual: ClassVar[Mapping[str, str]] = {}
-    former: ClassVar[Mapping[str, str]] = {}
-    gone: ClassVar[Mapping[str, Any]] = {}
-    absent: ClassVar[Mapping[str, Any]] = {}
+    aliases: ClassVar[Mapping[str, str]] = {}
+    removed: ClassVar[Mapping[str, Any]] = {}
+    default_if_missing: ClassVar[Mapping[str, Any]] = {}
     hints: ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
         for option_field in fields(self):
-            given, kind = getattr(self, option_field.name), kind_of(option_field)
-            if (kind is Path and isinstance(given, str)) or (kind is tuple and isinstance(given, list)):
-                object.__setattr__(self, option_field.name, kind(given))
+            value, kind = getattr(self, option_field.name), kind_of(option_field)
+            if (kind is Path and isinstance(value, str)) or (kind is tuple and isinstance(value, list)):
+                object.__setattr__(self, option_field.name, kind(value))
             check_value(option_field, getattr(self, option_field.name))
 
     def check_files(self) -> None:
@@ -120,11 +121,13 @@ class Configuration:
         known = {option_field.name: kind_of(option_field) for option_field in fields(cls)}
         options: dict[str, Any] = {}
         for name, value in values.items():
-            if name in cls.gone and name not in known:
-                if value != cls.gone[name]:
-                    raise InputError(f"{name} is {value!r}; this option no longer exists, required {cls.gone[name]!r}")
+            if name in cls.removed and name not in known:
+                if value != cls.removed[name]:
+                    raise InputError(
+                        f"{name} is {value!r}; this option no longer exists, required {cls.removed[name]!r}"
+                    )
                 continue
-            present = cls.former.get(name, name)
+            present = cls.aliases.get(name, name)
             if present not in known:
                 raise InputError(cls._unknown(name))
             options[present] = _part(present, known[present], value)
@@ -142,7 +145,7 @@ class Configuration:
             name, equals, text = setting.partition("=")
             if not equals:
                 raise InputError(f"the setting {setting!r} has no value; required NAME=VALUE")
-            present = cls.former.get(name, name)
+            present = cls.aliases.get(name, name)
             if present not in options:
                 raise InputError(cls._unknown(name))
             values[present] = _from_text(options[present], text)
@@ -160,13 +163,14 @@ class Configuration:
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the values of all options, by name, as the header of a model stores them."""
-        later = {each.name: each.default for each in fields(self) if each.metadata.get("later")} | dict(self.absent)
-        return {name: value for name, value in asdict(self).items() if name not in later or value != later[name]}
+        omitted = {each.name: each.default for each in fields(self) if each.metadata.get("omit_default")}
+        omitted |= self.default_if_missing
+        return {name: value for name, value in asdict(self).items() if name not in omitted or value != omitted[name]}
 
     @classmethod
     def stored(cls: type[ConfigurationT], values: Mapping[str, Any]) -> ConfigurationT:
         """Return the configuration of which ``as_mapping`` returned some values. Raises as ``parsed``."""
-        return cls.parsed({**cls.absent, **values})
+        return cls.parsed({**cls.default_if_missing, **values})
 
 
 def check_value(option_field: Field[Any], value: Any) -> None:

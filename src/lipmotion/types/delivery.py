@@ -65,7 +65,7 @@ class Delivery(Configuration):
     stepped: bool = option(False, help="hold poses instead of moving smoothly, each for at least 83 ms")
     mood: str = option(
         "",
-        later=True,
+        omit_default=True,
         metavar="MOOD[:STRENGTH]",
         help="neutral, happy, sad, angry, afraid, disgusted, surprised, tense, tired; plain, whisper, shout, mumble; "
         "strength 0 to 1; over time: 'happy:0.7, sad at 2.5' (docs/expression.md)",
@@ -74,7 +74,7 @@ class Delivery(Configuration):
         0.0,
         Rule(0, most=1),
         what="tolerance of keys",
-        later=True,
+        omit_default=True,
         metavar="X",
         help="leave out keys of .glb .usda .anim .tres .vmd that others give to within X of a weight, as 0.01",
     )

@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.types.audio import Audio
+from lipmotion.types.audio import Audio, VoiceEvent
 from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
 from lipmotion.types.moods import MoodKey
 from lipmotion.types.motion import Motion, interpolate_rows
 from lipmotion.types.timeline import Span, Timeline, Unit
-from lipmotion.types.voice_event import VoiceEvent
 
-KeptT = TypeVar("KeptT")
+CachedT = TypeVar("CachedT")
+LARGEST_GAIN, MAX_DRAWN = 3.0, 10_000
+"""Largest factor of movements, and largest number of values of a drawn curve."""
+RowChange = Callable[[NDArray[np.floating[Any]]], NDArray[np.floating[Any]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ class Speech:
     voice       : 0 to 1, how well the model's training knows the voice
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
     encoding    : float16 array [shape=(T, 64)], of the speech encoder (None: the engine does not use it)
-    kept        : what was computed of the sound alone (``once``); speech with other units shares it
+    cache       : what was computed of the sound alone (``cached``); speech with other units shares it
     parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
                   empty: nothing is said. Beside it, features, spectrum, posteriors and encoding may be ``JoinedRows``
     """
@@ -70,20 +72,20 @@ class Speech:
     posteriors: TokenPosteriors | None = None
     encoding: NDArray[np.float16] | None = None
     times_given: bool = False
-    kept: dict[Any, Any] = field(default_factory=dict, repr=False)
+    cache: dict[Any, Any] = field(default_factory=dict, repr=False)
     parts: tuple[SpeechPart, ...] | None = None
 
-    def once(self, of: Any, make: Callable[[], KeptT]) -> KeptT:
+    def cached(self, of: Any, make: Callable[[], CachedT]) -> CachedT:
         """Return what a function makes of the sound; speech of the same sound with other units shares it.
 
         of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
         """
         sound = (self.features, self.log_f0, self.spectrum, self.posteriors, self.encoding)
-        found = self.kept.get(of)
-        if found is None or any(ours is not theirs for ours, theirs in zip(sound, found[0], strict=True)):
-            found = self.kept[of] = (sound, make())
-        made: KeptT = found[1]
-        return made
+        entry = self.cache.get(of)
+        if entry is None or any(ours is not theirs for ours, theirs in zip(sound, entry[0], strict=True)):
+            entry = self.cache[of] = (sound, make())
+        result: CachedT = entry[1]
+        return result
 
     def with_arrays(self) -> Speech:
         """Return the same with an array in place of all ``JoinedRows``, for an engine that takes it as one passage."""
@@ -180,7 +182,11 @@ class Pin:
 
     def __post_init__(self) -> None:
         for name, number in (("time", self.time_s), ("value", self.value)):
-            if not _is_number(number):
+            try:
+                is_number = isinstance(number, Real) and isinstance(float(number), float)
+            except OverflowError:
+                is_number = False
+            if not is_number:
                 raise InputError(f"the {name} of a pin is {shorten(repr(number))}, required a number")
 
 
@@ -211,9 +217,6 @@ class Gain:
             )
 
 
-LARGEST_GAIN = 3.0
-
-
 @dataclass(frozen=True)
 class DrawnCurve:
     """Values that a curve takes over a stretch, as somebody has drawn them.
@@ -221,7 +224,7 @@ class DrawnCurve:
     start_s, end_s : seconds; before and after them the curve goes over into them within 0.1 s
     channel : name of a channel or curve
     values  : at equal distances from the start to the end, in the unit of the channel
-    Raises InputError: fewer than 2 values, or more than ``MOST_DRAWN``; no numbers; or an end that is not after the
+    Raises InputError: fewer than 2 values, or more than ``MAX_DRAWN``; no numbers; or an end that is not after the
     start.
 
     >>> DrawnCurve(1.0, 1.5, "opening", (0.0, 0.1, 0.0)).channel
@@ -234,12 +237,9 @@ class DrawnCurve:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if not 2 <= len(self.values) <= MOST_DRAWN or not all(map(math.isfinite, self.values)):
-            raise InputError(f"{len(self.values)} values are drawn, required 2 to {MOST_DRAWN} finite numbers")
+        if not 2 <= len(self.values) <= MAX_DRAWN or not all(map(math.isfinite, self.values)):
+            raise InputError(f"{len(self.values)} values are drawn, required 2 to {MAX_DRAWN} finite numbers")
         _check_stretch(self.start_s, self.end_s)
-
-
-MOST_DRAWN = 10_000
 
 
 @dataclass(frozen=True)
@@ -286,14 +286,6 @@ class Constraints:
         if not isinstance(self.pins, Collection) or not all(isinstance(pin, Pin) for pin in self.pins):
             found = shorten(repr(self.pins))
             raise InputError(f"constraints of {found}, required pins: Constraints((Pin(0.5, 'opening', 0.02),))")
-
-
-def _is_number(value: object) -> bool:
-    """Return whether a value is a real number that a float can hold; NaN and infinity are."""
-    try:
-        return isinstance(value, Real) and isinstance(float(value), float)
-    except OverflowError:
-        return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -445,17 +437,18 @@ class Generation:
         columns = [self.motion.column(name) for name in names]
         channels = tuple(self.motion.channels[column] for column in columns)
         motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
-        if isinstance(self.spread, ReducedVariance):
-            return replace(self, motion=motion, spread=replace(self.spread, mixing=self.spread.mixing[:, columns]))
-        return replace(self, motion=motion, spread=self.spread[:, columns])
+        return replace(self, motion=motion, spread=self._change_channels(lambda rows: rows[:, columns]))
 
     def with_motion(self, motion: Motion) -> Generation:
         """Return the generation with other motion; channels after its own have the variance 0."""
         added = len(motion.channels) - len(self.motion.channels)
+        spread = self._change_channels(lambda rows: np.pad(rows, ((0, 0), (0, added))))
+        return replace(self, motion=motion, spread=spread)
+
+    def _change_channels(self, change: RowChange) -> NDArray[np.floating[Any]] | ReducedVariance:
         if isinstance(self.spread, ReducedVariance):
-            mixing = np.pad(self.spread.mixing, ((0, 0), (0, added)))
-            return replace(self, motion=motion, spread=replace(self.spread, mixing=mixing))
-        return replace(self, motion=motion, spread=np.pad(self.spread, ((0, 0), (0, added))))
+            return replace(self.spread, mixing=change(self.spread.mixing))
+        return change(self.spread)
 
     def resampled(self, rate_hz: float) -> Generation:
         """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
@@ -463,15 +456,13 @@ class Generation:
         Raises InputError: the rate is not more than 0.
         """
         motion = self.motion.resampled(rate_hz)
-        spread = self.changed_spread(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
+        spread = self.change_frames(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
         return replace(
             self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])
         )
 
-    def changed_spread(
-        self, change: Callable[[NDArray[np.floating[Any]]], NDArray[np.floating[Any]]]
-    ) -> NDArray[np.floating[Any]] | ReducedVariance:
+    def change_frames(self, change: RowChange) -> NDArray[np.floating[Any]] | ReducedVariance:
         """Return the variances with other rows, which a function makes of those of all frames."""
         if isinstance(self.spread, ReducedVariance):
             return replace(self.spread, reduced=change(self.spread.reduced))

@@ -1,12 +1,15 @@
-"""Reports of the progress of long work, and monitors, the functions that receive them."""
+"""Long work: reports of its progress, monitors, which receive them, and maps over several processes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
+REPORT_INTERVAL = 10
+"""Every so many items are reported."""
 
 
 @dataclass(frozen=True)
@@ -74,13 +77,16 @@ def with_reports(items: Iterable[ItemT], count: int, stage: str, monitor: Monito
     monitor(Progress(stage, count, count, 1.0))
 
 
-REPORT_INTERVAL = 10
-"""Every so many items are reported."""
-
-
 def with_progress(items: Sequence[ItemT], stage: str, monitor: Monitor) -> Iterator[ItemT]:
     """Yield the items one by one, and report after each how many of them are done."""
     for number, item in enumerate(items):
         monitor(Progress(stage, number, len(items), number / len(items)))
         yield item
     monitor(Progress(stage, len(items), len(items), 1.0))
+
+
+class ParallelMap(Protocol):
+    """A function as the built-in ``map``, which may run in several processes: function and items are then copied."""
+
+    def __call__(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        """Return the results of the function, in the order of the items."""

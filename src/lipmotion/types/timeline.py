@@ -70,12 +70,16 @@ class Timeline(Generic[LabelT]):
     def __post_init__(self) -> None:
         end_s = float("-inf")
         for span in self.spans:
-            _check_times(span)
+            try:
+                _ = span.start_s + 0.0 <= span.end_s + 0.0  # numbers, and such as a float can hold
+            except (TypeError, ValueError, OverflowError) as error:
+                first, last = (shorten(repr(time_s)) for time_s in (span.start_s, span.end_s))
+                raise InputError(f"{_describe(span)} lasts from {first} to {last}, required seconds") from error
             if not span.start_s <= span.end_s:
-                raise InputError(f"{_described(span)} ends at {span.end_s} s, before its start at {span.start_s} s")
+                raise InputError(f"{_describe(span)} ends at {span.end_s} s, before its start at {span.start_s} s")
             if span.start_s < end_s - 1e-9:
                 raise InputError(
-                    f"{_described(span)} starts at {span.start_s} s, before the previous span ends ({end_s} s); they "
+                    f"{_describe(span)} starts at {span.start_s} s, before the previous span ends ({end_s} s); they "
                     "must not overlap: correct one of the times"
                 )
             end_s = span.end_s
@@ -104,16 +108,7 @@ class Timeline(Generic[LabelT]):
         return Timeline(tuple(replace(s, start_s=s.start_s + offset_s, end_s=s.end_s + offset_s) for s in self.spans))
 
 
-def _check_times(span: Span[LabelT]) -> None:
-    """Raise InputError if a time is no number, or one that no float can hold."""
-    try:
-        _ = span.start_s + 0.0 <= span.end_s + 0.0
-    except (TypeError, ValueError, OverflowError) as error:
-        first, last = (shorten(repr(time_s)) for time_s in (span.start_s, span.end_s))
-        raise InputError(f"{_described(span)} lasts from {first} to {last}, required seconds") from error
-
-
-def _described(span: Span[LabelT]) -> str:
+def _describe(span: Span[LabelT]) -> str:
     """Return what a span is, for messages: the phone, the unit, or another label."""
     label = span.label
     if isinstance(label, Unit):

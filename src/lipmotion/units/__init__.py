@@ -1,8 +1,14 @@
 """Phones, visemes, unit sets, and words with their pronunciations. Data and look-ups, no audio."""
 
-from lipmotion.units.classes import list_phone_classes
-from lipmotion.units.length_limits import check_phones, check_text, check_words
 from lipmotion.units.lexicon import Lexicon, Pronunciation, find_phone, reduce_vowels
+from lipmotion.units.phone_timelines import (
+    RECOGNISED,
+    RecognisedPhone,
+    close_gaps,
+    group_words,
+    list_recognised_phones,
+    restore_confidences,
+)
 from lipmotion.units.phones import (
     LIP_CLOSING,
     PAUSE,
@@ -14,20 +20,12 @@ from lipmotion.units.phones import (
     find_similar_lips,
     find_similar_phone,
     is_silent,
+    list_phone_classes,
     mark_closing_phones,
 )
-from lipmotion.units.recognised import (
-    RECOGNISED,
-    RecognisedPhone,
-    close_gaps,
-    list_recognised_phones,
-    restore_confidences,
-)
-from lipmotion.units.text_normalisation import find_words, split_words
-from lipmotion.units.unit_set import UnitSet
-from lipmotion.units.unit_sets import UNIT_SETS, load_unit_set
+from lipmotion.units.text_normalisation import check_phones, check_text, check_words, find_words, split_words
+from lipmotion.units.unit_sets import UNIT_SETS, UnitSet, load_unit_set
 from lipmotion.units.visemes import VISEME_OF, VISEMES, VOWELS
-from lipmotion.units.word_spans import group_words
 
 __all__ = [
     "LIP_CLOSING",

@@ -60,11 +60,11 @@ OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be
 LENGTHENED, REPEATED = re.compile(r"(.)\1\1|^(..+?)\2"), re.compile(r"([a-z]{2,4}?)\1+h?")
 SOUNDED = re.compile(r"(?=.*(.)\1\1|.*rr\Z|p[sf]{2})(?!([^fhmrsvz])\2*\Z)[b-df-hj-np-tv-xz]+\Z")
 """Sounds in letters: ``brrr``, ``psst``, ``fff``; no dictionary has them, and their letters are not spelled."""
-LONGEST_LENGTHENED, MOST_LENGTHENED = 100, 5
+LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5
 """A word of more letters, or with more that are doubled, is none of these."""
 VARIANT_NUMBER = re.compile(r"\(\d+\)$")
 """The number by which the dictionary marks a further pronunciation."""
-MOST_VARIANTS = 32
+MAX_VARIANTS = 32
 """Most pronunciations of a word: alignment tries each after each of the word before. In the dictionary there are up to
 six."""
 
@@ -101,14 +101,32 @@ class Lexicon:
 
         Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
         Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MAX_LINES``,
-        ``LONGEST_LINE``, ``MOST_VARIANTS``), no phones after a word, or an unknown phone (with its line).
+        ``LONGEST_LINE``, ``MAX_VARIANTS``), no phones after a word, or an unknown phone (with its line).
         """
         user: dict[str, list[Pronunciation]] = {}
         for number, line in enumerate(_lines(Path(path)), start=1):
-            try:
-                _add_line(user, line)
-            except InputError as error:
-                raise InputError(f"{path}, line {number}: {error}") from error
+            where = f"{path}, line {number}"
+            if len(line) > LONGEST_LINE:
+                raise InputError(
+                    f"{where}: {len(line)} characters, required at most {LONGEST_LINE}; write one pronunciation of a "
+                    "word a line"
+                )
+            word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
+            if not word:
+                continue
+            if not labels:
+                raise InputError(f"{where}: a word without phones; write the word, then its phones")
+            word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
+            phones = tuple([phone for phone in map(_spoken_phone, labels) if phone])
+            if len(phones) < len(labels):
+                wrong = shorten(next(label for label in labels if not _spoken_phone(label)))
+                raise InputError(f"{where}: unknown phone {wrong!r}; the phones are: {' '.join(PHONES)}")
+            variants = user.setdefault(word, [])
+            if len(variants) == MAX_VARIANTS:
+                raise InputError(
+                    f"{where}: more than {MAX_VARIANTS} pronunciations of {shorten(word)!r}; keep those that are said"
+                )
+            variants.append(phones)
         return cls({word: tuple(variants) for word, variants in user.items()})
 
     def known(self, word: str) -> bool:
@@ -135,9 +153,9 @@ class Lexicon:
         own = tuple(reading for reading in said if len(reading) == 1 and reading[0] in self.user)
         forms: list[SpokenForm] = []
         for reading in ((word,),) if word in self.user else own or said:
-            choices = [self._of_word(each) for each in reading]
+            choices = [self._pronounce(each) for each in reading]
             several = len(said) > 1 and len(reading) > 1  # then not in all their pronunciations
-            for number in range(min(max(map(len, choices)), 2 if several else MOST_VARIANTS)):
+            for number in range(min(max(map(len, choices)), 2 if several else MAX_VARIANTS)):
                 form: list[tuple[str, str]] = []
                 for each, variants in zip(reading, choices, strict=True):
                     form += [(PAUSE, "")] if form else []
@@ -145,7 +163,7 @@ class Lexicon:
                 forms.append(tuple(form))
         return tuple(dict.fromkeys(forms))
 
-    def _of_word(self, word: str) -> tuple[Pronunciation, ...]:
+    def _pronounce(self, word: str) -> tuple[Pronunciation, ...]:
         """Return the pronunciations of one word."""
         if word in self.user:
             return self.user[word]
@@ -179,28 +197,12 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
         (run[0],) if len(run) == 1 else (run[0], 2 * run[0]) if run[0] in "aiuy" else (2 * run[0], run[0])
         for run in runs
     ]
-    if max(map(len, runs)) > 2 and sum(len(each) > 1 for each in choices) <= MOST_LENGTHENED:
+    if max(map(len, runs)) > 2 and sum(len(each) > 1 for each in choices) <= MAX_LENGTHENED:
         shortest = 3 if SOUNDED.fullmatch(plain) else 1  # "sss" is no name of a letter
         known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and in_dictionary(each)]
         return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
     found = REPEATED.fullmatch(plain)
     return ((found[1],) * found[0].count(found[1]),) if found and in_dictionary(found[1]) else ()
-
-
-def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
-    """Add the pronunciation in a line, if there is one."""
-    if len(line) > LONGEST_LINE:
-        raise InputError(
-            f"{len(line)} characters, required at most {LONGEST_LINE}; write one pronunciation of a word a line"
-        )
-    word, *phones = line.split("#", maxsplit=1)[0].split() or [""]
-    if not word:
-        return
-    word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
-    variants = user.setdefault(word, [])
-    if len(variants) == MOST_VARIANTS:
-        raise InputError(f"more than {MOST_VARIANTS} pronunciations of {shorten(word)!r}; keep those that are said")
-    variants.append(_user_phones(phones))
 
 
 def _lines(path: Path) -> Iterator[str]:
@@ -214,16 +216,6 @@ def _lines(path: Path) -> Iterator[str]:
         end = text.find("\n", start) if number < count else len(text)
         yield text[start:end]
         start = end + 1
-
-
-def _user_phones(phones: list[str]) -> Pronunciation:
-    if not phones:
-        raise InputError("a word without phones; write the word, then its phones")
-    names = tuple([name for name in map(_spoken_phone, phones) if name])
-    if len(names) < len(phones):
-        wrong = next(phone for phone in phones if not _spoken_phone(phone))
-        raise InputError(f"unknown phone {shorten(wrong)!r}; the phones are: {' '.join(PHONES)}")
-    return names
 
 
 @lru_cache(maxsize=4096)
@@ -282,15 +274,9 @@ def reduce_vowels(word: str, phones: Pronunciation) -> Pronunciation:
     precedes the last syllable's: ``b ah t axr`` but ``ax b aw t``.
     """
     vowels = [i for i, phone in enumerate(phones) if phone in FULL_VOWELS or phone in REDUCED_VOWELS]
-    stressed = set() if word in WEAK_WORDS else {_stressed_vowel(phones, vowels)}
-    return tuple(REDUCED_VOWELS.get(p, p) if i not in stressed else p for i, p in enumerate(phones))
-
-
-def _stressed_vowel(phones: Pronunciation, vowels: list[int]) -> int:
-    """Return the index of the vowel that is taken as stressed, -1 where there is none."""
-    if not vowels:
-        return -1
-    first = vowels[0]
-    if len(vowels) == 1 or phones[first] in FULL_VOWELS or first > 0:
-        return first
-    return next((i for i in vowels if phones[i] in FULL_VOWELS), vowels[1])
+    stressed = -1
+    if vowels and word not in WEAK_WORDS:
+        stressed = vowels[0]
+        if len(vowels) > 1 and phones[stressed] not in FULL_VOWELS and stressed == 0:
+            stressed = next((i for i in vowels if phones[i] in FULL_VOWELS), vowels[1])
+    return tuple(REDUCED_VOWELS.get(p, p) if i != stressed else p for i, p in enumerate(phones))

@@ -10,9 +10,9 @@ from typing import NamedTuple
 from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.moods import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
+from lipmotion.units.phone_timelines import group_words
 from lipmotion.units.spoken_text import find_speaker_names, remove_speakers
 from lipmotion.units.text_normalisation import find_words
-from lipmotion.units.word_spans import group_words
 
 LOG = logging.getLogger("lipmotion")
 TAG = re.compile(
@@ -70,7 +70,7 @@ def parse_tagged_text(text: str, words: Callable[[str], Sequence[str]] = find_wo
 MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral', strength=1.0)))
     """
     text, unknown = remove_speakers(LINK.sub(r"\1", text), find_speaker_names([text]))
-    spoken, found, last = "", [], 0
+    spoken, tags, last = "", [], 0
     for tag in TAG.finditer(text):
         meaning = _meaning(tag)
         if tag["did"] and meaning is None:
@@ -81,15 +81,15 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
         if meaning is None:
             unknown.append(tag[0])
         else:
-            found.append((len(words(spoken)), *meaning))
+            tags.append((len(words(spoken)), *meaning))
     spoken += text[last:]
-    if not found and not unknown:
+    if not tags and not unknown:
         return TaggedText(text, ())
     if unknown:
         named = ", ".join(map(shorten, dict.fromkeys(unknown)))
         LOG.warning("not known, and not spoken: %s; known tags are [happy], [sad:0.5], ... (docs/expression.md)", named)
     count = max(len(words(spoken)), 1)
-    return TaggedText(spoken, tuple(MoodTag(before / count, mood, strength) for before, mood, strength in found))
+    return TaggedText(spoken, tuple(MoodTag(before / count, mood, strength) for before, mood, strength in tags))
 
 
 def remove_known_tags(text: str) -> str:

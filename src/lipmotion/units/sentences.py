@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from lipmotion.errors import InputError, shorten
 from lipmotion.units.text_normalisation import find_words
 
-MOST_CHARACTERS = 50_000
+MAX_CHARACTERS = 50_000
 """Most characters of a text: about an hour of speech."""
 LONGEST_SENTENCE = 400
 """A longer sentence is divided at a comma, else between words; in characters."""
@@ -40,14 +40,14 @@ def split_sentences(text: str) -> list[str]:
     """Return the sentences of a text, in order, each with a word in it and of at most ``LONGEST_SENTENCE`` characters.
 
     What stands between two sentences without a word, such as a row of dots, is left out.
-    Raises InputError: more than ``MOST_CHARACTERS``, no word, or a word of more than ``LONGEST_WORD`` characters.
+    Raises InputError: more than ``MAX_CHARACTERS``, no word, or a word of more than ``LONGEST_WORD`` characters.
 
     >>> split_sentences("Dr. Smith said: wait! Then he left...")
     ['Dr. Smith said: wait!', 'Then he left...']
     """
-    if len(text) > MOST_CHARACTERS:
+    if len(text) > MAX_CHARACTERS:
         raise InputError(
-            f"the text has {len(text)} characters, required at most {MOST_CHARACTERS}, about an hour of speech; "
+            f"the text has {len(text)} characters, required at most {MAX_CHARACTERS}, about an hour of speech; "
             "speak it in parts"
         )
     plain = clean_text(text)
@@ -57,13 +57,23 @@ def split_sentences(text: str) -> list[str]:
             f"a word of {len(longest)} characters ({shorten(longest)!r}), required at most {LONGEST_WORD}; "
             "write words with blanks between them"
         )
-    found = [part for sentence in _ended(plain) for part in _short(sentence) if find_words(part)]
-    if not found:
+    parts = []
+    for sentence in _divide(plain):
+        rest = sentence
+        while len(rest) > LONGEST_SENTENCE:
+            breaks = [match.end() for match in _BREAK.finditer(rest, LONGEST_SENTENCE // 2, LONGEST_SENTENCE)]
+            blank = rest.rfind(" ", 1, LONGEST_SENTENCE)
+            cut = breaks[-1] if breaks else blank if blank > 0 else LONGEST_SENTENCE
+            parts.append(rest[:cut].strip())
+            rest = rest[cut:].strip()
+        parts.append(rest)
+    sentences = [part for part in parts if find_words(part)]
+    if not sentences:
         raise InputError(f"the text {shorten(plain)!r} holds no word; give the words to be spoken")
-    return found
+    return sentences
 
 
-def _ended(text: str) -> Iterator[str]:
+def _divide(text: str) -> Iterator[str]:
     """Yield the sentences of a text as punctuation divides it."""
     start = 0
     for end in _END.finditer(text):
@@ -74,14 +84,3 @@ def _ended(text: str) -> Iterator[str]:
         yield text[start : end.end()].strip()
         start = end.end()
     yield text[start:].strip()
-
-
-def _short(sentence: str) -> Iterator[str]:
-    """Yield a sentence in parts of at most ``LONGEST_SENTENCE`` characters."""
-    while len(sentence) > LONGEST_SENTENCE:
-        breaks = [found.end() for found in _BREAK.finditer(sentence, LONGEST_SENTENCE // 2, LONGEST_SENTENCE)]
-        blank = sentence.rfind(" ", 1, LONGEST_SENTENCE)
-        cut = breaks[-1] if breaks else blank if blank > 0 else LONGEST_SENTENCE
-        yield sentence[:cut].strip()
-        sentence = sentence[cut:].strip()
-    yield sentence

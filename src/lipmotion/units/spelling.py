@@ -31,8 +31,8 @@ _LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
 """A long vowel: vowel, consonant, final e."""
 
 
-MOST_MARKS = 30
-"""Most accents on one letter; no language has so many."""
+MAX_MARKS = 30
+"""Largest number of accents on one letter; no language has so many."""
 APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
 UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
 """A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""
@@ -47,7 +47,10 @@ def plain_text(text: str) -> str:
     ``2½`` becomes ``2 1⁄2``.
     """
     if not text.isascii():
-        text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", UNSPOKEN.sub("", APOSTROPHES.sub("'", _few_marks(text))))
+        marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
+        if marks:  # at most so many on a letter, as Unicode Standard Annex 15: they are sorted in quadratic time
+            text = re.sub(f"([{marks}]{{{MAX_MARKS}}})[{marks}]+", r"\1", text)
+        text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", UNSPOKEN.sub("", APOSTROPHES.sub("'", text)))
         text = unicodedata.normalize("NFKC", text.translate(DASHES)).translate(DASHES)
         text = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
         text = re.sub(r"\d", lambda digit: str(int(digit[0])), text)
@@ -57,15 +60,6 @@ def plain_text(text: str) -> str:
 def normalise_text(text: str) -> str:
     """Return a text as ``plain_text`` does, in lower case."""
     return plain_text(text).lower()
-
-
-def _few_marks(text: str) -> str:
-    """Return a text with at most ``MOST_MARKS`` marks on a letter: Unicode sorts them in quadratic time.
-
-    Source: Unicode Standard Annex 15, Stream-Safe Text Format.
-    """
-    marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
-    return re.sub(f"([{marks}]{{{MOST_MARKS}}})[{marks}]+", r"\1", text) if marks else text
 
 
 def remove_accents(word: str) -> str:
@@ -93,22 +87,15 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
     letters = re.sub(r"([b-df-hj-np-tv-z])\1+", r"\1", plain)  # doubled consonants sound once
     at = 0
     while at < len(letters):
-        taken, sound = _next_sound(letters, at, begun=bool(phones))
-        phones += sound.split()
-        at += taken
+        if phones and _SILENT_E.fullmatch(letters, at):
+            phones += ["z"] * letters.endswith("s")
+            break
+        if _LONG_VOWEL.match(letters, at):
+            phones.append(LONG_VOWELS[letters[at]])
+            at += 1
+            continue
+        size = next(n for n in range(_LONGEST, 0, -1) if letters[at : at + n] in SPELLINGS)
+        phones += SPELLINGS[letters[at : at + size]].split()
+        at += size
     has_vowel = re.search("[aeiouy]", plain)
     return tuple("er" if phone == "r" and not has_vowel else phone for phone in phones)  # the vowel of "brr"
-
-
-def _next_sound(letters: str, at: int, *, begun: bool) -> tuple[int, str]:
-    """Return how many letters from ``at`` on make the next sound, and their phones.
-
-    begun : whether there is a sound before them
-    """
-    if _SILENT_E.fullmatch(letters, at) and begun:
-        return len(letters) - at, "z" if letters.endswith("s") else ""
-    if _LONG_VOWEL.match(letters, at):
-        return 1, LONG_VOWELS[letters[at]]
-    rest = letters[at : at + _LONGEST]
-    size = next(n for n in range(len(rest), 0, -1) if rest[:n] in SPELLINGS)
-    return size, SPELLINGS[rest[:size]]

@@ -42,7 +42,7 @@ SPEAKER_NAME_LINES = 3
 """A name that begins so many lines is that of a speaker."""
 LONGEST_LINE = 1 << 18
 """Most characters of a line: a label may hold four hours of speech."""
-MOST_WORDS = 500_000
+MAX_WORDS = 500_000
 """Most words of a transcript: twelve hours of the fastest speech on record."""
 
 
@@ -152,5 +152,5 @@ def time_words(
 
 def check_word_count(count: int, where: str) -> None:
     """Raise InputError for more words than a recording has."""
-    if count > MOST_WORDS:
-        raise InputError(f"{where}: more than {MOST_WORDS} words; give those of one recording")
+    if count > MAX_WORDS:
+        raise InputError(f"{where}: more than {MAX_WORDS} words; give those of one recording")

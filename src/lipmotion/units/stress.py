@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 from lipmotion.types import Timeline, Unit
-from lipmotion.units.classes import list_phone_classes
 from lipmotion.units.lexicon import WEAK_WORDS, Lexicon
-from lipmotion.units.phones import FULL_FORMS, is_silent
+from lipmotion.units.phones import FULL_FORMS, is_silent, list_phone_classes
 
 REDUCED = frozenset(FULL_FORMS)
 """Vowels, and consonants in the place of a vowel, that are not stressed in a word with a full vowel."""
@@ -65,11 +64,24 @@ def find_stress(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[
     >>> find_stress(Timeline(tuple(Span(n / 10, (n + 1) / 10, unit) for n, unit in enumerate(phones))))
     (0, 1, 1, 1)
     """
+    lexicon = lexicon or Lexicon()
     labels = [span.label for span in units]
     stresses: list[int | None] = [0 if label.phone in REDUCED else None for label in labels]
-    for first, stop in _spoken_words(labels, lexicon or Lexicon()):
-        phones = [label.phone for label in labels[first:stop]]
-        stresses[first:stop] = _stress_of_phones(labels[first].word, phones)
+    stop = 0
+    while stop < len(labels):
+        first, stop, word = stop, stop + 1, labels[stop].word
+        while stop < len(labels) and labels[stop].word == word and not is_silent(labels[stop].phone):
+            stop += 1
+        if not word or is_silent(labels[first].phone):
+            continue
+        phones, count = [label.phone for label in labels[first:stop]], stop - first
+        length = count  # of the word, which may be said several times without a pause
+        for size in range(1, count // 2 + 1):
+            repeated = count % size == 0 and phones[:size] * (count // size) == phones
+            if repeated and tuple(phones[:size]) in lexicon.pronunciations(word):
+                length = size
+                break
+        stresses[first:stop] = _stress_phones(word, phones[:length]) * (count // length)
     return tuple(stresses)
 
 
@@ -98,50 +110,21 @@ def find_stressed_vowel(word: str, vowels: Sequence[str]) -> int | None:
     return PATTERNS.get(pattern, full[len(full) // 2] if full else 0)
 
 
-def _spoken_words(labels: Sequence[Unit], lexicon: Lexicon) -> Iterator[tuple[int, int]]:
-    """Yield the first unit of every spoken word, and the one after its last."""
-    first = 0
-    while first < len(labels):
-        stop = first + 1
-        word = labels[first].word
-        while stop < len(labels) and labels[stop].word == word and not is_silent(labels[stop].phone):
-            stop += 1
-        if word and not is_silent(labels[first].phone):
-            each = _length_once(word, [label.phone for label in labels[first:stop]], lexicon)
-            yield from ((start, start + each) for start in range(first, stop, each))
-        first = stop
-
-
-def _length_once(word: str, phones: list[str], lexicon: Lexicon) -> int:
-    """Return how many of the phones of a word, perhaps said several times without a pause, are of it once."""
-    count = len(phones)
-    for each in range(1, count // 2 + 1):
-        repeated = count % each == 0 and phones[:each] * (count // each) == phones
-        if repeated and tuple(phones[:each]) in lexicon.pronunciations(word):
-            return each
-    return count
-
-
-def _stress_of_phones(word: str, phones: Sequence[str]) -> list[int | None]:
-    """Return the stress of each phone of a word."""
-    nuclei = [place for place, phone in enumerate(phones) if phone in NUCLEI]
-    stressed = find_stressed_vowel(word, [phones[place] for place in nuclei])
-    if not nuclei:
-        return [None] * len(phones)
-    starts = [0, *(_onset(phones, before, here) for before, here in pairwise(nuclei)), len(phones)]
-    return [
-        int(number == stressed) for number, (start, stop) in enumerate(pairwise(starts)) for _ in range(start, stop)
-    ]
-
-
-def _onset(phones: Sequence[str], before: int, here: int) -> int:
-    """Return where the syllable of the vowel ``here`` begins: at most two consonants after the vowel ``before``.
+def _stress_phones(word: str, phones: Sequence[str]) -> list[int | None]:
+    """Return the stress of each phone of a word; a syllable begins with at most two consonants.
 
     Deviation from the maximal onset principle (Kahn 1976): s before a stop stays with the syllable before.
     """
-    start = here
-    if here - before > 1 and phones[here - 1] != "ng":
-        start = here - 1
-        if start - before > 1 and phones[start] in GLIDES and phones[start - 1] in LEADS:
-            start -= 1
-    return start
+    nuclei = [place for place, phone in enumerate(phones) if phone in NUCLEI]
+    if not nuclei:
+        return [None] * len(phones)
+    stressed, starts = find_stressed_vowel(word, [phones[place] for place in nuclei]), [0]
+    for before, here in pairwise(nuclei):
+        start = here
+        if here - before > 1 and phones[here - 1] != "ng":
+            start = here - 1
+            if start - before > 1 and phones[start] in GLIDES and phones[start - 1] in LEADS:
+                start -= 1
+        starts.append(start)
+    bounds = pairwise([*starts, len(phones)])
+    return [int(number == stressed) for number, (start, stop) in enumerate(bounds) for _ in range(start, stop)]

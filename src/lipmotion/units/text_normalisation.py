@@ -1,13 +1,14 @@
-"""Text normalisation: a transcript as people write it, to the words that are spoken."""
+"""Text normalisation: a transcript as people write it, to the words that are spoken; how long a text may be."""
 
 from __future__ import annotations
 
 import html
 import re
 import unicodedata
+from collections.abc import Sequence
 from functools import cache
 
-from lipmotion.errors import InputError
+from lipmotion.errors import AlignmentError, InputError
 from lipmotion.units.lexicon import SOUNDED, expand_lengthened, in_dictionary
 from lipmotion.units.spelling import normalise_text, plain_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
@@ -26,6 +27,16 @@ GROUPED = re.compile(
 """Numbers whose thousands are parted by blanks or apostrophes: ``1 000 000``, ``1'000'000``."""
 SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[tT]_[tT])(?!\w)")
 REFERENCE = re.compile(r"&(?:[a-zA-Z]{2,8}|#\d{1,6}|#x[\da-fA-F]{1,5});")
+CHARACTERS_PER_S = 200
+"""Most characters a second: three times the fastest speech on record (655 words a minute), blanks and punctuation."""
+ALWAYS_ALLOWED_CHARACTERS = 10_000
+"""Characters that a text may always have, as notes and blank lines beside the words of a short recording."""
+LARGEST_TRANSCRIPT_BYTES = 1 << 22
+"""Most bytes of a transcript file: three days of speech."""
+PHONES_PER_S = 100
+"""Most phones a second: with more, a phone has less than one frame of 10 ms on average."""
+ALWAYS_ALLOWED_PHONES = 1000
+"""Phones that a list may always have; if they are those of another recording, a warning is enough."""
 
 
 def split_words(text: str) -> tuple[str, ...]:
@@ -43,7 +54,7 @@ def find_words(text: str) -> tuple[str, ...]:
 
 def require_tokens(text: str) -> tuple[str, ...]:
     """Return the words of a text as ``tokenise`` does. Raises InputError: there is no word in it."""
-    return _some(tokenise(text), text)
+    return _require_words(tokenise(text), text)
 
 
 def tokenise(text: str) -> tuple[str, ...]:
@@ -87,12 +98,37 @@ def split_written_words(text: str) -> tuple[str, ...]:
     Raises InputError: there is no word in it.
     """
     spaced = re.sub(CHINESE, r" \g<0> ", normalise_text(text))
-    kept = "".join(letter if letter == "'" or unicodedata.category(letter)[0] in "LMN" else " " for letter in spaced)
-    return _some(tuple(word.strip("'") for word in kept.split() if word.strip("'")), text)
+    spoken = "".join(letter if letter == "'" or unicodedata.category(letter)[0] in "LMN" else " " for letter in spaced)
+    return _require_words(tuple(word.strip("'") for word in spoken.split() if word.strip("'")), text)
 
 
-def _some(words: tuple[str, ...], text: str) -> tuple[str, ...]:
+def _require_words(words: tuple[str, ...], text: str) -> tuple[str, ...]:
     """Return words. Raises InputError: there is none."""
     if not words:
         raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
     return words
+
+
+def check_words(words: Sequence[str], duration_s: float) -> None:
+    """Raise AlignmentError for words that nobody can say within this duration."""
+    check_text("".join(f"{word} " for word in words), duration_s)
+
+
+def check_text(text: str, duration_s: float) -> None:
+    """Raise AlignmentError for a text that nobody can say within this duration."""
+    allowed = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
+    if len(text) > allowed:
+        raise AlignmentError(
+            f"the transcript has {len(text)} characters, required at most {allowed} for {duration_s:.2f} s of sound: "
+            "nobody says so much; give the words of this recording"
+        )
+
+
+def check_phones(count: int, duration_s: float) -> None:
+    """Raise InputError for more phones in time than there are frames in this duration."""
+    allowed = ALWAYS_ALLOWED_PHONES + int(PHONES_PER_S * duration_s)
+    if count > allowed:
+        raise InputError(
+            f"{count} units in time, required at most {allowed} for {duration_s:.2f} s of sound; give those of this "
+            "recording"
+        )

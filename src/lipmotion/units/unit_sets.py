@@ -1,6 +1,7 @@
-"""The five unit sets of Hofer 2008 (§6, Table 1), with a reason for each group of phones.
+"""Unit sets: maps from every phone of the inventory to the unit that models it, built in or read from table files.
 
-The paper gives the number of units of each set and a line of text on them; the groups are ours. Counts, and silence:
+The five of Hofer 2008 (§6, Table 1) have a reason for each group of phones: the paper gives the number of units of each
+set and a line of text on them; the groups are ours. Counts, and silence:
 
 - ``2vis``: 2; silence belongs to the closed mouth;
 - ``sVis``: 6 groups of speech as printed, and silence is a unit beside them;
@@ -12,13 +13,176 @@ The paper gives the number of units of each set and a line of text on them; the 
 from __future__ import annotations
 
 import os
+from collections.abc import Container, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from lipmotion.errors import InputError
-from lipmotion.units.phones import PAUSE, PHONES
-from lipmotion.units.unit_set import CLOSED_UNIT, UnitSet, read_unit_table
+from lipmotion.errors import InputError, shorten
+from lipmotion.storage.files import read_text_file
+from lipmotion.types import Unit
+from lipmotion.units.phones import PAUSE, PHONES, SILENCE, describe_unknown_phone, is_silent, list_phone_classes
 from lipmotion.units.visemes import VISEME_OF
+
+LARGEST_TABLE_BYTES = 1 << 18
+"""The most bytes of a table file; one of 47 phones has a few hundred."""
+CLOSED_UNIT = "closed"
+"""Name of the only unit that may hold silence and speech."""
+
+
+@dataclass(frozen=True)
+class UnitSet:
+    """A map from every phone of the inventory to its unit.
+
+    name          : of the set, for users
+    unit_of_phone : phone to unit, for all phones of the inventory
+    uncounted     : units that the printed count of a paper leaves out (``count``)
+
+    Raises InputError: a phone is missing or unknown, a unit has no name or one with a blank in it, or silence shares a
+    unit other than ``closed`` with speech.
+    """
+
+    name: str
+    unit_of_phone: Mapping[str, str]
+    uncounted: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        unknown = sorted(set(self.unit_of_phone) - set(PHONES))
+        missing = [phone for phone in PHONES if phone not in self.unit_of_phone]
+        if unknown or missing:
+            wrong = [f"unknown {' '.join(unknown)}"] * bool(unknown) + [f"missing {' '.join(missing)}"] * bool(missing)
+            raise InputError(f"unit set {self.name}: phones {'; '.join(wrong)}; required: {' '.join(PHONES)}")
+        nameless = [
+            phone for phone, unit in self.unit_of_phone.items() if len(unit.split()) != 1 or unit != unit.strip()
+        ]
+        if nameless:
+            unit = shorten(self.unit_of_phone[nameless[0]])
+            raise InputError(f"unit set {self.name}: the unit of {nameless[0]} is {unit!r}, not a word")
+        for unit in _mixed(self.unit_of_phone):
+            raise InputError(f"unit set {self.name}: {_ADVICE.format(shorten(unit))}")
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """All units, in the order of the table."""
+        return tuple(dict.fromkeys(self.unit_of_phone.values()))
+
+    @property
+    def count(self) -> int:
+        """The number of units without the uncounted ones."""
+        return len(self.units) - len(self.uncounted)
+
+    @cached_property
+    def silence(self) -> tuple[str, ...]:
+        """The units of the silent phones (sil, sp), whether or not they hold others, too."""
+        return tuple(dict.fromkeys(unit for phone, unit in self.unit_of_phone.items() if is_silent(phone)))
+
+    @cached_property
+    def _silent_only(self) -> frozenset[str]:
+        return frozenset(unit for unit in self.silence if all(map(is_silent, self.phones(unit))))
+
+    def silent(self, unit: str) -> bool:
+        """Return whether all phones of a unit are silent."""
+        return unit in self._silent_only
+
+    def unit(self, phone: str) -> str:
+        """Return the unit of a phone. Raises InputError: it is not in the inventory."""
+        if phone not in self.unit_of_phone:
+            raise InputError(describe_unknown_phone(phone))
+        return self.unit_of_phone[phone]
+
+    def unit_of(self, label: Unit) -> str:
+        """Return the unit of a label: that of its phone or, where it has no phone, its own.
+
+        Raises InputError: an unknown phone, or a unit that this set does not have.
+        """
+        if label.phone:
+            return self.unit(label.phone)
+        if label.unit not in self.units:
+            raise InputError(
+                f"unknown unit {label.unit!r} without a phone; give a phone, or one of {' '.join(self.units)}"
+            )
+        return label.unit
+
+    def label(self, unit: str) -> Unit:
+        """Return a label for a unit: with its phone if it has only one or is silence, else without a phone."""
+        phones = self.phones(unit)
+        if self.silent(unit) and SILENCE in phones:
+            return Unit(SILENCE, unit)
+        return Unit(phones[0] if len(phones) == 1 else "", unit)
+
+    def phones(self, unit: str) -> tuple[str, ...]:
+        """Return the phones of a unit."""
+        return tuple(phone for phone, other in self.unit_of_phone.items() if other == unit)
+
+    def units_within(self, phones: Container[str]) -> tuple[str, ...]:
+        """Return the units all of whose phones are among some phones."""
+        return tuple(unit for unit in self.units if all(phone in phones for phone in self.phones(unit)))
+
+    def classes(self) -> dict[str, frozenset[str]]:
+        """Return the sets of units that decision trees may ask about, by name, each set once.
+
+        A class of phones becomes the set of the units all of whose phones are in the class; every unit alone is a set,
+        too. Sets of no unit or of all units are left out. Where every phone is a unit these are ``list_phone_classes``.
+        """
+        members = {unit: frozenset(self.phones(unit)) for unit in self.units}
+        names: dict[frozenset[str], str] = {}
+        for name, phones in list_phone_classes().items():
+            inside = frozenset(unit for unit in self.units if members[unit] <= phones)
+            if 1 < len(inside) < len(self.units):
+                names.setdefault(inside, f"class {name}" if name in self.units else name)
+            elif len(inside) == 1:
+                names.setdefault(inside, *inside)
+        for unit in self.units:
+            names.setdefault(frozenset([unit]), unit)
+        return {name: units for units, name in names.items() if len(units) < len(self.units)}
+
+
+def read_unit_table(path: Path) -> UnitSet:
+    """Return the unit set of a table file: lines ``UNIT phone phone ...``; ``#`` starts a comment.
+
+    Raises InputError (with the line): no such file, not UTF-8, a unit twice or without phones, a phone that is unknown,
+    twice or missing, or silence in one unit with speech that is not called ``closed``.
+    """
+    unit_line: dict[str, int] = {}
+    phone_line: dict[str, int] = {}
+    unit_of_phone: dict[str, str] = {}
+    for number, line in enumerate(read_text_file(path, "unit table", LARGEST_TABLE_BYTES).splitlines(), start=1):
+        unit, *phones = line.split("#")[0].split() or [""]
+        if not unit:
+            continue
+        where = f"{path}, line {number}"
+        if not phones:
+            raise InputError(f"{where}: unit {shorten(unit)!r} without phones; write the unit, then its phones")
+        if unit in unit_line:
+            raise InputError(
+                f"{where}: unit {shorten(unit)!r} stands in line {unit_line[unit]} already; write it in one line"
+            )
+        unit_line[unit] = number
+        for phone in phones:
+            if phone not in PHONES:
+                raise InputError(f"{where}: unknown phone {shorten(phone)!r}; the phones are: {' '.join(PHONES)}")
+            if phone in phone_line:
+                raise InputError(f"{where}: phone {phone!r} has a unit in line {phone_line[phone]} already; keep one")
+            phone_line[phone], unit_of_phone[phone] = number, unit
+    for unit in _mixed(unit_of_phone):
+        raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(shorten(unit))}")
+    try:
+        return UnitSet(path.stem, unit_of_phone)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _mixed(of: Mapping[str, str]) -> list[str]:
+    """Return the units, other than ``closed``, that hold silence and speech."""
+    silent, spoken = ({unit for phone, unit in of.items() if is_silent(phone) is wanted} for wanted in (True, False))
+    return sorted((silent & spoken) - {CLOSED_UNIT})
+
+
+_ADVICE = (
+    "unit {!r} holds silence and speech; give sil and sp a unit without other phones, or call this one "
+    f"{CLOSED_UNIT!r}: silence is then a closed mouth"
+)
 
 
 class UnitGroup(NamedTuple):
@@ -103,12 +267,14 @@ _UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": PAUSE}
 """Units that the paper's count leaves out."""
 
 
-def _built_in(name: str) -> UnitSet:
-    of = {phone: group.unit for group in GROUPS[name] for phone in group.phones.split()}
-    return UnitSet(name, of, frozenset([_UNCOUNTED[name]] if name in _UNCOUNTED else []))
-
-
-UNIT_SETS: dict[str, UnitSet] = {name: _built_in(name) for name in GROUPS}
+UNIT_SETS: dict[str, UnitSet] = {
+    name: UnitSet(
+        name,
+        {phone: group.unit for group in groups for phone in group.phones.split()},
+        frozenset([_UNCOUNTED[name]] if name in _UNCOUNTED else []),
+    )
+    for name, groups in GROUPS.items()
+}
 """The unit sets in the order of the paper's Table 1, except sVis, which is placed by its size."""
 VISEME_SET = UnitSet("viseme", VISEME_OF)
 """The 13 visemes of Xie & Liu 2007, Table 1; not one of the five."""

@@ -14,7 +14,7 @@ from lipmotion.units.spelling import parse_table
 Reading = tuple[str, ...]
 Forms = tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...]
 
-MOST_READINGS = 8
+MAX_READINGS = 8
 """Most readings of a form: alignment tries each."""
 ONES = (
     "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
@@ -74,13 +74,6 @@ def spell_number(digits: str) -> list[str]:
     return [*spell_number(str(number // scale)), name, *rest]
 
 
-def spell_ordinal(word: str) -> str:
-    """Return the ordinal of the last word of a number: ``third`` of ``three``, ``twentieth`` of ``twenty``."""
-    if word in ORDINALS:
-        return ORDINALS[word]
-    return f"{word[:-1]}ieth" if word.endswith("y") else f"{word}th"
-
-
 @cache
 def list_readings(token: str) -> tuple[Reading, ...]:
     """Return the readings of a written form, the usual one first; of any other word, the word in lower case.
@@ -88,11 +81,11 @@ def list_readings(token: str) -> tuple[Reading, ...]:
     >>> list_readings("1995")[:2]
     (('nineteen', 'ninety', 'five'), ('one', 'thousand', 'nine', 'hundred', 'ninety', 'five'))
     """
-    found = {tuple(_COUNTED.sub(_singular, each).split()): None for each in _readings(token)}
-    return tuple(found)[:MOST_READINGS]
+    found = {tuple(_COUNTED.sub(_singular, each).split()): None for each in _iterate_readings(token)}
+    return tuple(found)[:MAX_READINGS]
 
 
-def _readings(token: str) -> Iterator[str]:
+def _iterate_readings(token: str) -> Iterator[str]:
     if token.isalpha() and token.islower():
         yield token
         return
@@ -170,7 +163,8 @@ def _spelled(digits: str, zero: str = "zero") -> str:
 
 def _ordinal(digits: str) -> str:
     *before, last = spell_number(digits.replace(",", "").lstrip("0"))
-    return " ".join((*before, spell_ordinal(last)))
+    regular = f"{last[:-1]}ieth" if last.endswith("y") else f"{last}th"
+    return " ".join((*before, ORDINALS.get(last, regular)))
 
 
 def _pair(digits: str) -> str:
@@ -184,14 +178,6 @@ def _minutes(digits: str) -> str:
 
 def _hour(digits: str, later: int = 0) -> str:
     return _cardinal(str((int(digits) + later - 1) % 12 + 1))
-
-
-def _month(text: str) -> str:
-    return MONTHS[int(text) - 1] if text.isdecimal() else next(n for n in MONTHS if n.startswith(text[:3].lower()))
-
-
-def _year(digits: str) -> str:
-    return _usual(digits if len(digits) == 4 else f"{'19' if int(digits) > 50 else '20'}{digits}")
 
 
 def _roman(numeral: str) -> str:
@@ -212,10 +198,6 @@ def _hundreds(digits: str) -> str:
 
 def _usual(text: str) -> str:
     return " ".join(list_readings(text)[0])
-
-
-def _decade(digits: str) -> str:
-    return re.sub("ys$", "ies", f"{_usual(digits)}s")
 
 
 def _telephone(text: str) -> Iterator[str]:
@@ -248,10 +230,6 @@ def _stutter(text: str) -> Iterator[str]:
         yield word if vowel is None else " ".join((*(bit + vowel for bit in bits), word))
 
 
-def _initials(text: str) -> Iterator[str]:
-    yield from (" ".join(text).lower(), text.lower())
-
-
 SAID: dict[str, Callable[[str], str]] = {
     "": _usual,
     "w": str.lower,
@@ -259,8 +237,12 @@ SAID: dict[str, Callable[[str], str]] = {
     "c": _plain,
     "o": _ordinal,
     "p": _pair,
-    "y": _year,
-    "m": _month,
+    "y": lambda digits: _usual(digits if len(digits) == 4 else f"{'19' if int(digits) > 50 else '20'}{digits}"),
+    "m": lambda text: (
+        MONTHS[int(text) - 1]
+        if text.isdecimal()
+        else next(name for name in MONTHS if name.startswith(text[:3].lower()))
+    ),
     "q": lambda digits: "quarter" if digits == "4" else _ordinal(digits),
     "n": _minutes,
     "N": lambda digits: _minutes(digits).replace("quarter", "a quarter"),
@@ -278,7 +260,7 @@ SAID: dict[str, Callable[[str], str]] = {
     "v": lambda unit: _COUNTED.sub(_singular, f"one {UNITS[unit.lower()]}").removeprefix("one "),
     "r": lambda numeral: _cardinal(_roman(numeral)),
     "R": lambda numeral: _ordinal(_roman(numeral)),
-    "d": _decade,
+    "d": lambda digits: re.sub("ys$", "ies", f"{_usual(digits)}s"),
     "g": lambda scale: "celsius" if scale in "cC" else "fahrenheit",
 }
 """What the ways of templates make of a part."""
@@ -392,7 +374,7 @@ FORMS: Forms = (
     (r"(?-i:([A-Z])#)", "{1:w} sharp"),
     (r"(?-i:[A-Z]{1,3}&[A-Z]{1,3})", lambda text: iter([" ".join(text).lower().replace("&", "and")])),
     (rf"(?!d-day)(?P<bit>[b-df-hj-np-tv-z]{{1,3}})-(?:(?P=bit)-)*(?=(?P=bit)){WORD}", _stutter),
-    (r"(?-i:[A-Z]{2,5}s?)", _initials),
+    (r"(?-i:[A-Z]{2,5}s?)", lambda text: iter([" ".join(text).lower(), text.lower()])),
 )  # fmt: skip
 """Patterns of forms, without regard of case, and how they are read: the first that matches counts.
 Those that begin with a letter come last.

@@ -16,7 +16,7 @@ from lipmotion.errors import CorpusError
 from lipmotion.pipeline.training.prompts import pronounce_sentences, read_corpus_phones
 from lipmotion.printable import printable
 from lipmotion.units import PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, Lexicon, find_similar_lips
-from lipmotion.units.classes import CLASSES
+from lipmotion.units.phones import CLASSES
 
 KINDS = ("phones", "diphones", "triphones")
 """Sequences of one, two and three phones; silence is a neighbour only."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import read_entry
+from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
 from lipmotion.corpora.store import MANIFEST, Corpus
 from lipmotion.errors import CorpusError, InputError

@@ -194,7 +194,7 @@ def face_codes(
 ) -> FaceCodes:
     """Return what the lower face is like in ``count`` frames at the rate of a video.
 
-    units : the phones in time; in every p, b and m the lips touch (``contact.closed_lips``)
+    units : the phones in time; in every p, b and m the lips touch (``contact.close_lips``)
     Raises InputError: motion without the channels that the face needs.
     """
     time_s = np.arange(count) / rate_hz

@@ -69,7 +69,7 @@ def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     shapes: list[Blendshape] = []
 
     def add(name: str, start: Real, end: Real) -> None:
-        shapes.append(Blendshape.between(name, start, end, least=LEAST_DISPLACEMENT))
+        shapes.append(Blendshape.between(name, start, end, smallest=LEAST_DISPLACEMENT))
 
     for name, pose in (POSES | MOOD_POSES if moods else POSES).items():
         start = figure.place(POSES["jawOpen"])[0] if name == "mouthClose" else rest

@@ -21,7 +21,7 @@ from lipmotion_faces.registry import stage_face
 class SessionPictures:
     """Pictures of drawn faces with the motion of a session; what of a face does not move is painted once.
 
-    session : whose motion is deliver_to_face
+    session : whose motion is shown
 
     >>> import lipmotion
     >>> pictures = lipmotion.SessionPictures(lipmotion.Session("examples/welcome.flac"))

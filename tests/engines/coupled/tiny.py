@@ -11,7 +11,7 @@ from lipmotion.engines.coupled.chains.structures import COUPLED, HMM, Structure
 from lipmotion.engines.coupled.chains.transitions import initial_transitions
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
-from lipmotion.units.unit_set import CLOSED_UNIT
+from lipmotion.units.unit_sets import CLOSED_UNIT
 
 BILABIAL = ("p", "b", "m", "em")
 SHUT = (*BILABIAL, "sil", "sp")

@@ -9,8 +9,7 @@ from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
 from lipmotion.motion.frame_labels import label_full_context
-from lipmotion.stats.tree_regression import fit_regression_node, fit_tree_regressions, ridge, zero_statistics
-from lipmotion.stats.trees import Question, Tree
+from lipmotion.stats.trees import Question, Tree, fit_regression_node, fit_tree_regressions, ridge, zero_statistics
 from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor
 

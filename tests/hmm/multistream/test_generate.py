@@ -18,7 +18,7 @@ from lipmotion.hmm.multistream.generate import (
 from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.multistream_training import train_joint
 from lipmotion.hmm.multistream.streams import MOTION, SPEECH
-from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.stats.curves import with_dynamics
 from oracles import trajectories
 
 

@@ -175,7 +175,7 @@ def cut_array(content: bytes, rows: int) -> bytes:
 @pytest.mark.recordings
 def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
-    monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 100)
+    monkeypatch.setattr(acoustic_network, "MIN_STEPS", 100)
     monkeypatch.setattr(posterior_network, "STEPS", 6.0)
     from lipmotion import animate, evaluate, load_model, save_model, train
 

@@ -11,7 +11,7 @@ from lipmotion import Corpus, Model, Run, Selection, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.motion.resample import resample_track
+from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.train import describe_training, label_phones

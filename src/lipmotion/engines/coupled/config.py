@@ -73,13 +73,13 @@ class CoupledConfig(Configuration):
     variance_scaling: bool = True
     closures: bool = True
     articulation: bool = True
-    start_asynchrony: int = option(1, Rule(least=0), later=True)
-    unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), later=True)
-    modulation_filter: float = option(0.0, STRENGTH, later=True)
+    start_asynchrony: int = option(1, Rule(least=0), omit_default=True)
+    unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), omit_default=True)
+    modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     preset_visual: ClassVar[Mapping[str, str]] = {"xieliu2007": EIGENLIPS}
-    former: ClassVar[Mapping[str, str]] = {
+    aliases: ClassVar[Mapping[str, str]] = {
         "crosses": "cross_units",
         "more_mixtures": "speech_only_mixtures",
         "more_steps": "speech_only_steps",

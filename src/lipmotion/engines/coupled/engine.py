@@ -21,7 +21,7 @@ from lipmotion.engines.coupled.explanation import concatenated, describe, explai
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.generation import Statistics, split_into_blocks
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -125,7 +125,7 @@ class CoupledEngine(Engine[CoupledModel]):
         observations = model.speech_observations(features)
         inference = model.chains.infer(observations, lattice)
         for _ in range(self.config.steps if self.config.conversion == TRAJECTORY else 0):
-            values = generate(*model.motion_statistics(inference))[0]
+            values = solve_mlpg(*model.motion_statistics(inference))[0]
             inference = model.chains.infer(model.with_motion(observations, values), lattice)
         return inference
 

@@ -65,24 +65,24 @@ class JointEngineConfig(Configuration):
     f0: bool = True
     motion_in_training: bool = True
     recognise_units: bool = False
-    own_alignment: bool = option(False, later=True)
+    own_alignment: bool = option(False, omit_default=True)
     paths: int = option(1, COUNT)
     seed: int = option(0, Rule(least=0))
     closures: bool = True
     articulation: bool = True
-    speech_weight: float = option(1.0, WEIGHT, later=True)
-    f0_weight: float = option(1.0, WEIGHT, later=True)
-    motion_weight: float = option(1.0, WEIGHT, later=True)
-    recognition_speech_weight: float = option(1.0, WEIGHT, later=True)
-    recognition_f0_weight: float = option(1.0, WEIGHT, later=True)
-    bigram_weight: float = option(4.0, WEIGHT, later=True)
-    insertion: float = option(-4.0, later=True)
-    both_neighbours: bool = option(False, later=True)
-    flat_start: bool = option(False, later=True)
-    modulation_filter: float = option(0.0, STRENGTH, later=True)
+    speech_weight: float = option(1.0, WEIGHT, omit_default=True)
+    f0_weight: float = option(1.0, WEIGHT, omit_default=True)
+    motion_weight: float = option(1.0, WEIGHT, omit_default=True)
+    recognition_speech_weight: float = option(1.0, WEIGHT, omit_default=True)
+    recognition_f0_weight: float = option(1.0, WEIGHT, omit_default=True)
+    bigram_weight: float = option(4.0, WEIGHT, omit_default=True)
+    insertion: float = option(-4.0, omit_default=True)
+    both_neighbours: bool = option(False, omit_default=True)
+    flat_start: bool = option(False, omit_default=True)
+    modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
-    former: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
+    aliases: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -21,7 +21,7 @@ from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, gr
 from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.arrays import (
     MOTION_ARRAYS,
     SCALING,
@@ -195,7 +195,7 @@ class JointEngine(Engine[JointModel]):
     def _generated(self, model: JointModel, speech: Speech) -> NDArray[np.float64]:
         """Return motion in the motion space for phones in time, as parameter generation makes it [shape=(T, Q)]."""
         path = _aligned(model, self._observations(speech), speech.units)
-        return generate(*merge_gaussians(select_densities(model.hmm, path)))[0]
+        return solve_mlpg(*merge_gaussians(select_densities(model.hmm, path)))[0]
 
     def without_closures(self) -> JointEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
@@ -203,7 +203,7 @@ class JointEngine(Engine[JointModel]):
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observations = self._observations(speech)
         if self.config.recognise_units and not speech.units_decide:
-            units, paths = speech.once(
+            units, paths = speech.cached(
                 (model.hmm, self.config.paths, self.config.seed),
                 lambda: self._recognised(model, observations, speech.features.duration_s),
             )

@@ -89,9 +89,9 @@ class SelectionConfig(Configuration):
     joint_recogniser: bool = True
     closures: bool = True
     articulation: bool = True
-    predictor: str = option(AUTOMATIC, later=True)
-    suppressed: bool = option(False, later=True)
-    modulation_filter: float = option(0.0, STRENGTH, later=True)
+    predictor: str = option(AUTOMATIC, omit_default=True)
+    suppressed: bool = option(False, omit_default=True)
+    modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"minnis2000": MINNIS_2000}
 

@@ -20,7 +20,7 @@ from lipmotion.engines.selection.inventory import (
 from lipmotion.engines.selection.lip_reading import INVISIBLE, OVERLAPS, PROTECTED_PHONES, lip_reading_class
 from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, SILENT, VISEME_NUMBER, PhoneWindows
 from lipmotion.units import PHONES
-from lipmotion.units.classes import CLASSES
+from lipmotion.units.phones import CLASSES
 
 Array = NDArray[np.float64]
 POINTS = 5

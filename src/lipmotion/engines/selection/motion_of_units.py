@@ -13,7 +13,7 @@ from lipmotion.engines.selection.inventory import UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.rest import find_digital_silence, find_runs, is_away_from_speech, list_speech_intervals
-from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.stats.curves import with_dynamics
 from lipmotion.types import FRAME_RATE_HZ, Constraints, Motion, ReducedVariance, Speech, Timeline, Unit
 from lipmotion.units import SILENCE, is_silent
 

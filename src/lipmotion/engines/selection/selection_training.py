@@ -21,13 +21,12 @@ from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
-from lipmotion.motion.fit import fit_motion
+from lipmotion.motion.generation import fit_motion
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PredictorTraining, choose_predictor, load_predictor
-from lipmotion.motion.reliability import rate_phones
-from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
+from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals, rate_phones
 from lipmotion.motion.space import MotionSpace
-from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
+from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Span, Speech, Timeline, Unit, sub_monitor
 from lipmotion.units import SILENCE, is_silent

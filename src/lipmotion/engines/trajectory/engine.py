@@ -89,10 +89,10 @@ class TrajectoryConfig(Configuration):
     epochs: int = option(100, Rule(least=1))
     articulation: bool = True
     units: str = "phone"
-    predictor: str = option(AUTOMATIC, later=True)
+    predictor: str = option(AUTOMATIC, omit_default=True)
     modulation_filter: float = option(1.0, STRENGTH)
 
-    former: ClassVar[Mapping[str, str]] = {
+    aliases: ClassVar[Mapping[str, str]] = {
         "parts": "states",
         "silent_parts": "silent_states",
         "listens": "acoustic_regression",
@@ -100,8 +100,8 @@ class TrajectoryConfig(Configuration):
         "full_range": "variance_scaling",
         "joint": "joint_recogniser",
     }
-    gone: ClassVar[Mapping[str, Any]] = {"trajectory_steps": 0}
-    absent: ClassVar[Mapping[str, Any]] = {"modulation_filter": 0.0}
+    removed: ClassVar[Mapping[str, Any]] = {"trajectory_steps": 0}
+    default_if_missing: ClassVar[Mapping[str, Any]] = {"modulation_filter": 0.0}
 
     def check_files(self) -> None:  # noqa: D102
         load_unit_set(self.units)

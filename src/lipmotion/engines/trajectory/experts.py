@@ -12,7 +12,7 @@ from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.motion.articulation import ArticulationPrior, slice_dynamics, unseen_share
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import Predictor
-from lipmotion.motion.reliability import rate_phones
+from lipmotion.motion.rest import rate_phones
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]

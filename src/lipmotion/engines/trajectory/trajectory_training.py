@@ -14,7 +14,7 @@ from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
@@ -23,15 +23,18 @@ from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
-from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
-from lipmotion.stats.tree_regression import (
+from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
+from lipmotion.stats.trees import (
+    Question,
     RegressionStatistics,
+    Tree,
     fit_regression_node,
     fit_tree_regressions,
+    gaussian_log_likelihood,
+    grow_tree,
     ridge,
     zero_statistics,
 )
-from lipmotion.stats.trees import Question, Tree, gaussian_log_likelihood, grow_tree
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, sub_monitor
 
@@ -221,7 +224,7 @@ def _share_of_predictor(
         for number in outside:
             clip = clips[number]
             rows = density_rows(emission, clip.states, options.layout)
-            states = generate(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
+            states = solve_mlpg(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
             recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
             change = (predicted - states) / spread
@@ -247,7 +250,7 @@ def _recorded_and_generated(
         rows = density_rows(emission, clip.states, layout)
         means, precisions = Experts(emission, rows, clip.speech, network, prior, share).statistics(slice(None))
         recorded.append(clip.rows[:, 0])
-        generated.append(generate(means, precisions)[0][clip.frames])
+        generated.append(solve_mlpg(means, precisions)[0][clip.frames])
     return recorded, generated
 
 

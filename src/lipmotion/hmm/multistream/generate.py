@@ -13,7 +13,7 @@ from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.model import JointHmm, StreamModel
 from lipmotion.hmm.multistream.streams import MOTION
 from lipmotion.kernels.banded import normal_equations, pin, solve
-from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.stats.curves import with_dynamics
 
 Array = NDArray[np.float64]
 ITERATIONS = 20

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
+from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 
 SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")

@@ -21,7 +21,7 @@ from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.units.ipa_phones import read_tokens
-from lipmotion.units.languages_told import detect_language, is_english
+from lipmotion.units.language_detection import detect_language, is_english
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import split_written_words
 

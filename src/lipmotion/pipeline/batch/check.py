@@ -23,7 +23,7 @@ from lipmotion.speech.sound.pauses import levels_db, spoken_spans
 from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
 from lipmotion.types.audio import to_sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, script_of
-from lipmotion.units.languages_told import COMMON_WORDS, detect_language
+from lipmotion.units.language_detection import COMMON_WORDS, detect_language
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import find_words, split_written_words
 

@@ -31,7 +31,7 @@ from lipmotion.types.moods import MoodTag
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
-from lipmotion.units.sentences import MOST_CHARACTERS, split_sentences
+from lipmotion.units.sentences import MAX_CHARACTERS, split_sentences
 
 LOG = logging.getLogger("lipmotion")
 CORPUS_VOICE = "corpus"
@@ -46,7 +46,7 @@ SENTENCES_PER_RUN = 20
 """Sentences that one run of a synthesiser speaks; only their files are on the disk at a time."""
 BLOCK = 1 << 20
 """Samples of noise that are drawn at a time."""
-LARGEST_TEXT_BYTES = 4 * MOST_CHARACTERS
+LARGEST_TEXT_BYTES = 4 * MAX_CHARACTERS
 """Most bytes of a text file: a character takes up to four."""
 
 

@@ -54,7 +54,7 @@ class AnalysedAudio(Audio):
     _mfcc: dict[float, Features] = field(default_factory=dict, repr=False)
     _made: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
-    def once(self, name: Hashable, make: Callable[[], MadeT]) -> MadeT:
+    def cached(self, name: Hashable, make: Callable[[], MadeT]) -> MadeT:
         """Return what a function makes of this recording; it is made once, and kept under a name."""
         if name not in self._made:
             self._made[name] = make()

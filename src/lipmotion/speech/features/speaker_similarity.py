@@ -47,7 +47,7 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
         warp = best_warp(fits)
         return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
 
-    return stretch.once(("similarity to", hmm), judge)
+    return stretch.cached(("similarity to", hmm), judge)
 
 
 @lru_cache(maxsize=2)

@@ -27,7 +27,7 @@ from lipmotion.speech.features.laughter import laughter
 from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.spectrum import band_centres, log_bands
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, VoiceEvent
-from lipmotion.types.voice_event import BREATH, LAUGHTER, SHOUT, WHISPER
+from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from lipmotion.units import VOWELS, is_silent
 
 Curve = NDArray[np.float64]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.motion.space import MotionSpace
-from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.stats.curves import with_dynamics
 from lipmotion.types import EYE_DISTANCE, GREY
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
-from lipmotion.stats.tree_regression import ridge, zero_statistics
+from lipmotion.stats.trees import ridge, zero_statistics
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]

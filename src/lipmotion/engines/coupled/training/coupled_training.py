@@ -49,14 +49,14 @@ from lipmotion.engines.coupled.training.chain_training import (
 )
 from lipmotion.engines.coupled.training.em_steps import ChainStatistics, lattice_utterance, variance_floors
 from lipmotion.errors import CorpusError
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
-from lipmotion.stats.delta_windows import mark_known_dynamics
+from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.em import EmResult
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
@@ -317,7 +317,7 @@ def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Ar
 
     def generated(utterance: AlignedUtterance) -> Array:
         speech = without_visual_streams(utterance.observations)
-        motion, _ = generate(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
+        motion, _ = solve_mlpg(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
         return motion[utterance.observations.observed[1]]
 
     return list(_threaded(generated, data))

@@ -183,10 +183,10 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
         if audio.is_passage:
             return by_passage[0]
         for part in audio.passages:
-            part.audio.once(key, partial(by_passage.__getitem__, part.first))
+            part.audio.cached(key, partial(by_passage.__getitem__, part.first))
         return [each_of for part in audio.passages for each_of in _placed(by_passage[part.first], part)]
 
-    return audio.once(key, found)
+    return audio.cached(key, found)
 
 
 def _placed(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
@@ -215,7 +215,7 @@ def recording_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = ma
     def joined() -> PhonePosteriors:
         return PhonePosteriors(np.asarray(_posterior_rows(name, audio, each)), phone_recogniser(name).tokens)
 
-    return audio.once(f"all posteriors of {name}", joined)
+    return audio.cached(f"all posteriors of {name}", joined)
 
 
 def _posterior_rows(name: str, audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.units.languages_told import detect_language, is_english
+from lipmotion.units.language_detection import detect_language, is_english
 from lipmotion.units.text_normalisation import split_written_words
 
 TEXTS = {

@@ -19,11 +19,11 @@ COMMON_WORDS = {
     "nl": "de het een en van is ik niet dat op zijn te",
 }
 """The commonest words of languages in Latin letters, as any frequency list has them."""
-LEAST_COMMON, AHEAD = 3, 1.5
+MIN_COMMON, AHEAD = 3, 1.5
 """A text is in a language with so many of its common words in it, and so many times as many as of any other one."""
-LEAST_KNOWN = 0.85
+MIN_KNOWN = 0.85
 """A text of which the dictionary knows so large a share is English."""
-LEAST_PHONES, LEAST_WORDS = 4, 12
+MIN_PHONES, MIN_WORDS = 4, 12
 """Shorter words than the first are in the dictionary by chance, and of fewer words than the second nothing is said."""
 NOT_ENGLISH, IS_ENGLISH = 0.2, 0.5
 """Shares of recognised words with a pronunciation of English, up to and from which speech is not English, or is. In
@@ -44,17 +44,17 @@ def detect_language(words: Sequence[str]) -> str:
     if set(scripts) != {"LATIN"}:
         return ""
     counts = Counter({code: sum(word in common.split() for word in words) for code, common in COMMON_WORDS.items()})
-    (first, most), (_, second) = counts.most_common(2)
-    if most >= LEAST_COMMON and most >= AHEAD * second:
+    (first, highest), (_, second) = counts.most_common(2)
+    if highest >= max(MIN_COMMON, AHEAD * second):
         return first
-    return ENGLISH if sum(map(Lexicon().known, words)) >= LEAST_KNOWN * len(words) else ""
+    return ENGLISH if sum(map(Lexicon().known, words)) >= MIN_KNOWN * len(words) else ""
 
 
 def is_english(words: Iterable[Pronunciation]) -> bool | None:
     """Return whether the words of speech, as a recogniser of phones divides it, are English; None: not known."""
-    known, long = _pronunciations(), [_alike(word) for word in words if len(word) >= LEAST_PHONES]
+    known, long = _pronunciations(), [_alike(word) for word in words if len(word) >= MIN_PHONES]
     share = sum(word in known for word in long) / max(len(long), 1)
-    return share >= IS_ENGLISH if len(long) >= LEAST_WORDS and not NOT_ENGLISH < share < IS_ENGLISH else None
+    return share >= IS_ENGLISH if len(long) >= MIN_WORDS and not NOT_ENGLISH < share < IS_ENGLISH else None
 
 
 def _alike(phones: Iterable[str]) -> Pronunciation:

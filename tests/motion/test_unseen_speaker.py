@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from lipmotion import load_model
 from lipmotion.motion.closure import REACH_S, find_closable_ranges
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.unknown_voice import (
+from lipmotion.motion.unseen_speaker import (
     CONSONANT_CLOSING,
     INSET_S,
     OPENING_BY_DURATION,
     VOWEL_S,
+    UnseenSpeaker,
     choose_closing_reach,
-    open_before_speech,
-    raise_contrast,
     widen_range,
 )
 from lipmotion.pipeline.analysis.speech_analysis import analyse
@@ -45,7 +44,7 @@ def welcome() -> Speech:
 @pytest.fixture
 def no_distortion_is_low(monkeypatch: pytest.MonkeyPatch) -> None:
     """Phones can be relied on as far as words confirm them, however clear the sound is."""
-    monkeypatch.setattr("lipmotion.motion.reliability.DISTORTIONS", (-2.0, -1.0))
+    monkeypatch.setattr("lipmotion.motion.rest.DISTORTIONS", (-2.0, -1.0))
 
 
 def generated(speech: Speech, *pins: Pin) -> Generation:
@@ -68,7 +67,9 @@ def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, 
     phones = ("t", "aa", "t", "aa", "t", "aa", "t")
     units = Timeline(tuple(Span(*edges, Unit(phone)) for edges, phone in zip(pairwise(seconds), phones, strict=True)))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = raise_contrast(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 1.0, voice)
+    statistics = UnseenSpeaker(prior, units, 250, 1.0, voice).raise_contrast(
+        lambda frames: (means[frames], precisions[frames])
+    )
     deviation = prior.matrix[0, 0]
     changed, kept = statistics(slice(20, 240))
     opening = changed[:, 0, 0] / deviation
@@ -84,7 +85,9 @@ def test_half_known_voices_open_before_they_speak(voice: float, share: float) ->
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit("aa")), Span(1.8, 2.5, Unit("sil"))))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = open_before_speech(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 0.5, voice)
+    statistics = UnseenSpeaker(prior, units, 250, 0.5, voice).open_before_speech(
+        lambda frames: (means[frames], precisions[frames])
+    )
     changed, kept = statistics(slice(10, 250))
     assert changed[130 - 10, 0] == pytest.approx(share * prior.centre, rel=1e-3)
     assert np.abs(changed[[10, 60, 170, 230], 0]).max() < 1e-3
@@ -97,14 +100,11 @@ def test_a_model_of_few_phones_opens_no_mouth_before_speech() -> None:
     prior, units = load_model().learned.prior, timeline(("p", "aa"), 0.2)
     few = replace(prior, contexts=dict.fromkeys(list(prior.contexts)[:10], 1))
     means, precisions = np.zeros((250, 3, len(prior.centre))), np.ones((250, 3, len(prior.centre)))
-    changes = [
-        np.abs(
-            open_before_speech(lambda frames: (means[frames], precisions[frames]), each, units, 250, 1.0, 0.8)(
-                slice(250)
-            )[0]
-        ).max()
-        for each in (prior, few)
-    ]
+    changes = []
+    for each in (prior, few):
+        speaker = UnseenSpeaker(each, units, 250, 1.0, 0.8)
+        statistics = speaker.open_before_speech(lambda frames: (means[frames], precisions[frames]))
+        changes.append(np.abs(statistics(slice(250))[0]).max())
     assert changes[1] == pytest.approx(changes[0] * 10 / 5000)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import Lexicon, group_words, word_spans
+from lipmotion.units import Lexicon, group_words, phone_timelines
 
 
 def said(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
@@ -37,7 +37,7 @@ def test_a_word_that_is_said_again_is_another_one() -> None:
 
 def test_a_word_is_said_as_few_times_as_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
     both = Lexicon({"dodo": (("d", "ow"), ("d", "ow", "d", "ow"))})
-    monkeypatch.setattr(word_spans, "Lexicon", lambda: both)
+    monkeypatch.setattr(phone_timelines, "Lexicon", lambda: both)
     assert said(("dodo", "d ow d ow")) == [(0, 4, "dodo")]
     assert said(("dodo", "d ow d ow d ow")) in ([(0, 2, "dodo"), (2, 6, "dodo")], [(0, 4, "dodo"), (4, 6, "dodo")])
 

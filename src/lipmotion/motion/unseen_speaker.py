@@ -1,0 +1,148 @@
+"""Motion for voices that training does not know: mouths that open before speech begins, vowels that open by their
+duration, and movements as large as people's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.motion.articulation import (
+    ARTICULATORS,
+    TYPICAL_DEVIATIONS,
+    ArticulationPrior,
+    Statistics,
+    average_classes,
+    slice_dynamics,
+    smooth_steps,
+    unseen_share,
+)
+from lipmotion.motion.closure import OPENING, REACH_S
+from lipmotion.motion.space import MotionSpace
+from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Timeline, Unit, frames_of
+from lipmotion.units import VOWELS, is_silent
+
+Array = NDArray[np.float64]
+Predict = Callable[[slice], Statistics]
+LATE_ENCODING_SHARE = 0.2
+"""Share of the motion from the encoding alone after all that is done for such a voice, where training knows it half or
+less: what the sound says of the lips corrects what is only usual (docs/results/voices.md)."""
+VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
+"""A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
+standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
+CONSONANT_CLOSING = 0.25
+"""Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of
+the phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
+BREATH_S = 0.6
+"""So long before the first phone the mouth of a voice that is half known is as open as in speech: people part their
+lips and breathe in."""
+SURE_PHONES = 5000
+"""Models of so many phones in training, some twelve minutes, know their own speaker; those of 50 sentences take his
+voice for 0.85 of a known one (docs/results/jerk.md), no more than the large model some strangers of the same studio."""
+INSET_S = 0.03
+"""The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
+short vowels beside it stay open."""
+RETAINED = (0.52, 0.62)
+"""Standard deviation of what a model generates for voices that it does not know, as a share of that of its speaker:
+where phones cannot be relied on at all, and where they can. The more there is doubt, the closer motion is to a mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenSpeaker:
+    """What is changed in the motion of a voice that training does not know; precisions stay those of the model.
+
+    prior       : the table of articulation
+    units       : phones in time, in T frames
+    reliability : of the phones in time, 0 to 1 [shape=(T,)]
+    voice       : how well training knows the voice, 0 to 1; at 1 nothing changes
+    Every method takes and returns a function that returns means and precisions of a range of frames.
+    """
+
+    prior: ArticulationPrior
+    units: Timeline[Unit]
+    frames: int
+    reliability: Array | float
+    voice: float
+
+    def follow_encoding(self, statistics: Predict, encoded: Array) -> Predict:
+        """Draw the motion towards that from the encoding of the sound alone [shape=(T, Q)]."""
+        share = LATE_ENCODING_SHARE * min(2 * unseen_share(self.voice), 1.0)
+
+        def predict(chosen: slice) -> Statistics:
+            means, precisions = statistics(chosen)
+            return means + share * (slice_dynamics(encoded, chosen) - means), precisions
+
+        return predict
+
+    def raise_contrast(self, statistics: Predict) -> Predict:
+        """Open consonants less, and vowels by their duration.
+
+        All articulators move as from the mean consonant to the mean vowel of the table.
+        Source: Lindblom 1963 (vowel reduction): the shorter a vowel, the more it misses its target.
+        """
+        wider = np.zeros((self.frames, 1))
+        for span in self.units:
+            inside, phone = slice(*frames_of(span, self.frames)), span.label.phone
+            if phone in VOWELS:
+                wider[inside] = OPENING_BY_DURATION * np.log(max(span.duration_s, 1 / FRAME_RATE_HZ) / VOWEL_S)
+            elif phone and not is_silent(phone):
+                wider[inside] = -CONSONANT_CLOSING
+        more_open = (average_classes()[True] - average_classes()[False]).mean(axis=0)
+        more_open /= more_open[ARTICULATORS.index(OPENING)]
+        gain = unseen_share(self.voice) * np.broadcast_to(self.reliability, self.frames)[:, None]
+        change = gain * smooth_steps(wider) * more_open @ self.prior.matrix
+
+        def predict(chosen: slice) -> Statistics:
+            means, precisions = statistics(chosen)
+            return means + slice_dynamics(change, chosen), precisions
+
+        return predict
+
+    def open_before_speech(self, statistics: Predict) -> Predict:
+        """Open the mouth before speech begins; at ``voice`` 0 nothing changes, either.
+
+        All dimensions are drawn towards their median in speech. A voice of which nothing is known may be a known one
+        in noise, and its recording may begin anywhere. A model of few phones half knows its own speaker's voice, too:
+        the fewer it was trained on, the less changes.
+        Source: Scobbie, Schaeffler & Mennen 2011 (lips part and breath is taken before the first sound).
+        """
+        first_s = next((span.start_s for span in self.units if not is_silent(span.label.phone)), 0.0)
+        time_s = np.arange(self.frames) / FRAME_RATE_HZ
+        before = ((time_s >= first_s - BREATH_S) & (time_s < first_s))[:, None].astype(float)
+        sure = min(sum(self.prior.contexts.values()) / SURE_PHONES, 1)
+        half_known = 2 * np.sqrt(self.voice) * unseen_share(self.voice) * sure
+        share = half_known * np.broadcast_to(self.reliability, self.frames)[:, None] * smooth_steps(before)
+        pose = np.stack([self.prior.centre, *np.zeros((2, len(self.prior.centre)))])
+
+        def predict(chosen: slice) -> Statistics:
+            means, precisions = statistics(chosen)
+            return means + share[chosen, :, None] * (pose - means), precisions
+
+        return predict
+
+
+def choose_closing_reach(voice: float) -> float:
+    """Return how many seconds before and after a p, b or m the lips may close; negative: seconds within it.
+
+    voice : how well training knows the voice, 0 to 1
+    """
+    return REACH_S - unseen_share(voice) * (REACH_S + INSET_S)
+
+
+def widen_range(prior: ArticulationPrior, space: MotionSpace, voice: float, reliability: float) -> float:
+    """Return the factor by which movements reach the range of typical talkers, at least 1.
+
+    prior       : the table of articulation, which knows the range of the model's speaker
+    space       : of the motion; the factor is 1 where its opening is not in eye distances
+    voice       : how well training knows the voice, 0 to 1; at 1 the range is that of the speaker, and the factor 1
+    reliability : of the phones, 0 to 1, on average
+    """
+    column, row = space.direct_names.index(OPENING), ARTICULATORS.index(OPENING)
+    if space.channels[space.direct[column]].unit != EYE_DISTANCE:
+        return 1.0
+    typical = TYPICAL_DEVIATIONS[row]
+    speaker_deviation = prior.matrix[row, column] ** 2 / typical
+    generated = speaker_deviation * float(np.interp(reliability, (0, 1), RETAINED))
+    return float(max(typical / generated, 1.0) ** (1 - voice))

@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lipmotion.stats.curves import measure_modulation_spectrum, varies, window_frames, with_dynamics
+from oracles.trajectories import window_matrix
+
+
+@given(frames=st.integers(1, 12), seed=st.integers(0, 1000))
+def test_agrees_with_the_window_matrix(frames, seed):
+    values = np.random.default_rng(seed).normal(0, 1, (frames, 2))
+    wanted = (window_matrix(frames) @ values).reshape(3, frames, 2)
+    assert with_dynamics(values) == pytest.approx(wanted.swapaxes(0, 1), abs=1e-12)
+
+
+def test_a_parabola_has_its_slope_and_constant_curvature():
+    t = np.arange(6.0)[:, None]
+    dynamics = with_dynamics(3 * t * t - 5 * t + 1)
+    assert dynamics[1:-1, 1] == pytest.approx(6 * t[1:-1] - 5)
+    assert dynamics[1:-1, 2] == pytest.approx(np.full((4, 1), 6.0))
+    assert not dynamics[[0, -1], 1:].any()
+
+
+def rounded(value: float, seed: int = 0) -> np.ndarray:
+    """Return a constant with the rounding errors of another processor."""
+    return value * (1 + 1e-7 * np.random.default_rng(seed).uniform(-1, 1, size=(500, 1)))
+
+
+def test_rounding_of_a_constant_is_no_movement() -> None:
+    for value in (0.0, 1e-30, 0.3, -7.0, 1e6):
+        assert not varies(rounded(value)).any()
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3, -7.0, 1e6])
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
+def test_a_thousandth_of_the_magnitude_is_movement_in_any_unit(value: float, scale: float) -> None:
+    moving = scale * (value + max(abs(value), 1.0) * 1e-3 * np.sin(np.arange(500)))[:, None]
+    assert varies(moving).all()
+
+
+def test_columns_are_judged_apart() -> None:
+    values = np.concatenate([rounded(1e6), np.linspace(0, 1e-3, 500)[:, None], rounded(0.0)], axis=1)
+    assert varies(values).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("rate_hz", [25.0, 100.0])
+def test_a_wave_is_at_its_frequency(rate_hz: float) -> None:
+    time_s = np.arange(round(4 * rate_hz)) / rate_hz
+    frequencies, power = measure_modulation_spectrum([5 + np.sin(2 * np.pi * 6.25 * time_s)[:, None]], rate_hz)
+    assert frequencies[power[:, 0].argmax()] == pytest.approx(6.25)
+    assert frequencies[-1] == pytest.approx(rate_hz / 2)
+    near = abs(frequencies - 6.25) < 2
+    assert power[near].sum() > 0.999 * power.sum()
+
+
+def test_it_is_the_mean_over_windows_and_level_does_not_matter() -> None:
+    rng = np.random.default_rng(0)
+    size = window_frames(25.0)
+    clips = [rng.normal(size=(size, 2)) for _ in range(3)]
+    whole = measure_modulation_spectrum(clips, 25.0)[1]
+    assert whole == pytest.approx(np.mean([measure_modulation_spectrum([clip + 9], 25.0)[1] for clip in clips], axis=0))
+    assert measure_modulation_spectrum([2 * clips[0]], 25.0)[1] == pytest.approx(
+        4 * measure_modulation_spectrum(clips[:1], 25.0)[1]
+    )
+
+
+def test_a_short_clip_has_as_many_frequencies() -> None:
+    frequencies, power = measure_modulation_spectrum([np.arange(4.0)[:, None]], 25.0)
+    assert power.shape == (len(frequencies), 1)
+    assert np.isfinite(power).all()
