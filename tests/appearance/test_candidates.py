@@ -11,7 +11,7 @@ from lipmotion_faces.appearance.candidates import (
     choose_candidates,
     draw_to_recorded,
     make_candidates,
-    recorded_details,
+    measure_details,
     squared_distances,
 )
 
@@ -116,7 +116,7 @@ def test_details_are_what_the_eigenlips_leave_out(space: Eigenlips) -> None:
     images = HELD_OUT[:20].copy()
     images[3, :2] = 255 - images[3, :2]
     codes = space.project(images)
-    details, deepest = recorded_details(space, images, codes)
+    details, deepest = measure_details(space, images, codes)
     exact = np.rint(images - space.expand(codes))
     assert np.array_equal(details, np.clip(exact, -100, 100).astype(np.int8))
     assert deepest == pytest.approx(np.abs(exact).max(axis=(1, 2, 3)))

@@ -80,7 +80,7 @@ def test_a_short_one_goes_to_and_fro():
 
 def test_no_step_is_much_larger_than_usual():
     descriptors = background(wander(150))
-    rows = descriptors.standardised([(0, 150)])
+    rows = descriptors.standardise([(0, 150)])
     usual = np.linalg.norm(np.diff(rows, axis=0), axis=1)
     order = loop_order(descriptors, 3000, RATE_HZ)
     shown = np.linalg.norm(np.diff(displayed(order, rows), axis=0), axis=1)
@@ -97,7 +97,7 @@ def test_a_motion_that_repeats_is_looped_forwards():
     assert len(jumps) >= 3
     for jump in jumps:
         assert jump.cost < JUMP_LIMIT
-    rows = descriptors.standardised([(0, 130)])
+    rows = descriptors.standardise([(0, 130)])
     shown = np.linalg.norm(np.diff(displayed(order, rows), axis=0), axis=1)
     assert shown.max() < JUMP_LIMIT + np.linalg.norm(np.diff(rows, axis=0), axis=1).max()
 
@@ -190,17 +190,17 @@ def maps(moves) -> np.ndarray:
 def test_equal_frames_have_no_distance():
     descriptors = describe_frames(scene(), maps(np.zeros((4, 2))))
     assert len(descriptors) == 4
-    assert row_distances(descriptors.standardised([(0, 4)])).max() < 1e-5
+    assert row_distances(descriptors.standardise([(0, 4)])).max() < 1e-5
 
 
 def test_the_mouth_does_not_count():
     frames = scene()
     frames[2, 95:130, 60:100] = 0  # below the nose
     same = describe_frames(frames, maps(np.zeros((4, 2))))
-    assert row_distances(same.standardised([(0, 4)]))[2].max() < 1e-5
+    assert row_distances(same.standardise([(0, 4)]))[2].max() < 1e-5
     frames[2, 50:66, 50:110] = 0  # the eyes
     other = describe_frames(frames, maps(np.zeros((4, 2))))
-    assert row_distances(other.standardised([(0, 4)]))[2, 0] > 0.5
+    assert row_distances(other.standardise([(0, 4)]))[2, 0] > 0.5
 
 
 def test_the_aligned_face_does_not_move():
@@ -217,7 +217,7 @@ def test_neighbours_differ_by_about_one():
     frames = scene(30)
     noisy = np.clip(frames + np.random.default_rng(0).normal(scale=20, size=frames.shape), 0, 255).astype(np.uint8)
     moves = np.cumsum(np.random.default_rng(1).normal(size=(30, 2)), axis=0)
-    distances = row_distances(describe_frames(noisy, maps(moves)).standardised([(0, 30)]))
+    distances = row_distances(describe_frames(noisy, maps(moves)).standardise([(0, 30)]))
     assert 0.7 < np.median(np.diag(distances, 1)) < 1.4
     np.testing.assert_allclose(np.diag(distances), 0, atol=1e-5)
 
@@ -225,7 +225,7 @@ def test_neighbours_differ_by_about_one():
 def test_any_size():
     for size in ((20, 30), (1, 1)):
         frames = np.zeros((2, *size, 3), np.uint8)
-        assert np.isfinite(describe_frames(frames, maps(np.zeros((2, 2)))).standardised([(0, 2)])).all()
+        assert np.isfinite(describe_frames(frames, maps(np.zeros((2, 2)))).standardise([(0, 2)])).all()
 
 
 def test_other_frames_than_maps_are_refused():

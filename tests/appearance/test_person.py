@@ -60,7 +60,7 @@ def test_its_parts(appearance: Appearance, footage: FootagePictures) -> None:
 
 
 def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen: Motion) -> None:
-    codes, drawn = appearance.of_motion(unseen), toy_lower_faces(unseen, noise=0)[MOUTH].astype(float)
+    codes, drawn = appearance.predict_codes(unseen), toy_lower_faces(unseen, noise=0)[MOUTH].astype(float)
     assert len(codes) == len(unseen.values)
     shown = appearance.mouth.restore(codes.mouth).astype(float)
     mean = drawn.mean(axis=0)
@@ -78,7 +78,7 @@ def test_mouths_are_as_wide_as_the_motion(appearance: Appearance, distances: np.
     for name, width in asked.items():
         values = unseen.values.copy()
         values[:, column] = width
-        shown[name] = appearance.of_motion(Motion(values, 25.0, unseen.channels)).mouth
+        shown[name] = appearance.predict_codes(Motion(values, 25.0, unseen.channels)).mouth
     order = distances[:, 1].argsort()
     ends = {"narrow": order[:20], "wide": order[-20:]}
     for name, other in (("narrow", "wide"), ("wide", "narrow")):
@@ -97,21 +97,21 @@ def test_a_closure_shows_a_recorded_mouth_that_is_closed(
     values = unseen.values.copy()
     values[10:13, unseen.column("opening")] = 0.0
     motion = Motion(values, 25.0, unseen.channels)
-    mixed, closed = appearance.of_motion(motion).mouth, appearance.of_motion(motion, contact).mouth
+    mixed, closed = appearance.predict_codes(motion).mouth, appearance.predict_codes(motion, contact).mouth
     apart = np.linalg.norm(appearance.mouth_codes - closed[11], axis=1)
     assert apart.min() < 1e-3 * np.linalg.norm(closed[11])
     assert distances[apart.argmin(), 0] < 0.01
     assert closed[10:12] == pytest.approx(closed[11:13], abs=1e-3)
     assert closed[9] == pytest.approx((mixed[9] + closed[11]) / 2, abs=1e-2)
     assert np.array_equal(closed[14:], mixed[14:])
-    pause = appearance.of_motion(motion, np.ones(len(values))).mouth  # too long for a closure
+    pause = appearance.predict_codes(motion, np.ones(len(values))).mouth  # too long for a closure
     assert np.array_equal(pause, mixed)
 
 
 def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Motion) -> None:
     drawn = toy_lower_faces(unseen, noise=0)[MOUTH]
     dim = relight(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))
-    bright, dark = appearance.of_mouths(drawn), appearance.of_mouths(dim)
+    bright, dark = appearance.measure_codes(drawn), appearance.measure_codes(dim)
     assert bright.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.0)
     assert dark.chin_px == pytest.approx(bright.chin_px, abs=0.3)
     assert np.abs(dark.mouth - bright.mouth).max() < 0.02 * np.abs(bright.mouth).max()
@@ -119,7 +119,7 @@ def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Moti
 
 
 def test_a_jaw_of_sound_is_proportional_to_its_level(appearance: Appearance, unseen: Motion) -> None:
-    codes = appearance.of_motion(unseen)
+    codes = appearance.predict_codes(unseen)
     frames = len(codes)
     quiet, middle, loud = (appearance.with_jaw_of_sound(codes, np.full(frames, level)) for level in (-60, -40, -20))
     assert np.array_equal(loud.mouth, codes.mouth)
@@ -165,7 +165,7 @@ def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
     assert found.light == pytest.approx(wanted.light, abs=0.5)
     assert cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)
     motion = Motion(footage.motion[::5], 25.0, footage.channels)
-    pictures = [each.mouth.restore(each.of_motion(motion).mouth).astype(int) for each in (found, wanted)]
+    pictures = [each.mouth.restore(each.predict_codes(motion).mouth).astype(int) for each in (found, wanted)]
     assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
 
 

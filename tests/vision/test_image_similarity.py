@@ -5,9 +5,9 @@ import pytest
 
 from lipmotion_faces.tracking.image_similarity import (
     face_thumbnail,
+    find_occluded_mouths,
     image_correlation,
     mouth_thumbnail,
-    occluded_mouths,
     scene_thumbnail,
 )
 
@@ -65,28 +65,28 @@ def test_a_box_is_strange():
     for value in (0, 255):
         frames = mouths()
         frames[10:18] = value
-        assert np.flatnonzero(occluded_mouths(frames)).tolist() == list(range(10, 18))
+        assert np.flatnonzero(find_occluded_mouths(frames)).tolist() == list(range(10, 18))
 
 
 def test_what_has_another_texture_is_strange_at_any_shift():
     frames = mouths()
     frames[10:18] = DRAW.integers(0, 255, frames[10:18].shape)
-    assert np.flatnonzero(occluded_mouths(frames)).tolist() == list(range(10, 18))
+    assert np.flatnonzero(find_occluded_mouths(frames)).tolist() == list(range(10, 18))
 
 
 def test_where_the_usual_look_is_flat_nothing_is_strange():
     frames = np.full((20, 14, 18, 3), 100, np.uint8)
     frames[3] = 250
-    assert not occluded_mouths(frames).any()
+    assert not find_occluded_mouths(frames).any()
 
 
 def test_neither_usual_mouths_nor_other_light_nor_a_nod_are_strange():
     usual = mouths()
-    assert not occluded_mouths(usual).any()
+    assert not find_occluded_mouths(usual).any()
     dark = usual.copy()
     dark[10:18] //= 2
-    assert not occluded_mouths(dark).any()
+    assert not find_occluded_mouths(dark).any()
     for rows in (-4, -2, 3):
         nodded = usual.copy()
         nodded[10:18] = np.roll(nodded[10:18], rows, axis=1)
-        assert not occluded_mouths(nodded).any()
+        assert not find_occluded_mouths(nodded).any()

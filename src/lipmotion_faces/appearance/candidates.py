@@ -122,7 +122,7 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
     """
     if coefficients is None:
         coefficients = eigenlips.project(pictures)
-    details, deepest = recorded_details(eigenlips, pictures, coefficients)
+    details, deepest = measure_details(eigenlips, pictures, coefficients)
     undamaged = deepest <= LARGEST_DETAIL
     if not undamaged.any():
         raise InputError(
@@ -133,7 +133,7 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
     return Candidates(coefficients[undamaged], details[undamaged])
 
 
-def recorded_details(
+def measure_details(
     eigenlips: Eigenlips, pictures: Pictures, coefficients: Values
 ) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
     """Return what eigenlips leave out of pictures, and the largest value of it in each picture before it is cut off.

@@ -56,7 +56,7 @@ class FrameDescriptors:
         """Return the descriptors of frames from ``start`` (included) to ``stop`` (excluded)."""
         return FrameDescriptors(*(rows[start:stop] for rows in (self.whole, self.face, self.eyes, self.place)))
 
-    def standardised(self, scenes: Scenes, fade: int = 1) -> Array:
+    def standardise(self, scenes: Scenes, fade: int = 1) -> Array:
         """Return rows whose distances count in ordinary differences: that of neighbours has a median of about 1.
 
         scenes : first frame of each part without a cut, and the one after its last
@@ -292,7 +292,7 @@ class _Plan:
             none = np.full((count, 1), -1), np.full((count, 1), np.inf)
             self._jumps = {1: none, -1: none}
         else:
-            distance = row_distances(descriptors.standardised(self.scenes, self._fade))
+            distance = row_distances(descriptors.standardise(self.scenes, self._fade))
             self._jumps = {way: self._find_jumps(distance, way) for way in (1, -1)}
 
     def order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
@@ -405,7 +405,7 @@ def _measure_restlessness(descriptors: FrameDescriptors, scenes: Sequence[tuple[
     """Return the speed of the background at each frame, relative to the median [shape=(T,)]."""
     from scipy.ndimage import gaussian_filter1d
 
-    rows = descriptors.standardised(scenes)
+    rows = descriptors.standardise(scenes)
     speed = np.zeros(len(rows))
     for start, stop in scenes:
         if stop - start > 1:

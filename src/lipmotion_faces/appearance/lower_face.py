@@ -198,8 +198,10 @@ def moved_part(scale: int) -> Mask:
 
 
 def move_chin(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
-    """Return pictures of the lower face whose chin is lower, or higher.
+    """Return pictures of the lower face whose chin is lower, or higher: what is between mouth and neck is stretched.
 
+    The tip of a chin moves against collar and hair, which cloning cannot mend: pictures of another moment have them
+    elsewhere. So the outline of the jaw stays that of the footage, and is moved to where speech wants it.
     pictures : [shape=(T, 128 · scale, 128 · scale, 3)], uint8
     chin_px  : how far the tip of the chin is below the eyes in them, px of the face [shape=(T,)]
     drops_px : how far it is moved down [shape=(T,)]; at most ``LARGEST_PX`` are done, less where the chin is short

@@ -42,7 +42,7 @@ from lipmotion_faces.appearance.candidates import (
     choose_candidates,
     draw_to_recorded,
     make_candidates,
-    recorded_details,
+    measure_details,
     squared_distances,
 )
 from lipmotion_faces.appearance.lower_face import (
@@ -185,7 +185,7 @@ class Appearance:
     @cached_property
     def jaw_candidates(self) -> Candidates:
         """The recorded lower faces as components and detail."""
-        details, _ = recorded_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        details, _ = measure_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
         return Candidates(self.jaw_codes, details)
 
     def mouth_refiner(self, options: RefinementOptions) -> Refiner:
@@ -196,7 +196,7 @@ class Appearance:
         """Return what makes pictures of the lower face from components of the jaw."""
         return Refiner(enlarge(self.jaw, self.scale), self.jaw_candidates, options)
 
-    def of_motion(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
+    def predict_codes(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
         """Return the lower face for motion of tracked points.
 
         contact : how near the lips are to touching, 0 to 1, at which they touch [shape=(T,)]; None: as they are mixed
@@ -234,7 +234,7 @@ class Appearance:
             mouths[around] += contact[around, None].astype(np.float32) * (pressed - mouths[around])
         return mouths
 
-    def of_mouths(self, mouths: Pictures) -> FaceCodes:
+    def measure_codes(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
         codes = self.mouth.project(relight(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
         values = codes @ self.from_mouth[1:] + self.from_mouth[0]
@@ -265,7 +265,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     blocks = (pictures[start : start + PICTURES_PER_BLOCK] for start in range(0, len(pictures), PICTURES_PER_BLOCK))
     jaw_codes = np.concatenate([jaw.project(_isolate_jaw(block, around, footage.shape)) for block in blocks])
     chosen = choose_candidates(codes, CANDIDATES)
-    undamaged = recorded_details(mouth, mouths[chosen], codes[chosen])[1] <= LARGEST_DETAIL
+    undamaged = measure_details(mouth, mouths[chosen], codes[chosen])[1] <= LARGEST_DETAIL
     chosen = chosen[undamaged] if undamaged.any() else chosen
     chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
     names = [channel.name for channel in footage.channels]

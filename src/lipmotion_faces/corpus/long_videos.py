@@ -188,7 +188,7 @@ HELD_OUT_SHARE = 0.1
 """Share of the utterances, the last ones, that are ``test``; as many before them are ``val``."""
 
 
-def transcript_beside(video: Path) -> TimedTranscript | None:
+def find_transcript(video: Path) -> TimedTranscript | None:
     """Return the transcript beside a video, one with times if there is any; None if there is none.
 
     Raises InputError: a file of labels cannot be read.
@@ -324,7 +324,7 @@ def divide_video(
 
 def _read_lines(recording: SourceRecording) -> list[SpokenPart]:
     """Return the lines in time beside a video, with a warning where there are words without times."""
-    transcript = transcript_beside(recording.file)
+    transcript = find_transcript(recording.file)
     lines = [] if transcript is None else spoken_lines(transcript)
     if transcript is not None and not lines:
         LOG.warning(

@@ -30,11 +30,11 @@ from lipmotion.units import check_words
 from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, divide_long_videos, single_video
 from lipmotion_faces.corpus.supplied import (
     DIGESTS,
+    read_supplied_phones,
+    read_supplied_track,
     separate_sound,
     shift_phones,
     source_digests,
-    supplied_phones,
-    supplied_track,
     trim_to_shared,
 )
 from lipmotion_faces.tracking.frames import VideoSpan
@@ -324,13 +324,13 @@ def _make_utterance(job: _Job, source: dict[str, str]) -> Utterance:
         split=recording.split,
         source=source,
         speaker=recording.speaker,
-        phones=supplied_phones(recording, audio.duration_s),
+        phones=read_supplied_phones(recording, audio.duration_s),
     )
 
 
 def _track(job: _Job, duration_s: float | None) -> Track:
     if job.recording.motion_file is not None:
-        return supplied_track(job.recording.motion_file, duration_s)
+        return read_supplied_track(job.recording.motion_file, duration_s)
     recording, crops = job.recording, job.settings["crops"] == "yes"
     if job.part is None or recording.end_s is None:
         return track(recording.file, crops=crops, tracker=job.tracker)

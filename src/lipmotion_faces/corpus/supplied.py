@@ -53,7 +53,7 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
     return digests
 
 
-def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
+def read_supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
     """Return the motion in a file as a track, without mouth pictures.
 
     duration_s : of the sound that is in step with it; None: there is none, so any length is right
@@ -82,7 +82,7 @@ def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
     return Track(motion, np.ones(len(motion.values), bool) if seen is None else seen)
 
 
-def supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:
+def read_supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:
     """Return the labelled phones of a recording, from 0 s to the end of its sound, or None if it has no labels.
 
     duration_s : of the sound

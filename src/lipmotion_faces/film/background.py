@@ -186,7 +186,7 @@ def _chain_parts(parts: Sequence[_Part]) -> list[_Part]:
         missing = max(0.0, 1 - (scene[1] - scene[0]) / rate_hz / SHORT_S)
         blemishes.append(max((join.cost for join in order.joins), default=0.0) + SHORT_COST * missing)
     part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
-    distances = row_distances(descriptors.standardised(scenes, fade_frames(rate_hz))[::COMPARED_STEP])
+    distances = row_distances(descriptors.standardise(scenes, fade_frames(rate_hz))[::COMPARED_STEP])
     chosen = [int(np.argmin(blemishes))]
     while True:
         nearest = distances[np.isin(part_of, chosen)].min(axis=0)
@@ -227,7 +227,7 @@ def _usable(footage: Footage) -> NDArray[np.bool_]:
     return usable
 
 
-def stored_sequence(background: StoredBackground) -> BackgroundSequence:
+def open_stored_background(background: StoredBackground) -> BackgroundSequence:
     """Return the background in the file of a face."""
     video = background.video
     usable = np.ones(len(video), bool)

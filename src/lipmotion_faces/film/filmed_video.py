@@ -24,7 +24,7 @@ from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent
 from lipmotion.types.progress import with_reports
 from lipmotion_faces.appearance.person import FaceCodes
 from lipmotion_faces.appearance.placing import cut
-from lipmotion_faces.film.background import open_background, stored_sequence
+from lipmotion_faces.film.background import open_background, open_stored_background
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, BATCH, STITCHING, Stitcher
 from lipmotion_faces.tracking.footage import read_video_frames
@@ -151,7 +151,7 @@ def make_film(  # noqa: PLR0913
     if options.overlay is not None and speech is not None:
         background = open_background(speech, in_time=True).enlarge(ZOOM)
     elif options.background is None:
-        background = stored_sequence(face.background)
+        background = open_stored_background(face.background)
     else:
         background = open_background(Path(options.background), face.appearance)
     rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
@@ -207,15 +207,15 @@ def face_codes(
         contact = 1 - np.clip(gap / FULL_DEFICIT_GAP, 0, 1)  # how near the lips are to touching
     shown = Motion(values, rate_hz, motion.channels)
     if eigenlips is None or not all(channel in shown.channels for channel in eigenlips.channels):
-        return face.appearance.of_motion(shown, contact)
+        return face.appearance.predict_codes(shown, contact)
     values = values[:, [shown.column(channel.name) for channel in eigenlips.channels]]
     starts = range(0, count, BATCH)
-    parts = [face.appearance.of_mouths(eigenlips.restore(values[start : start + BATCH])) for start in starts]
+    parts = [face.appearance.measure_codes(eigenlips.restore(values[start : start + BATCH])) for start in starts]
     mouth = np.concatenate([part.mouth for part in parts])
     if all(channel.unit == GREY for channel in shown.channels):
         jaw, chin_px = (np.concatenate([getattr(part, name) for part in parts]) for name in ("jaw", "chin_px"))
         return FaceCodes(mouth, jaw, chin_px)
-    return replace(face.appearance.of_motion(shown), mouth=mouth)  # points tell the jaw better
+    return replace(face.appearance.predict_codes(shown), mouth=mouth)  # points tell the jaw better
 
 
 def person_shown(model: Model, face: FilmedFace, speaker: str = "") -> FilmedFace | None:

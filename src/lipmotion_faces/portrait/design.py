@@ -1,7 +1,7 @@
 """What tells one drawn character from another: colours, proportions, hair. The drawing itself is the same for all.
 
 Lengths are in eye distances: origin between the eyes, x to the right, y downwards. Paths are lists of points that a
-smooth curve goes through (``outlines``).
+smooth curve goes through: pairs of numbers, or a text ``"x y, x y, ..."``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Pictures of poses for the encoder of a video: planes of brightness and of two colours, YUV 4:2:0.
 
-The same stages as in ``rasteriser``, in the encoder's own colours from the first layer on: brightness and colours are
-sums of red, green and blue, so what is laid or mixed in one form is laid and mixed in the other one. The colours of a
+The same stages as in ``portrait_rasteriser``, in the colours of the encoder from the first layer on: they are sums of
+red, green and blue, so what is laid or mixed in one form is laid and mixed in the other one. The colours of a
 video have a quarter of its pixels, and there is nothing to convert: a frame takes less than half of the time.
 """
 

@@ -81,7 +81,7 @@ def image_correlation(first: Array, other: Array) -> Array:
     return (a * b).mean(axis=(-3, -2, -1)) / np.where(textured, np.sqrt(a_power * b_power), np.inf)
 
 
-def occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def find_occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return in which frames something covers the mouth: its region is unlike the median region of the clip.
 
     mouths : array [shape=(T, 14, 18, 3)] of ``mouth_thumbnail``

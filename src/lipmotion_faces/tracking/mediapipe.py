@@ -144,7 +144,7 @@ def quiet_stderr() -> Iterator[None]:
 
 @final
 class MediaPipe(LandmarkTracker):
-    """The face mesh of MediaPipe, whose numbers of points are those of ``landmarks``."""
+    """The face mesh of MediaPipe, whose numbers of points are those of ``trackers``."""
 
     def versions(self) -> dict[str, str]:  # noqa: D102
         try:

@@ -25,7 +25,7 @@ from lipmotion_faces.tracking.frames import (
     resample_to_constant_rate,
 )
 from lipmotion_faces.tracking.head_pose import crop_mouth, eyes_to_image, face_to_image, remove_head_motion
-from lipmotion_faces.tracking.image_similarity import mouth_thumbnail, occluded_mouths
+from lipmotion_faces.tracking.image_similarity import find_occluded_mouths, mouth_thumbnail
 from lipmotion_faces.tracking.trackers import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, MEDIAPIPE, TRACKED_POINTS
 
 Array = NDArray[np.float64]
@@ -179,7 +179,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
     if not pictures.times_s:
         raise InputError(f"{path}: no picture from {span.start_s:.2f} to {span.end_s:.2f} s; give a whole video")
     others = pictures.mark_unseen(~follower.person()[pictures.seen])
-    covered = pictures.mark_unseen(occluded_mouths(np.stack(pictures.mouths))) if pictures.mouths else 0
+    covered = pictures.mark_unseen(find_occluded_mouths(np.stack(pictures.mouths))) if pictures.mouths else 0
     times_s, cuts = np.array(pictures.times_s), tuple(follower.cuts())
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
     notes = (

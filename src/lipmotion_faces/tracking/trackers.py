@@ -1,4 +1,7 @@
-"""Landmark trackers: methods that find faces in pictures, and the points of each. MediaPipe is one of them."""
+"""Landmark trackers: methods that find faces in pictures, and the points of each. MediaPipe is one of them.
+
+Points have the numbers of the face mesh (478). Left and right are the speaker's own: his left is right in the picture.
+"""
 
 from __future__ import annotations
 
@@ -79,7 +82,7 @@ class PointFinder(AbstractContextManager["PointFinder"], Protocol):
         """Return the points of every face in the next picture.
 
         image : uint8 array [shape=(H, W, 3)], RGB
-        Returns one array a face [shape=(len(TRACKED_POINTS), 3)], in the order of ``landmarks.TRACKED_POINTS``:
+        Returns one array a face [shape=(len(TRACKED_POINTS), 3)], in the order of ``TRACKED_POINTS``:
         px, x to the right, y down, z away from the camera.
         """
 

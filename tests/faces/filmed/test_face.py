@@ -77,7 +77,7 @@ def test_there_and_back(filmed_face: FilmedFace, filmed_face_file: Path) -> None
     assert again.summary == filmed_face.summary
     assert again.appearance.shape == filmed_face.appearance.shape
     motion = filmed_face.takes[0].motion
-    codes, expected = again.appearance.of_motion(motion), filmed_face.appearance.of_motion(motion)
+    codes, expected = again.appearance.predict_codes(motion), filmed_face.appearance.predict_codes(motion)
     for name in ("mouth", "jaw", "chin_px"):
         assert np.array_equal(getattr(codes, name), getattr(expected, name))
     for name in ("mouths", "jaws"):
@@ -214,7 +214,7 @@ def test_faces_of_before(arrays: dict[str, np.ndarray], header: dict[str, object
     face = load_face(path)
     assert (face.appearance.mouth_distances, face.background.cuts) == (None, ())
     save_face(face, path)
-    assert len(face.appearance.of_motion(load_face(path).takes[0].motion)) > 0
+    assert len(face.appearance.predict_codes(load_face(path).takes[0].motion)) > 0
 
 
 def test_arrays_that_do_not_fit_together(

@@ -45,7 +45,7 @@ def backgrounds(spoken: Motion) -> list[Background]:
 @pytest.fixture(scope="module")
 def backwards(appearance: Appearance, backgrounds: list[Background], spoken: Motion) -> tuple[FaceCodes, np.ndarray]:
     """What the lower face is like in the sentence said backwards, and the frames of it."""
-    codes = appearance.of_motion(Motion(spoken.values[::-1], 25.0, spoken.channels))
+    codes = appearance.predict_codes(Motion(spoken.values[::-1], 25.0, spoken.channels))
     return codes, stitched(appearance, codes, backgrounds)
 
 
@@ -66,7 +66,7 @@ def codes_in(appearance: Appearance, backgrounds: list[Background]) -> FaceCodes
     faces = [cut(each.frame, region_map(each.face_to_frame, 1), (128, 128)) for each in backgrounds]
     mouths = np.clip(np.rint(np.stack(faces)), 0, 255).astype(np.uint8)[(slice(None), *mouth_part(1))]
     chins = np.array([each.chin_px for each in backgrounds], np.float32)
-    return replace(appearance.of_mouths(mouths), chin_px=chins)
+    return replace(appearance.measure_codes(mouths), chin_px=chins)
 
 
 def part_in_frame(part: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -125,7 +125,7 @@ def test_a_silent_mouth_onto_a_talking_one(
 ) -> None:
     """The footage's own mouth does not shine through, and its chin goes up."""
     silent = closed(spoken)
-    made = stitched(appearance, appearance.of_motion(silent), backgrounds)
+    made = stitched(appearance, appearance.predict_codes(silent), backgrounds)
     wanted = np.stack([each.frame for each in footage_of(silent, noise=0.0)]).astype(int)
     footage = np.stack([each.frame for each in backgrounds]).astype(int)
     inside = np.stack([part_in_frame(moved_part(1), each.face_to_frame) for each in backgrounds])
@@ -140,7 +140,7 @@ def test_a_silent_mouth_onto_a_talking_one(
 
 def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motion) -> None:
     backgrounds = footage_of(closed(spoken))
-    made = stitched(appearance, appearance.of_motion(spoken), backgrounds)
+    made = stitched(appearance, appearance.predict_codes(spoken), backgrounds)
     inside = np.stack([part_in_frame(mouth_ellipse(1), each.face_to_frame) for each in backgrounds])
     dark = ((made < 90).all(axis=3) & inside).sum(axis=(1, 2))
     assert np.corrcoef(dark, spoken["opening"])[0, 1] > 0.85
@@ -150,7 +150,7 @@ def test_the_light_is_that_of_the_footage(appearance: Appearance, backgrounds: l
     """Under another lamp the same frames are made, under that lamp."""
     lamp = np.array([(1.1, 0.9, 0.7)])
     lit = [replace(each, frame=relight(each.frame[None], lamp)[0]) for each in backgrounds[:8]]
-    codes = appearance.of_motion(Motion(np.tile([[0.2, 0.55, 0.42]], (8, 1)), 25.0, TOY))
+    codes = appearance.predict_codes(Motion(np.tile([[0.2, 0.55, 0.42]], (8, 1)), 25.0, TOY))
     plain, made = (stitched(appearance, codes, each) for each in (backgrounds[:8], lit))
     wanted = relight(plain.astype(np.uint8), np.repeat(lamp, 8, axis=0)).astype(int)
     assert np.abs(made - wanted).mean() < 0.5
@@ -184,7 +184,7 @@ def test_frames_are_taken_a_few_at_a_time(appearance: Appearance, spoken: Motion
             taken += 1
             yield backgrounds[taken % 4]
 
-    frames = Stitcher(appearance, MOUTH_ALONE).stitch(appearance.of_motion(spoken), endless())
+    frames = Stitcher(appearance, MOUTH_ALONE).stitch(appearance.predict_codes(spoken), endless())
     next(frames)
     assert taken == BATCH
     assert len(list(frames)) == FRAMES - 1
@@ -192,7 +192,7 @@ def test_frames_are_taken_a_few_at_a_time(appearance: Appearance, spoken: Motion
 
 
 def test_too_few_frames_of_background(appearance: Appearance, backgrounds: list[Background], spoken: Motion) -> None:
-    frames = Stitcher(appearance).stitch(appearance.of_motion(spoken), backgrounds[:-1])
+    frames = Stitcher(appearance).stitch(appearance.predict_codes(spoken), backgrounds[:-1])
     with pytest.raises(InputError, match=f"{FRAMES - 1} frames of background, required {FRAMES}; give longer footage"):
         list(frames)
 

@@ -21,7 +21,7 @@ from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
 from lipmotion.units.visemes import SHAPES
-from lipmotion_faces.corpus.supplied import supplied_track
+from lipmotion_faces.corpus.supplied import read_supplied_track
 from meshes import gltf
 from meshes.flame import head
 from meshes.live_link_app import write_take
@@ -101,7 +101,7 @@ def read(folder: Path, good: Good) -> None:
     path = folder / VALUES if names.exists() else next(folder.iterdir())
     rate_hz = RATE_HZ / FRAMES if path.suffix == ".ply" else RATE_HZ  # one mesh is all of the motion
     curves = MotionFile(path, rate_hz, read_channels(names) if names.exists() else ())
-    track = supplied_track(curves, short_speech(good).duration_s)
+    track = read_supplied_track(curves, short_speech(good).duration_s)
     require(bool(np.isfinite(track.motion.values).all()), "values that are not finite")
     corpus = Corpus.open(good.corpus)
     utterance = replace(corpus.utterance(corpus.names()[0]), track=track)

@@ -53,7 +53,7 @@ def read(folder: Path, _: Good) -> None:
     if any(name not in known for name in needed.names):
         return
     motion = Motion(poses, 25.0, tuple(known[name] for name in needed.names))
-    codes = face.appearance.of_motion(motion)
+    codes = face.appearance.predict_codes(motion)
     for values in (codes.mouth, codes.jaw, codes.chin_px):
         require(bool(np.isfinite(values).all()), "codes that are not finite")
         require(float(np.abs(values).max(initial=0.0)) <= CODES, "codes that are absurd")

@@ -15,7 +15,7 @@ from lipmotion.corpora.layouts import read_aligned_words
 from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits
 from lipmotion.formats.label_files import read_labels
 from lipmotion.types import TimedWord, TranscriptLine
-from lipmotion_faces.corpus.supplied import supplied_phones
+from lipmotion_faces.corpus.supplied import read_supplied_phones
 
 LONG = """File type = "ooTextFile"
 Object class = "TextGrid"
@@ -108,6 +108,6 @@ def _read_labels(path: Path) -> None:
             times_s = [time for time in (part.start_s, part.end_s) if time is not None]
             require(all(0 <= time_s < math.inf for time_s in times_s), "times that are none")
             require(times_s == sorted(times_s), "times that are not in order")
-    phones = supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
+    phones = read_supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
     for span in phones or ():
         require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
-from lipmotion_faces.corpus.long_videos import spoken_lines, transcript_beside
+from lipmotion_faces.corpus.long_videos import find_transcript, spoken_lines
 
 SUBTITLES = "1\n00:00:01,000 --> 00:00:02,500\nHello there.\n\n2\n00:00:04,000 --> 00:00:05,000\n- Again!\n"
 WHISPER = {
@@ -33,7 +33,7 @@ WHISPER = {
 )
 def test_transcripts_beside_a_video(tmp_path: Path, name: str, text: str, expected: list[object]) -> None:
     (tmp_path / name).write_text(text)
-    transcript = transcript_beside(tmp_path / "talk.mp4")
+    transcript = find_transcript(tmp_path / "talk.mp4")
     assert transcript is not None
     assert [(part.start_s, part.end_s, part.words) for part in spoken_lines(transcript)] == expected
 
@@ -41,7 +41,7 @@ def test_transcripts_beside_a_video(tmp_path: Path, name: str, text: str, expect
 def test_subtitles_come_before_plain_text(tmp_path: Path) -> None:
     (tmp_path / "talk.srt").write_text(SUBTITLES)
     (tmp_path / "talk.txt").write_text("hello there again")
-    transcript = transcript_beside(tmp_path / "talk.mp4")
+    transcript = find_transcript(tmp_path / "talk.mp4")
     assert transcript is not None
     assert transcript.has_times
 

@@ -21,7 +21,7 @@ from lipmotion.motion import acoustic_network, posterior_network
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
 from lipmotion_faces.corpus import prepare as module
-from lipmotion_faces.corpus.supplied import source_digests, supplied_phones, supplied_track
+from lipmotion_faces.corpus.supplied import read_supplied_phones, read_supplied_track, source_digests
 from meshes.live_link_app import write_take
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
@@ -110,9 +110,9 @@ def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
 def test_a_bare_array_at_another_rate_is_noticed(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((50, 2)))
     curves = MotionFile(tmp_path / "a.npy", 30.0, CHANNELS)
-    assert supplied_track(curves, 1.7).motion.rate_hz == 30
+    assert read_supplied_track(curves, 1.7).motion.rate_hz == 30
     with pytest.raises(InputError, match=r"50 frames at 30 Hz last 1\.67 s, the sound lasts 5\.00 s"):
-        supplied_track(curves, 5.0)
+        read_supplied_track(curves, 5.0)
 
 
 def recording(phones: Timeline[Unit] | None) -> SourceRecording:
@@ -128,12 +128,12 @@ def test_silence_is_named_as_recognition_names_it():
         *[(0.1, 0.2, "sp"), (0.2, 0.4, "aa"), (0.4, 0.5, "sil"), (0.5, 0.7, "m"), (0.7, 0.8, "sp")],
         *[(0.8, 1.0, "sil"), (1.0, 1.2, "b"), (1.2, float("inf"), "sil")],
     )
-    found = supplied_phones(recording(labelled), 1.3)
+    found = read_supplied_phones(recording(labelled), 1.3)
     assert found == spans(
         *[(0.0, 0.2, "sil"), (0.2, 0.4, "aa"), (0.4, 0.5, "sp"), (0.5, 0.7, "m"), (0.7, 1.0, "sil")],
         *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
     )
-    assert supplied_phones(recording(None), 1.3) is None
+    assert read_supplied_phones(recording(None), 1.3) is None
     assert "phones_sha256" not in source_digests(recording(None))
 
 
@@ -146,7 +146,7 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
     edges = begin_s + np.cumsum([0, *(length for _, length in phones)])
     labelled = spans(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
     duration_s = max(float(edges[-1]) + longer_s, 0.1)
-    found = supplied_phones(recording(labelled), duration_s)
+    found = read_supplied_phones(recording(labelled), duration_s)
     assert found is not None
     assert found[0].start_s == 0
     assert found[-1].end_s == pytest.approx(duration_s)
@@ -160,8 +160,8 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
 
 def test_labels_that_go_on_after_the_sound():
     with pytest.raises(InputError, match="are they those of another recording"):
-        supplied_phones(recording(spans((0, 2, "aa"))), 1.8)
-    assert supplied_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
+        read_supplied_phones(recording(spans((0, 2, "aa"))), 1.8)
+    assert read_supplied_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
 
 
 def cut_array(content: bytes, rows: int) -> bytes:
@@ -241,6 +241,6 @@ def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
 def test_frames_without_a_face_are_not_seen(tmp_path):
     rows = [f"10:00:{n // 60:02d}:{n % 60:02d}.000,{'1,0.5' if 30 <= n < 90 else 0}" for n in range(120)]
     (tmp_path / "a.csv").write_text("\n".join(["Timecode,BlendshapeCount,JawOpen", *rows]))
-    track = supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
+    track = read_supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
     assert np.flatnonzero(track.seen).tolist() == list(range(30, 90))
     assert track.motion["jawOpen"] == pytest.approx(np.where(track.seen, 0.5, 0.0))

@@ -16,7 +16,7 @@ from lipmotion_faces.film.background import (
     best_background,
     chin_px,
     open_background,
-    stored_sequence,
+    open_stored_background,
 )
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import Background
@@ -26,7 +26,7 @@ from testing.toy_face import SCALE, toy_chin_px, toy_frames, toy_places
 
 @pytest.fixture(scope="module")
 def sequence(filmed_face: FilmedFace) -> BackgroundSequence:
-    return stored_sequence(filmed_face.background)
+    return open_stored_background(filmed_face.background)
 
 
 @pytest.fixture(scope="module")

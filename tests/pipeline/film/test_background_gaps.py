@@ -11,7 +11,7 @@ import pytest
 
 from lipmotion.types import Motion, Track
 from lipmotion_faces.film import background
-from lipmotion_faces.film.background import BackgroundSequence, stored_sequence
+from lipmotion_faces.film.background import BackgroundSequence, open_stored_background
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE
@@ -19,7 +19,7 @@ from lipmotion_faces.tracking.frames import WHOLE
 
 @pytest.fixture(scope="module")
 def sequence(filmed_face: FilmedFace) -> BackgroundSequence:
-    return stored_sequence(filmed_face.background)
+    return open_stored_background(filmed_face.background)
 
 
 def without(sequence: BackgroundSequence, unseen: Iterable[int], **more: object) -> BackgroundSequence:

@@ -81,7 +81,7 @@ def test_what_was_built(built: tuple[FilmedFace, list[Event]], videos: Videos, t
 def test_motion_becomes_the_person(built: tuple[FilmedFace, list[Event]]) -> None:
     face, _ = built
     take = face.takes[2]
-    codes = face.appearance.of_motion(take.motion)
+    codes = face.appearance.predict_codes(take.motion)
     mouths = face.appearance.mouth.restore(codes.mouth)
     dark = (mouths < 90).all(axis=3).sum(axis=(1, 2))
     assert np.corrcoef(dark, take.motion["opening"])[0, 1] > 0.8
@@ -172,7 +172,7 @@ def test_footage_without_sound(tracker: Callable[..., None], tmp_path: Path, mon
     tracker(more={video.path.resolve(): video})
     face = build_face(video.path, workers=1)
     assert face.takes == ()
-    codes = face.appearance.of_motion(footage_of(video).track.motion)
+    codes = face.appearance.predict_codes(footage_of(video).track.motion)
     level = face.appearance.with_jaw_of_sound(codes, np.full(len(codes), QUIETEST_DB))
     assert np.isfinite(level.chin_px).all()
     assert level.chin_px == pytest.approx(np.full(len(codes), toy_chin_px(video.motion).mean()), abs=1)

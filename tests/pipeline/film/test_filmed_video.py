@@ -18,7 +18,7 @@ from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.film import filmed_video as module
-from lipmotion_faces.film.background import stored_sequence
+from lipmotion_faces.film.background import open_stored_background
 from lipmotion_faces.film.filmed_video import face_codes, make_film, write_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptions
@@ -293,7 +293,7 @@ def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(
     filmed_face: FilmedFace, brief: Motion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
-    stitched, sequence = [], stored_sequence(filmed_face.background)
+    stitched, sequence = [], open_stored_background(filmed_face.background)
 
     class Noted(Stitcher):
         def __init__(self, appearance: Appearance, options: StitchingOptions) -> None:
