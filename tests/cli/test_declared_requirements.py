@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.cli.installation.doctor import EXTRAS, Requirement, declared_requirements, requirement
+from lipmotion.cli.doctor import EXTRAS, Requirement, declared_requirements, requirement
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cli.conftest import RunCommand
-from lipmotion.cli.installation.doctor import InstalledPart
+from lipmotion.cli.doctor import InstalledPart
 
 GOOD = (InstalledPart("numpy", "works", "2.4"), InstalledPart("[vosk]", "absent", "pip install 'lipmotion[vosk]'"))
 BROKEN = InstalledPart("main path", "broken", "no model")
@@ -15,7 +15,7 @@ BROKEN = InstalledPart("main path", "broken", "no model")
 def found(monkeypatch: pytest.MonkeyPatch) -> list[InstalledPart]:
     """What is found, which a test may change."""
     findings = list(GOOD)
-    monkeypatch.setattr("lipmotion.cli.installation.doctor.doctor", lambda: iter(findings))
+    monkeypatch.setattr("lipmotion.cli.doctor.doctor", lambda: iter(findings))
     return findings
 
 

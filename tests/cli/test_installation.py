@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from cli.conftest import RunCommand
-from lipmotion.cli.installation import doctor as doctor_module
-from lipmotion.cli.installation.doctor import InstalledPart, Requirement, doctor
+from lipmotion.cli import doctor as doctor_module
+from lipmotion.cli.doctor import InstalledPart, Requirement, doctor
 from lipmotion.errors import LipMotionError
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices.synthesiser import SyntheticVoice

@@ -15,8 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import shift_prosody
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift_prosody
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey

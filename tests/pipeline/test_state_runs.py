@@ -10,7 +10,7 @@ import pytest
 
 import lipmotion
 from lipmotion import Model, state_runs
-from lipmotion.pipeline.generate.state_runs import StateRun, run_lines, runs_of
+from lipmotion.pipeline.generate.explain import StateRun, run_lines, runs_of
 from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
