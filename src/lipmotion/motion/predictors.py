@@ -136,6 +136,7 @@ PREDICTORS: Registry[type[Predictor]] = Registry(
         "network": "lipmotion.motion.acoustic_network:AcousticNetwork",
         "posteriors": "lipmotion.motion.posterior_network:PosteriorNetwork",
         "prior": "lipmotion.motion.prior_regression:PriorRegression",
+        "encoding": "lipmotion.motion.encoding_regression:EncodingRegression",
     },
 )
 

@@ -101,6 +101,7 @@ def _cut_speech(speech: Speech, frames: slice) -> Speech:
         else PriorOutput(prior.articulators[steps], prior.hidden[steps], prior.distortion[steps]),
         voice=speech.voice,
         posteriors=None if posteriors is None else replace(posteriors, values=posteriors.values[halves]),
+        encoding=None if speech.encoding is None else speech.encoding[frames],
         times_given=True,
         parts=parts,
     )

@@ -334,6 +334,7 @@ def _silent_speech(speech: Speech) -> Speech:
         None if speech.log_f0 is None else np.full(REST_FRAMES, np.nan, np.float32),
         spectrum=None if speech.spectrum is None else np.zeros((REST_FRAMES, speech.spectrum.shape[1]), np.float32),
         posteriors=None if said is None else replace(said, values=np.repeat(said.values[:1], REST_FRAMES // 2, axis=0)),
+        encoding=None if speech.encoding is None else np.zeros((REST_FRAMES, speech.encoding.shape[1]), np.float16),
     )
 
 

@@ -53,9 +53,10 @@ class Speech:
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     voice       : 0 to 1, how well the model's training knows the voice
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
+    encoding    : float16 array [shape=(T, 64)], of the speech encoder (None: the engine does not use it)
     kept        : what was computed of the sound alone (``once``); speech with other units shares it
     parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
-                  empty: nothing is said. Beside it, features, spectrum and posteriors may be ``JoinedRows``
+                  empty: nothing is said. Beside it, features, spectrum, posteriors and encoding may be ``JoinedRows``
     """
 
     features: Features
@@ -67,6 +68,7 @@ class Speech:
     prior: PriorOutput | None = None
     voice: float = 1.0
     posteriors: TokenPosteriors | None = None
+    encoding: NDArray[np.float16] | None = None
     times_given: bool = False
     kept: dict[Any, Any] = field(default_factory=dict, repr=False)
     parts: tuple[SpeechPart, ...] | None = None
@@ -76,7 +78,7 @@ class Speech:
 
         of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
         """
-        sound = (self.features, self.log_f0, self.spectrum, self.posteriors)
+        sound = (self.features, self.log_f0, self.spectrum, self.posteriors, self.encoding)
         found = self.kept.get(of)
         if found is None or any(ours is not theirs for ours, theirs in zip(sound, found[0], strict=True)):
             found = self.kept[of] = (sound, make())
@@ -88,7 +90,8 @@ class Speech:
         features = replace(self.features, values=np.asarray(self.features.values))
         spectrum = None if self.spectrum is None else np.asarray(self.spectrum)
         said = self.posteriors and replace(self.posteriors, values=np.asarray(self.posteriors.values))
-        return replace(self, features=features, spectrum=spectrum, posteriors=said)
+        encoding = None if self.encoding is None else np.asarray(self.encoding)
+        return replace(self, features=features, spectrum=spectrum, posteriors=said, encoding=encoding)
 
     @property
     def units_decide(self) -> bool:

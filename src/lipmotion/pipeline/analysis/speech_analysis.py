@@ -330,7 +330,12 @@ def build_speech(
             SpeechPart(first, own, build_speech(engine, sound, sound.mfcc(), Timeline(()), kind, each))
             for first, own, sound in audio.passages
         )
-    speech = Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, parts=parts)
+    encoding: Any = None
+    if inputs.encoding:
+        encoding = audio.encoding if audio.is_passage else audio.joined_rows(lambda sound: sound.encoding)
+    speech = Speech(
+        features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts
+    )
     return with_units(speech, units) if len(units) else speech
 
 

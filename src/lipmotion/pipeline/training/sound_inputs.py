@@ -8,8 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.engines import Engine
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, token_posteriors
 from lipmotion.speech.sound.acoustic_conditions import condition_spectra
 from lipmotion.types import (
@@ -51,6 +53,11 @@ def with_sound_inputs(
             result[number] = replace(result[number], speech=replace(result[number].speech, posteriors=posteriors))
             if (number + 1) % BLOCK == 0:
                 report(Progress("posteriors of phones", number + 1, count, (number + 1) / count))
+    if inputs.encoding:
+        result = [
+            replace(example, speech=replace(example.speech, encoding=encoding))
+            for example, encoding in zip(result, each(_encode, recordings), strict=True)
+        ]
     if inputs.conditions:
         report, spectra = sub_monitor(monitor, 0.5, 1), list[list[ConditionSpectrum]]()
         chosen = [recordings[n] for n in np.unique(np.linspace(0, count - 1, VOICES).round().astype(int))]
@@ -69,3 +76,7 @@ def _vary_block(
     recordings: Sequence[tuple[int, Audio]], voices: Sequence[Audio], count: int
 ) -> list[list[ConditionSpectrum]]:
     return [condition_spectra(audio, voices, count, [number]) for number, audio in recordings]
+
+
+def _encode(audio: Audio) -> NDArray[np.float16]:
+    return analysed(audio).encoding
