@@ -52,7 +52,7 @@ from lipmotion.testing.toy import toy_sentences  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
 from lipmotion_faces.mesh import MeshFace  # noqa: E402
 from lipmotion_faces.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
-from lipmotion_faces.registry import face_named  # noqa: E402
+from lipmotion_faces.registry import make_face  # noqa: E402
 from lipmotion_studio.folder import open_folder  # noqa: E402
 from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
@@ -115,7 +115,7 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     found["a character of one's own, 45 frames of it, s"] = round(
         timed(lambda: line.weights(own, slice(200, 245))) / 1000, 2
     )
-    found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, face_named("woman"))) / 1000, 2)}
+    found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, make_face("woman"))) / 1000, 2)}
     chance, parts = Random(3), []  # noqa: S311
     while len(parts) < (EDITS if seconds <= RECOGNISED_S else FEW_EDITS):
         phones = line.state()["phones"]

@@ -59,9 +59,8 @@ from video_ways import (
 
 from lipmotion import Corpus, animate, load_model
 from lipmotion.errors import InputError
-from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closed_threshold, phone_closures
-from lipmotion.measures.curves import pooled_correlation
+from lipmotion.measures.curves import bootstrap_interval, pooled_correlation
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.train import label_phones

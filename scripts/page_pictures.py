@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import lipmotion
 from lipmotion.pipeline.outputs.curve_sets import make_curves
-from lipmotion_faces import Staging, staged_face
+from lipmotion_faces import Staging, stage_face
 
 IMAGES = Path(__file__).parent.parent / "docs" / "images"
 SENTENCE = "Five big boats follow you far up the little river. My father will call."
@@ -38,7 +38,7 @@ def main() -> None:
 def drawn(face: str, spoken: lipmotion.Generation, size: int) -> list[Frame]:
     """Return the frames of a face of which only the mouth moves."""
     still = dict.fromkeys(("blinks", "gaze", "brows", "head"), False)
-    return list(staged_face(face, Staging(size=size, **still)).render(spoken.motion, spoken.units, fps=FPS))
+    return list(stage_face(face, Staging(size=size, **still)).render(spoken.motion, spoken.units, fps=FPS))
 
 
 def mouth(frame: Frame) -> Frame:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine
 from lipmotion.errors import CorpusError

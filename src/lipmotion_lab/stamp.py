@@ -16,7 +16,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import ENGINES
 from lipmotion.kernels.threads import blas_kernels

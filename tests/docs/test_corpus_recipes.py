@@ -19,7 +19,7 @@ from lipmotion import Corpus, load_model
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.pipeline.training import train as train_module
 from lipmotion.testing import toy_utterances
 from lipmotion.types import Track, Utterance
@@ -76,7 +76,7 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     monkeypatch.setattr(prepare_module, "track", track)
     versions: Callable[[], dict[str, str]] = lambda: {"mediapipe": "0"}  # noqa: E731
-    monkeypatch.setattr(prepare_module, "tracker_named", lambda _: SimpleNamespace(versions=versions))
+    monkeypatch.setattr(prepare_module, "make_tracker", lambda _: SimpleNamespace(versions=versions))
     monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.chdir(tmp_path)

@@ -11,7 +11,7 @@ import pytest
 
 from lipmotion import Delivery, Model, animate, read_motion, write
 from lipmotion.articulation.contact import find_closures
-from lipmotion.articulation.pauses import LAUGH_GAP
+from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
@@ -75,7 +75,7 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
             levels.append(prosody.level_db)
         return face
 
-    monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.staged_face", staged)
+    monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.stage_face", staged)
     monkeypatch.setattr("lipmotion_faces.video.transparent.write_pictures", lambda *_: None)
     for offset_ms in (0, 500):
         path = tmp_path / "a%d.png"

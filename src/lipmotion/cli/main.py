@@ -65,7 +65,7 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
         if not is_exit:
             events.fail(f"{type(error).__name__}: {error}", 1)
             raise
-        code = int(getattr(error, "code", 0) or 0)
+        code = int(error.code or 0) if isinstance(error, SystemExit) else 0
         if code:
             events.fail("wrong command line", code)
         return code

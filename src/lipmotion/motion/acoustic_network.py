@@ -45,8 +45,8 @@ trained on clean speech, the other one in noise and rooms."""
 SURE_POSTERIORS = (0.75, 0.9)
 """For an unknown voice it has no share at the first mean posterior, all of its share at the second one. A known voice
 has all of it in a clear recording, too."""
-ENCODING_SHARE = 0.4
-"""Share of the regression on the encoding for a voice that training does not know; one that it knows has none of it."""
+ENCODING_SHARE = 0.5
+"""Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none."""
 
 TARGETS = {
     "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
@@ -125,9 +125,16 @@ class AcousticNetwork(Predictor):
             fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
             share = (fitting * (known + strange * (unknown - known)))[:, None]
             motion = motion + share * (network.predict(speech)[0] - motion)
-        if self.encoding is not None and strange > 0 and self.encoding.can_predict(speech):
-            motion = motion + ENCODING_SHARE * strange * (self.encoding.predict(speech)[0] - motion)
+        encoded = self.predict_encoded(speech)
+        if encoded is not None:
+            motion = motion + ENCODING_SHARE * min(2 * strange, 1.0) * (encoded - motion)
         return motion, distortion
+
+    def predict_encoded(self, speech: Speech) -> Array | None:
+        """Return motion from the encoding of the sound alone, for voices that training does not know."""
+        if self.encoding is None or speech.encoding is None or speech.voice >= 1:
+            return None
+        return self.encoding.predict(speech)[0]
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""

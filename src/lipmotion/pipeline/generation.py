@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.curve_edits import bend_through_pins, find_pinned_frame
-from lipmotion.articulation.pauses import rest_in_pauses
-from lipmotion.articulation.symmetry import make_symmetrical
+from lipmotion.articulation.lip_points import make_symmetrical
+from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided

@@ -58,8 +58,8 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
     products, down, across, pixels = np.zeros((3, 3)), np.zeros(2), np.zeros(2), 0
     for pictures in clips:
         if pictures.ndim != 4 or pictures.shape[3] != 3 or pictures.dtype != np.uint8:
-            found = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
-            raise InputError(f"{found}, required (T, H, W, 3), uint8")
+            received = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
+            raise InputError(f"{received}, required (T, H, W, 3), uint8")
         if len(pictures) < 3 or not pictures.size:
             continue
         steps = np.diff(pictures.astype(np.float32), axis=0)
@@ -102,8 +102,8 @@ class NoiseSource:
         """
         height, width = self.size
         if pictures.ndim != 4 or pictures.shape[1:] != (height, width, 3) or pictures.dtype != np.uint8:
-            found = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
-            raise InputError(f"{found}, required (T, {height}, {width}, 3), uint8")
+            received = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
+            raise InputError(f"{received}, required (T, {height}, {width}, 3), uint8")
         result = np.empty_like(pictures)
         for number, picture in enumerate(pictures):
             draw = np.random.default_rng([self.seed, first_frame + number])

@@ -13,8 +13,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantise, read_entry, write_utterance
+from lipmotion.corpora.folder import discover
 from lipmotion.corpora.separate_sounds import add_separate_sounds
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
@@ -39,7 +39,7 @@ from lipmotion_faces.corpus.supplied import (
 )
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.trackers import MEDIAPIPE, tracker_named
+from lipmotion_faces.tracking.trackers import MEDIAPIPE, make_tracker
 
 LOG = logging.getLogger("lipmotion")
 RECIPE = "5"
@@ -153,7 +153,7 @@ def prepare(
         folder, place = discover(directory), directory
     offset_s = None if offset_ms is None else offset_ms / 1000
     folder = add_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
-    chosen = tracker_named(tracker)
+    chosen = make_tracker(tracker)
     packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with lock_folder(output):

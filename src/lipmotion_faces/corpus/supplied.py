@@ -149,8 +149,8 @@ class SeparateSound:
     @property
     def note(self) -> str:
         """What was done, for the user."""
-        found = self.how if self.how == GIVEN else f"found by the {self.how.removeprefix('the ')}"
-        return f"sound {abs(self.late_s) * 1000:.1f} ms {'late' if self.late_s >= 0 else 'early'}, {found}"
+        description = self.how if self.how == GIVEN else f"found by the {self.how.removeprefix('the ')}"
+        return f"sound {abs(self.late_s) * 1000:.1f} ms {'late' if self.late_s >= 0 else 'early'}, {description}"
 
 
 def separate_sound(recording: SourceRecording) -> SeparateSound | None:

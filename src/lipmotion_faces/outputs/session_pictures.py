@@ -15,7 +15,7 @@ from lipmotion.pipeline.session import Cache, Session
 from lipmotion.types import Prosody, frame_of
 from lipmotion_faces.base import DrawnMotion, DrawsSingly, Face, Picture
 from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, read_sound
-from lipmotion_faces.registry import staged_face
+from lipmotion_faces.registry import stage_face
 
 
 class SessionPictures:
@@ -47,15 +47,15 @@ class SessionPictures:
         edits = edits or Edits()
         staging, delivery = edits.staging(), edits.delivery()
 
-        def make_face() -> DrawsSingly:
-            found = staged_face(face, staging, shift_prosody(self._prosody, delivery))
-            if not isinstance(found, DrawsSingly):
+        def make_drawing() -> DrawsSingly:
+            drawing = stage_face(face, staging, shift_prosody(self._prosody, delivery))
+            if not isinstance(drawing, DrawsSingly):
                 raise InputError(f"the face {face!r} draws no single pictures; write a video")
-            return found
+            return drawing
 
         def draw() -> DrawnMotion[Any]:
             seen = deliver_to_face(self._session.generate(edits), delivery, fps)
-            return self._cache.cached("face", (face, staging, delivery), make_face).drawn(
+            return self._cache.cached("face", (face, staging, delivery), make_drawing).draw(
                 seen.motion, seen.units, fps=fps
             )
 

@@ -209,7 +209,20 @@ def read_transform(text: str) -> Points:
     for call in calls:
         name, _, inside = call.strip(", \t\r\n").partition("(")
         try:
-            one = _transform(name.rstrip(), read_numbers(inside, 6, name))
+            n = read_numbers(inside, 6, name)
+            name, one = name.rstrip(), np.eye(3)
+            if name == "matrix":
+                one[0, 0], one[1, 0], one[0, 1], one[1, 1], one[0, 2], one[1, 2] = n
+            elif name == "translate":
+                one[:2, 2] = n[0], n[1] if len(n) > 1 else 0
+            elif name == "scale":
+                one = np.diag([n[0], n[1] if len(n) > 1 else n[0], 1.0])
+            elif name == "rotate":
+                cos, sin = np.cos(np.radians(n[0])), np.sin(np.radians(n[0]))
+                x, y = n[1:3] if len(n) > 2 else (0.0, 0.0)
+                one = np.array([[cos, -sin, x - cos * x + sin * y], [sin, cos, y - sin * x - cos * y], [0, 0, 1]])
+            else:
+                one[{"skewX": (0, 1), "skewY": (1, 0)}[name]] = np.tan(np.radians(n[0]))
         except (ValueError, IndexError, KeyError) as error:
             raise InputError(f"the transform {shorten(call + ')')!r} cannot be read") from error
         matrix = check_matrix(matrix @ one)
@@ -220,22 +233,4 @@ def check_matrix(matrix: Points) -> Points:
     """Return a matrix of transforms. Raises InputError: it enlarges or moves beyond ``LARGEST_NUMBER``."""
     if not np.abs(matrix).max() <= LARGEST_NUMBER:
         raise InputError(f"transforms in one another enlarge beyond {LARGEST_NUMBER:g} times")
-    return matrix
-
-
-def _transform(name: str, n: list[float]) -> Points:
-    if name == "matrix":
-        a, b, c, d, e, f = n
-        return np.array([[a, c, e], [b, d, f], [0, 0, 1]])
-    if name == "translate":
-        return np.array([[1, 0, n[0]], [0, 1, n[1] if len(n) > 1 else 0], [0, 0, 1]])
-    if name == "scale":
-        return np.diag([n[0], n[1] if len(n) > 1 else n[0], 1.0])
-    if name == "rotate":
-        cos, sin = np.cos(np.radians(n[0])), np.sin(np.radians(n[0]))
-        x, y = n[1:3] if len(n) > 2 else (0.0, 0.0)
-        return np.array([[cos, -sin, x - cos * x + sin * y], [sin, cos, y - sin * x - cos * y], [0, 0, 1]])
-    skews = {"skewX": (0, 1), "skewY": (1, 0)}
-    matrix = np.eye(3)
-    matrix[skews[name]] = np.tan(np.radians(n[0]))
     return matrix

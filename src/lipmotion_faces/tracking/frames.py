@@ -139,10 +139,7 @@ def _frames(
 
 
 def _pictures_from(container: Any, stream: Any, first_s: float, damage: list[str]) -> Iterator[Any]:
-    """Yield the pictures from a time on, of the container's clock; ``damage`` lists what is damaged from there on.
-
-    If seeking ends behind that time, as without an index, all pictures before are decoded too.
-    """
+    """Yield the pictures from a time of the container's clock on; ``damage`` lists what is damaged from there on."""
     start_s = (container.start_time or 0) / 1e6
     if first_s <= start_s:
         yield from _pictures(container, stream, damage)
@@ -194,10 +191,7 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
 
 
 def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
-    """Return a picture as RGB [shape=(H, W, 3)], rotated upright, with square pixels, of at most ``longest_px``.
-
-    Raises MissingDependencyError: it is to be rotated, and OpenCV, which takes a tenth of NumPy's time, is missing.
-    """
+    """Return a picture as RGB [shape=(H, W, 3)], upright, with square pixels, at most ``longest_px``."""
     width, height = round(picture.width * pixel_shape), picture.height
     if longest_px is not None and max(width, height) > longest_px:
         scale = longest_px / max(width, height)

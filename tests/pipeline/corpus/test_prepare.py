@@ -58,7 +58,7 @@ def tracked(monkeypatch) -> list[str]:
     monkeypatch.setattr(module, "track", track)
     monkeypatch.setattr(
         module,
-        "tracker_named",
+        "make_tracker",
         lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"}),
     )
     return asked
@@ -176,7 +176,7 @@ def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "tracker_named", lambda _: SimpleNamespace(versions=missing))
+    monkeypatch.setattr(module, "make_tracker", lambda _: SimpleNamespace(versions=missing))
     with pytest.raises(MissingDependencyError):
         prepare(studio, tmp_path / "corpus")
     assert not (tmp_path / "corpus").exists()

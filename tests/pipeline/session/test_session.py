@@ -25,7 +25,7 @@ from lipmotion.types import Audio, Timeline, Unit
 from lipmotion_faces.outputs.drawn_video import sound_track
 from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import shown_face
-from lipmotion_faces.registry import staged_face
+from lipmotion_faces.registry import stage_face
 
 
 @pytest.fixture
@@ -282,7 +282,7 @@ def test_single_pictures_are_those_of_the_video(session: Session, request_: Requ
             deliver_to_face(performance.generation, Delivery(), 25.0),
             measure_prosody(sound_track(performance)),
         )
-        frames = list(staged_face("portrait", edits.staging(), prosody).render(seen.motion, seen.units, fps=25.0))
+        frames = list(stage_face("portrait", edits.staging(), prosody).render(seen.motion, seen.units, fps=25.0))
         for number in (25, 3):
             assert np.array_equal(pictures.picture(number / 25, edits), frames[number])
     with pytest.raises(InputError, match="9 s lies outside the video"):

@@ -174,6 +174,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             constraints,
             close=self.config.closures,
             reliability=experts.reliability,
+            encoded=None if model.network is None else model.network.predict_encoded(speech),
             voice=speech.voice,
         )
         return Generation(

@@ -166,7 +166,7 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
                 f"{path}: {len(vertices)} vertices, required {len(mesh.vertices)} as in {neutral[0].name}; "
                 "move other meshes to another folder"
             )
-        shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=smallest))
+        shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, smallest=smallest))
         budget.spend("displacements", len(shapes[-1].rows))
     return replace(mesh, shapes=tuple(shapes))
 

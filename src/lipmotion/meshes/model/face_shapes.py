@@ -153,8 +153,8 @@ def _choose_mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str
         }
         if len(those) >= enough:
             return list(those.items()), "visemes"
-    own = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
-    named = {number for _, numbers in own for number in numbers}
+    moving = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
+    named = {number for _, numbers in moving for number in numbers}
     others = [number for number in np.flatnonzero(strong).tolist() if mesh.shapes[number].called]
-    own += [("", [number]) for number in others if number not in named]
-    return sorted(own, key=lambda each: each[1]), "own"
+    moving += [("", [number]) for number in others if number not in named]
+    return sorted(moving, key=lambda each: each[1]), "own"

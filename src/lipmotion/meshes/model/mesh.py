@@ -91,14 +91,14 @@ class Blendshape:
 
     @classmethod
     def between(
-        cls, name: str, neutral: NDArray[np.float64], shape: NDArray[np.float64], *, least: float = 0.0
+        cls, name: str, neutral: NDArray[np.float64], shape: NDArray[np.float64], *, smallest: float = 0.0
     ) -> Blendshape:
         """Return the blendshape that moves the vertices ``neutral`` to ``shape`` [shape=(V, 3), both].
 
-        least : vertices that move no further than this, in the unit of the mesh, are left where they are
+        smallest : vertices that move no further than this, in the unit of the mesh, are left where they are
         """
         moved = shape - neutral
-        rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > least)
+        rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > smallest)
         return cls(name, rows, moved[rows])
 
 

@@ -37,9 +37,9 @@ def with_sound_inputs(
 ) -> list[Example]:
     """Return examples with what the engine's training takes from their sound (``Inputs``).
 
-    These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, and spectra in many
-    acoustic conditions (``Example.condition_spectra``). The noise of babble is made of the recordings themselves; all
-    is drawn from the number of the recording.
+    These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, the encoding of the
+    sound, and spectra in many acoustic conditions (``Example.condition_spectra``). The noise of babble is made of the
+    recordings themselves; all is drawn from the number of the recording.
     sound : of each example, by its name
     each  : applies a function to many items, perhaps in several processes
     """

@@ -10,10 +10,21 @@ from hypothesis import strategies as st
 
 from formats.cue_examples import result, spoken, timeline
 from lipmotion import CueSheet
-from lipmotion.articulation.cue_sheets import choose_cues, default_hold_frames
+from lipmotion.articulation.cue_sheets import (
+    ANY_OPEN,
+    ANY_SHAPE,
+    PHONE_SHAPES,
+    choose_cues,
+    cue_frame_count,
+    default_hold_frames,
+    frame_to_seconds,
+    lay_out_cues,
+    shapes_of_phone,
+)
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
+from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, choose_drawn_shape
 
 FRAME_RATES = [12.0, 24.0, 25.0, 30.0, 60.0]
 
@@ -207,3 +218,77 @@ def test_phones_outside_the_motion() -> None:
     sheet = choose_cues(result(units, Motion(np.full((41, 1), 0.2), 100.0, (Channel("opening"),))))
     check(sheet, 1.0, 2)
     assert sheet.cues.spans[-1].label == "A"
+
+
+BLAIR = "AI E O U FV L MBP WQ etc rest".split()
+"""The names that OpenToonz knows."""
+
+
+def test_every_phone_but_h_has_shapes() -> None:
+    assert set(PHONES) - set(PHONE_SHAPES) == {"hh"}
+    assert set(PHONE_SHAPES) <= set(PHONES)
+    assert shapes_of_phone("hh") == shapes_of_phone("a phone of another language") == ANY_OPEN
+    assert shapes_of_phone("") == ANY_SHAPE
+
+
+def test_the_parts_of_a_phone_are_the_whole() -> None:
+    for phone in PHONES:
+        assert sum(look.share for look in shapes_of_phone(phone)) == pytest.approx(1)
+        for look in shapes_of_phone(phone):
+            assert look.best
+            assert set(look.best + look.allowed) <= set(SHAPES)
+            assert not set(look.best) & set(look.allowed)
+
+
+def shown(name: str) -> set[str]:
+    return {phone for phone in PHONES if any(name in look.best for look in shapes_of_phone(phone))}
+
+
+def test_the_special_shapes_belong_to_their_sounds() -> None:
+    assert shown("A") == set(LIP_CLOSING)
+    assert shown("G") == set(VISEMES["ld"])
+    assert shown("H") == {"l", "el"}
+    assert shown("X") == {phone for phone in PHONES if is_silent(phone)}
+
+
+def test_optional_shapes_fall_back_as_rhubarb_does() -> None:
+    assert OPTIONAL == "GHX"
+    assert [choose_drawn_shape(name, "ABCDEF") for name in "ABCDEFGHX"] == list("ABCDEFACA")
+    assert [choose_drawn_shape(name, "ABCDEFX") for name in "GHX"] == ["A", "C", "X"]
+
+
+RATES = [1, 10, 12, 15, 23.976, 24, 25, 29.97, 30, 48, 50, 59.94, 60]
+
+
+def test_times_in_hundredths_lead_back_to_their_frames() -> None:
+    """Also where the time is rounded, as the Blender add-ons do."""
+    for fps in RATES:
+        times_s = [frame_to_seconds(frame, fps) for frame in range(2_000)]
+        assert [int(fps * float(f"{time_s:.2f}")) for time_s in times_s] == list(range(2_000))
+        assert fps >= 50 or [round(fps * time_s) for time_s in times_s] == list(range(2_000))
+        assert all(before < after for before, after in pairwise(times_s))
+        assert max(time_s - frame / fps for frame, time_s in enumerate(times_s)) < 0.0201
+
+
+def test_the_last_frame_begins_before_the_end() -> None:
+    for fps in RATES:
+        for duration_s in [0.0, 0.004, 0.01, 0.04, 0.0417, 0.05, 0.5, 1.0, 2.975, 3.0, 10.009, 60.0]:
+            frames = cue_frame_count(duration_s, fps)
+            sheet = lay_out_cues([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
+            assert duration_s - 0.01 < sheet.duration_s <= duration_s
+            assert frames == pytest.approx(duration_s * fps, abs=1.7)
+            assert all(cue.start_s < cue.end_s for cue in sheet.cues) or duration_s < 0.01
+
+
+def test_no_segments_are_rest() -> None:
+    for drawn, rest in (("ABCDEFX", "X"), ("ABCDEF", "A")):
+        (cue,) = lay_out_cues([], 0.0, 24, drawn).cues
+        assert (cue.start_s, cue.end_s, cue.label) == (0.0, 0.0, rest)
+
+
+def test_a_time_in_whole_hundredths_is_not_rounded_up() -> None:
+    for fps, hundredths in ((25, 4), (50, 2), (20, 5)):
+        exact = {frame: frame * hundredths / 100 for frame in range(200)}
+        kept = {frame: time_s for frame, time_s in exact.items() if int(fps * time_s) == frame}
+        assert len(kept) > 150
+        assert [frame_to_seconds(frame, fps) for frame in kept] == pytest.approx(list(kept.values()))
