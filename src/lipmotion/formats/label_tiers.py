@@ -390,14 +390,14 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
                 f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
                 f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
             )
-    label_phones: dict[int, list[str]] = defaultdict(list)
+    phones_of: dict[int, list[str]] = defaultdict(list)
     # no sound goes on beyond silence
     tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
     for phone, number in read_tokens(tokens):
-        label_phones[number].append(phone)
+        phones_of[number].append(phone)
     result: list[TimedLabel] = []
     for number, label in enumerate(labels):
-        phones = label_phones.get(number, [])
+        phones = phones_of.get(number, [])
         if phones:
             each_s = (label.end_s - label.start_s) / len(phones)
             edges_s = [label.start_s + place * each_s for place in range(len(phones))] + [label.end_s]
