@@ -27,7 +27,7 @@ from lipmotion.formats.blender import write_addon
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.prosody import measure_prosody
+from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Generation
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import head_poses

@@ -20,17 +20,15 @@ if TYPE_CHECKING:
     from lipmotion.formats.base import read_motion
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.generate.animate import animate
-    from lipmotion.pipeline.generate.explain import explain
+    from lipmotion.pipeline.generate.explain import explain, state_runs
     from lipmotion.pipeline.generate.speak import speak
-    from lipmotion.pipeline.generate.state_runs import state_runs
     from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.model import Model, load_model, save_model, with_person
     from lipmotion.pipeline.outputs.cues import cues, write_cues
     from lipmotion.pipeline.outputs.write import write
     from lipmotion.pipeline.request import Outputs, Request
     from lipmotion.pipeline.session import Session
-    from lipmotion.pipeline.training.adapt import adapt
-    from lipmotion.pipeline.training.train import Run, train
+    from lipmotion.pipeline.training.train import Run, adapt, train
     from lipmotion.types import (
         Audio,
         Constraints,
@@ -101,7 +99,7 @@ _HOMES = {
     "Request": "lipmotion.pipeline.request",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
-    "adapt": "lipmotion.pipeline.training.adapt",
+    "adapt": "lipmotion.pipeline.training.train",
     "animate": "lipmotion.pipeline.generate.animate",
     "cues": "lipmotion.pipeline.outputs.cues",
     "engine_named": "lipmotion.engines",
@@ -111,7 +109,7 @@ _HOMES = {
     "save_model": "lipmotion.pipeline.model",
     "SpokenText": "lipmotion.types",
     "speak": "lipmotion.pipeline.generate.speak",
-    "state_runs": "lipmotion.pipeline.generate.state_runs",
+    "state_runs": "lipmotion.pipeline.generate.explain",
     "train": "lipmotion.pipeline.training.train",
     "with_person": "lipmotion.pipeline.model",
     "write": "lipmotion.pipeline.outputs.write",

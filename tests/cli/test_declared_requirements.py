@@ -5,8 +5,9 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.markers import default_environment
 
-from lipmotion.cli.installation.doctor import EXTRAS, Requirement, declared_requirements, requirement
+from lipmotion.cli.doctor import EXTRAS, Requirement, declared_requirements, requirement
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
@@ -28,9 +29,8 @@ def test_requirements_are_read(text: str, expected: Requirement) -> None:
 
 
 def test_markers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.platform", "darwin")
-    monkeypatch.setattr("platform.machine", lambda: "arm64")
-    monkeypatch.setattr("platform.python_version_tuple", lambda: ("3", "9", "1"))
+    machine = {"sys_platform": "darwin", "platform_machine": "arm64", "python_version": "3.9"}
+    monkeypatch.setattr("packaging.markers.default_environment", lambda: default_environment() | machine)
     for marker, expected in (
         ("", True),
         ("python_version < '3.13'", True),

@@ -9,23 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Delivery, read_motion, write
+from lipmotion import Delivery, Model, animate, read_motion, write
 from lipmotion.articulation.contact import find_closures
+from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import shift_prosody
-from lipmotion.pipeline.request import Outputs
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift_prosody
+from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey
+from lipmotion.types.voice_event import LAUGHTER
 from lipmotion_faces import Face, Staging
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.scenes import delivered_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
+from speech.made_voices import laugh, pulses, recording, said, vowels
 
 
 @pytest.fixture(scope="module")
@@ -169,3 +171,30 @@ def test_moods_move_on_while_the_mouth_is_held(generation: Generation) -> None:
     found = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
     assert "mood_sad" not in found.stepped
     assert len(np.unique(found.motion["mood_sad"])) > 6
+
+
+@pytest.fixture(scope="module")
+def request_with_laughter() -> Request:
+    audio = recording((0.5, vowels(pulses(1.0, 120))), (2.0, laugh(6)))
+    return Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
+
+
+def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with_laughter: Request):
+    laughing = animate(request_with_laughter, model=toy_model)
+    (event,) = laughing.events
+    assert event.kind == LAUGHTER
+    opening = laughing.motion["opening"]
+    loudest_s = max(event.calls, key=lambda call: call[1])[0]
+    assert opening[round(loudest_s * 100)] == pytest.approx(LAUGH_GAP, rel=0.1)
+    happy = deliver(laughing, Delivery()).motion["mood_happy"]
+    assert happy[round(loudest_s * 100)] > 0.7
+    assert not happy[:150].any()
+    assert "mood_happy" not in deliver(laughing, Delivery(mood="neutral")).motion.names
+
+
+def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(toy_model: Model, request_with_laughter: Request):
+    plain = animate(replace(request_with_laughter, manner="asked"), model=toy_model)
+    laughing = animate(request_with_laughter, model=toy_model)
+    assert not plain.events
+    assert plain.motion["opening"][200:].max() < 0.05
+    assert np.array_equal(plain.motion.values[50:150], laughing.motion.values[50:150])

@@ -105,12 +105,7 @@ def generate_motion(
 
 
 def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
-    """Return the map of one speaker of a model; None for the mean person, or the only one.
-
-    maps    : of the model (None: it was not trained on several people)
-    speaker : their name; empty: the mean person
-    Raises InputError: the model knows no such speaker.
-    """
+    """Return the map of a speaker; None: of the mean person (no name), or the only one. Raises InputError: unknown."""
     if not speaker:
         return None
     if maps is None:
@@ -210,10 +205,7 @@ def _generate_one(
 
 
 def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech: Speech) -> Explanation:
-    """Return an explanation of the mean person's motion with all channels in one person's units.
-
-    person : from ``speaker_map``
-    """
+    """Return an explanation of the mean person's motion with all channels in one person's units."""
     if person is None:
         return explanation
     frames, frame = len(speech.features.values), slice(explanation.frame, explanation.frame + 1)

@@ -101,7 +101,6 @@ def save_model(model: Model, path: str | Path) -> None:
 
 
 def _engine_header(model: Model) -> dict[str, Any]:
-    """Return the part of a header that says which engine a model has, and the information for users."""
     return {"engine": model.engine.name, "configuration": model.engine.config.as_mapping(), **model.about}
 
 

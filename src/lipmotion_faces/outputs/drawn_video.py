@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import measure_prosody
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_prosody
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports

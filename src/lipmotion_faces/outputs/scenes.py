@@ -26,8 +26,7 @@ from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
 from lipmotion.pipeline.outputs.curve_sets import edit_weights, known_names
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import measure_recorded_prosody
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT

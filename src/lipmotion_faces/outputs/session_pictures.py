@@ -10,7 +10,7 @@ from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
-from lipmotion.pipeline.outputs.prosody import measure_prosody, shift_prosody
+from lipmotion.pipeline.outputs.output import measure_prosody, shift_prosody
 from lipmotion.pipeline.session import Cache, Session
 from lipmotion.types import Prosody, frame_of
 from lipmotion_faces.base import DrawnMotion, DrawsSingly, Face, Picture

@@ -12,8 +12,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
-from lipmotion.pipeline.outputs.prosody import measure_prosody, shift_prosody
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace, measure_prosody, shift_prosody
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
 from lipmotion.types.moods import MOODS

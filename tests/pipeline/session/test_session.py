@@ -18,8 +18,7 @@ from lipmotion.pipeline.edit_files import EditFile
 from lipmotion.pipeline.generation import generate_motion
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import measure_prosody
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
 from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Timeline, Unit

@@ -24,7 +24,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.adapt`` and ``lipmotion.save_model``; print how much speech was used."""
     from lipmotion.pipeline.model import save_model
-    from lipmotion.pipeline.training.adapt import adapt
+    from lipmotion.pipeline.training.train import adapt
     from lipmotion.storage.files import check_target
 
     check_target(options.output)

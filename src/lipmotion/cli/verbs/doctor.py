@@ -17,7 +17,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print what is found, one line for each part. Raises LipMotionError, of exit code 1: something is broken."""
-    from lipmotion.cli.installation.doctor import doctor
+    from lipmotion.cli.doctor import doctor
     from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.errors import LipMotionError
     from lipmotion.types.progress import Item

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input
@@ -30,8 +31,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.explain`` and print the explanations; without a time, ``lipmotion.state_runs`` and the runs."""
     from lipmotion.pipeline.analysis.read_request import read_request
-    from lipmotion.pipeline.generate.explain import explain, explanation_document, explanation_text
-    from lipmotion.pipeline.generate.state_runs import run_document, run_lines, state_runs
+    from lipmotion.pipeline.generate.explain import (
+        explain,
+        explanation_document,
+        explanation_text,
+        run_lines,
+        state_runs,
+    )
     from lipmotion.pipeline.model import load_model
 
     asked = part_of(options, Request())
@@ -41,7 +47,7 @@ def run(options: argparse.Namespace) -> None:
         documents, text = map(explanation_document, explanations), "\n\n".join(map(explanation_text, explanations))
     else:
         runs = state_runs(request, model=model)
-        documents, text = map(run_document, runs), "\n".join(run_lines(runs, options.count))
+        documents, text = map(asdict, runs), "\n".join(run_lines(runs, options.count))
     if not options.json:
         print_lines(text)
         return

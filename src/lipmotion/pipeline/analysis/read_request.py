@@ -93,7 +93,6 @@ def read_text_or_file(argument: str, tier: str = "", speaker: str = "") -> str |
     """Return the content of the file that the argument names, else the argument itself.
 
     tier, speaker : of a file of labels, which tier and whose words
-
     Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
@@ -110,7 +109,6 @@ def read_text_or_file(argument: str, tier: str = "", speaker: str = "") -> str |
 
 
 def _read_words(words: Path | str, tier: str, speaker: str) -> str | TimedTranscript:
-    """Return the words of a file, or of a text that may be subtitles."""
     from lipmotion.formats.label_files import read_transcript
 
     if isinstance(words, Path):

@@ -248,10 +248,7 @@ def _correct(
     recognised: Timeline[Unit],
     lexicon: Lexicon,
 ) -> Timeline[Unit]:
-    """Return the words of a transcript that are said, and what is recognised beside them, aligned.
-
-    Raises AlignmentError: as ``transcribe``.
-    """
+    """Return the words of a transcript that are said, and what is recognised beside them, aligned."""
     labels: list[tuple[str, float | None]] = []
     variants: dict[str, tuple[Pronunciation, ...]] = {}
     for number, word in enumerate((*evidence.words, None)):

@@ -1,18 +1,21 @@
-"""What determined frames of motion: ``explain(speech, at=…) → explanations``, as text, JSON, pictures of posteriors."""
+"""What determined frames of motion: ``explain(speech, at=…)``, ``state_runs(speech)``; their text and JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
+
+import numpy as np
 
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generation import map_explanation
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechInput, as_request
@@ -29,6 +32,8 @@ from lipmotion.types import (
     frame_of,
 )
 
+LONGEST_STATE_CHARACTERS = 110
+"""Most characters of a state in a line of text."""
 LINE = 110
 """Width of the text of a row, without its name, in characters."""
 SHOWN_CHANNELS = 6
@@ -184,3 +189,69 @@ def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[
             f"was trained with --engine {' or '.join(having)}"
         )
     return session.generate(edits), engine.posteriors(learned, session.analyse(edits).speech)
+
+
+@dataclass(frozen=True)
+class StateRun:
+    """Consecutive frames of generated motion behind which stands one state of the model.
+
+    start_s, end_s : seconds; the frames are centred at times from ``start_s`` (included) to ``end_s`` (excluded)
+    phone, word    : which take most of the run; empty: none, or not known
+    state          : as in ``Generation.trace``; of the engine ``selection`` it names a recording and the times in it
+    """
+
+    start_s: float
+    end_s: float
+    phone: str
+    word: str
+    state: str
+
+
+def state_runs(
+    speech: SpeechInput, *, model: Model | str | Path | None = None, transcript: str | Path | None = None
+) -> tuple[StateRun, ...]:
+    """Return which state of the model stands behind every frame of the motion that ``animate`` generates.
+
+    speech, model, transcript : as of ``animate``
+    Returns the runs of frames with one state, in order and without gaps.
+    Raises InputError, AlignmentError: as ``animate``.
+
+    >>> import lipmotion
+    >>> runs = lipmotion.state_runs("examples/welcome.flac")
+    >>> runs[0].start_s, runs[0].state, runs[0].end_s == runs[1].start_s
+    (0.0, 'rest', True)
+    """
+    return runs_of(animate(speech, model=model, transcript=transcript))
+
+
+def runs_of(generation: Generation) -> tuple[StateRun, ...]:
+    """Return the runs of frames with one state of generated motion."""
+    frames, rate_hz = generation.trace.frames, generation.motion.rate_hz
+    firsts = [0, *(np.flatnonzero(np.diff(frames)) + 1).tolist()] if len(frames) else []
+    times_s = [first / rate_hz for first in (*firsts, len(frames))]
+    spans, number = generation.units.spans, 0
+    runs = []
+    for first, start_s, end_s in zip(firsts, times_s, times_s[1:], strict=False):
+        while number < len(spans) and spans[number].end_s <= start_s:
+            number += 1
+        longest_s, phone, word = 0.0, "", ""
+        for span in spans[number:]:
+            if span.start_s >= end_s:
+                break
+            shared_s = min(span.end_s, end_s) - max(span.start_s, start_s)
+            if shared_s > longest_s:
+                longest_s, phone, word = shared_s, span.label.phone, span.label.word
+        runs.append(StateRun(start_s, end_s, phone, word, generation.trace.states[frames[first]]))
+    return tuple(runs)
+
+
+def run_lines(runs: Sequence[StateRun], count: int) -> Iterator[str]:
+    """Yield runs as lines of text for people to read, the first ``count`` of them, with a title."""
+    shown = runs[: max(count, 0)]
+    width = max([len("word"), *(len(printable(run.word)) for run in shown)])
+    yield f"{'from':>8} {'to':>8}  phone  {'word':{width}}  state"
+    for run in shown:
+        state = run.state[:LONGEST_STATE_CHARACTERS] + "..." * (len(run.state) > LONGEST_STATE_CHARACTERS)
+        yield f"{run.start_s:8.2f} {run.end_s:8.2f}  {run.phone:5}  {run.word:{width}}  {state}"
+    if len(runs) > len(shown):
+        yield f"and {len(runs) - len(shown)} more (--count N prints N, --json all)"

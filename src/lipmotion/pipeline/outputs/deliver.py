@@ -33,7 +33,7 @@ FACTORS: Final = {PLAIN: 1.0, "whisper": 0.85, "shout": 1.5, "mumble": 0.5}
 """How large the movements of the mouth are in each manner, beside those of plain speech."""
 
 LAUGHING: Final = "happy"
-"""The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.pauses`` opens the jaw."""
+"""The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.rest`` opens the jaw."""
 
 
 def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:

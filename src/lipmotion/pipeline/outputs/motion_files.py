@@ -34,8 +34,7 @@ from lipmotion.pipeline.outputs.curve_sets import (
     with_curves,
 )
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import measure_recorded_prosody
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import as_text, sound_reference
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 from lipmotion.types.motion import RADIAN

@@ -1,4 +1,4 @@
-"""Training: ``train(corpus) → model``."""
+"""Training: ``train(corpus) → model``; adaptation to a speaker without transcripts: ``adapt(model, recordings)``."""
 
 from __future__ import annotations
 
@@ -41,8 +41,10 @@ from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
 from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
@@ -325,3 +327,28 @@ def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: st
         "attribution": sorted({source["attribution"] for source in sources if "attribution" in source}),
         "versions": {"lipmotion": installed_version()} | {name: metadata.version(name) for name in ("numpy", "scipy")},
     }
+
+
+@one_thread()
+def adapt(model: Model | str | Path | None, recordings: Sequence[str | Path | Audio]) -> Model:
+    """Return a model whose phone models are adapted to one speaker, for recognition and alignment.
+
+    model      : from ``load_model``, or the path of a model file; None: the shipped model. The new adaptation replaces
+                 an earlier one
+    recordings : of this speaker alone: audio or video files, or samples at 16 kHz; transcripts are not needed
+    Raises InputError: no recording, one that cannot be read, or too little speech in them.
+    Raises MissingDependencyError: pocketsphinx is not installed.
+    Source: Gales 1998, constrained maximum-likelihood linear regression (``speech.recognition.adaptation_estimation``).
+
+    >>> import lipmotion
+    >>> adapted = lipmotion.adapt(None, ["examples/welcome.flac"])
+    >>> adapted.about["adapted"]["recordings"], adapted.about["adapted"]["speech_s"] > 4
+    (1, True)
+    """
+    if isinstance(recordings, str | Path | Audio) or not len(recordings):
+        raise InputError("recordings are not a list, or it is empty; required: one or more recordings of the speaker")
+    chosen = model if isinstance(model, Model) else load_model(model)
+    sounds = [recording if isinstance(recording, Audio) else read_audio(Path(recording)) for recording in recordings]
+    estimated = estimate_adaptation(chosen.phones, sounds)
+    about = {**chosen.about, "adapted": {"recordings": len(recordings), "speech_s": round(estimated.speech_s, 1)}}
+    return replace(chosen, about=about, adaptation=estimated.adaptation)
