@@ -27,7 +27,7 @@ from lipmotion.formats.blender import write_addon
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.outputs.prosody import measure_prosody
 from lipmotion.types import Generation
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import head_poses
@@ -50,7 +50,7 @@ def main() -> None:
         sound = folder / "welcome.flac"
         sound.write_bytes((EXAMPLES / sound.name).read_bytes())
         result = lipmotion.animate(sound, transcript=EXAMPLES / "welcome.txt")
-        prosody = prosody_of_speech(sound)
+        prosody = measure_prosody(sound)
         print(json.dumps(fit(result)), flush=True)
         makers = {"head": lambda: head_scene(result, prosody=prosody)}
         for path in options.characters:
@@ -144,7 +144,7 @@ def largest_error(scene: Scene, times_s: np.ndarray, values: list[dict[str, floa
 
 def keyed(folder: Path, result: Generation, sound: Path) -> None:
     """Print how far the keys that the add-on and the script make are from the motion, at all frames."""
-    curves, names = with_curves(result, "face", prosody=prosody_of_speech(sound))
+    curves, names = with_curves(result, "face", prosody=measure_prosody(sound))
     lipmotion.write(curves, [folder / "face.json", folder / "face.blender.py"], speech=sound, channels=names)
     lipmotion.write(curves, folder / "face.livelink.csv", speech=sound, rate_hz=100.0)
     write_addon("blender", folder / "addon.zip")

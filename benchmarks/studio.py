@@ -43,7 +43,7 @@ from lipmotion.formats.sound import write_sound  # noqa: E402
 from lipmotion.kernels.compiler import numba_works  # noqa: E402
 from lipmotion.meshes.fitting.driven import load_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
-from lipmotion.pipeline.edits import step_of  # noqa: E402
+from lipmotion.pipeline.edits import parse_step  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
 from lipmotion.pipeline.request import Request  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
@@ -52,7 +52,7 @@ from lipmotion.testing.toy import toy_sentences  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
 from lipmotion_faces.mesh import MeshFace  # noqa: E402
 from lipmotion_faces.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
-from lipmotion_faces.registry import face_named  # noqa: E402
+from lipmotion_faces.registry import make_face  # noqa: E402
 from lipmotion_studio.folder import open_folder  # noqa: E402
 from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
@@ -115,7 +115,7 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     found["a character of one's own, 45 frames of it, s"] = round(
         timed(lambda: line.weights(own, slice(200, 245))) / 1000, 2
     )
-    found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, face_named("woman"))) / 1000, 2)}
+    found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, make_face("woman"))) / 1000, 2)}
     chance, parts = Random(3), []  # noqa: S311
     while len(parts) < (EDITS if seconds <= RECOGNISED_S else FEW_EDITS):
         phones = line.state()["phones"]
@@ -265,7 +265,7 @@ def edit_for_ever(line: OpenRecording, chance: Random, writing: int) -> NoReturn
                 line.undo(line.revision, len(steps))
             else:
                 step = random_edit(chance, line.state())
-                tell(tried=[*steps, str(step_of(step))])
+                tell(tried=[*steps, str(parse_step(step))])
                 line.edit(line.revision, (step,))
             tell(done=list(line.file.edits.sentences))
 

@@ -44,10 +44,10 @@ import lipmotion
 from lipmotion.corpora.layouts import spell_name
 from lipmotion.errors import AlignmentError
 from lipmotion.formats.label_files import read_transcript
+from lipmotion.pipeline.analysis.speech_analysis import analyse_speech
+from lipmotion.pipeline.analysis.transcribe import transcribe
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.prompts import prompts
-from lipmotion.pipeline.understand.transcribe import transcribe
-from lipmotion.pipeline.understand.understood_speech import understood_speech
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, transcript_fit
 from lipmotion.speech.recognition.network.posteriors import (
@@ -262,7 +262,7 @@ def _print_hints(corpora: Path, every: int) -> None:
             audio, wanted = analysed(Audio(recordings[number][0], RATE_HZ)), Timeline[Unit](())
             for kind, words in _hints(recordings, number).items():
                 warnings.clear()
-                units = understood_speech(model, Request(audio, transcript=" ".join(words) or None)).speech.units
+                units = analyse_speech(model, Request(audio, transcript=" ".join(words) or None)).speech.units
                 wanted = units if kind == "right" else wanted
                 said, found = ([s.label.phone for s in u if not is_silent(s.label.phone)] for u in (wanted, units))
                 sums.setdefault(kind, Counter()).update(

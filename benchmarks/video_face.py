@@ -59,12 +59,11 @@ from video_ways import (
 
 from lipmotion import Corpus, animate, load_model
 from lipmotion.errors import InputError
-from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closed_threshold, phone_closures
-from lipmotion.measures.curves import pooled_correlation
+from lipmotion.measures.curves import bootstrap_interval, pooled_correlation
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.training.train import phones_of
+from lipmotion.pipeline.training.train import label_phones
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Audio, Motion, Track
@@ -318,7 +317,7 @@ def sheets_of(clip: RecordedClip, frames: Pictures, count: int, badness: dict[st
 def phones(corpus: Corpus, names: Sequence[str], model: Model) -> list[list[tuple[float, float, str]]]:
     """Return start and end in seconds of every spoken phone, clip by clip, by forced alignment."""
     recogniser = cached_recogniser(model.phones, "auto", model.adaptation)
-    found = [phones_of(corpus.utterance(name), recogniser, Lexicon()) for name in names]
+    found = [label_phones(corpus.utterance(name), recogniser, Lexicon()) for name in names]
     return [[(s.start_s, s.end_s, s.label.phone) for s in units if not is_silent(s.label.phone)] for units in found]
 
 

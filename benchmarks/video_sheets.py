@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 
 Pictures = NDArray[np.uint8]
 Pair = tuple[Pictures, Pictures]
@@ -142,7 +142,7 @@ def save_judged(path: Path, judged: dict[str, Judged]) -> None:
         arrays |= {f"{number}/curves/{name}": values for name, values in each.curves.items()}
         arrays |= {f"{number}/spaced/{frame}": np.stack(pair) for frame, pair in each.sheets.spaced.items()}
         arrays |= {f"{number}/worst/{name}": np.stack(pair) for name, (_, _, pair) in each.sheets.worst.items()}
-    with whole_file(path) as temporary, temporary.open("wb") as file:
+    with atomic_file(path) as temporary, temporary.open("wb") as file:
         np.savez(file, header=np.array(json.dumps(header)), **arrays)
 
 

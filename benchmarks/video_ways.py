@@ -27,7 +27,7 @@ from lipmotion_faces.film.background import open_background, steady_face
 from lipmotion_faces.film.filmed_video import FILM, make_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
-from lipmotion_faces.registry import face_named
+from lipmotion_faces.registry import make_face
 from lipmotion_faces.tracking.footage import footage_frames, track_footage
 from lipmotion_faces.tracking.head_pose import region_to_image
 from lipmotion_faces.tracking.trackers import LIP_POINTS
@@ -263,7 +263,7 @@ def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
 
     def drawn(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
         assert motion is not None
-        return face_named("portrait").render(motion, Timeline(()), fps=clip.rate_hz)
+        return make_face("portrait").render(motion, Timeline(()), fps=clip.rate_hz)
 
     region = rectangle()
     ways = [

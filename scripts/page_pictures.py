@@ -13,8 +13,8 @@ from matplotlib import pyplot as plt
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion_faces import Staging, staged_face
+from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion_faces import Staging, stage_face
 
 IMAGES = Path(__file__).parent.parent / "docs" / "images"
 SENTENCE = "Five big boats follow you far up the little river. My father will call."
@@ -38,7 +38,7 @@ def main() -> None:
 def drawn(face: str, spoken: lipmotion.Generation, size: int) -> list[Frame]:
     """Return the frames of a face of which only the mouth moves."""
     still = dict.fromkeys(("blinks", "gaze", "brows", "head"), False)
-    return list(staged_face(face, Staging(size=size, **still)).render(spoken.motion, spoken.units, fps=FPS))
+    return list(stage_face(face, Staging(size=size, **still)).render(spoken.motion, spoken.units, fps=FPS))
 
 
 def mouth(frame: Frame) -> Frame:
@@ -85,7 +85,7 @@ def strip(sheet: lipmotion.CueSheet, mouths: dict[str, Frame]) -> None:
 
 def curves(spoken: lipmotion.Generation, frames: list[Frame]) -> None:
     """Plot blendshape weights below the head that shows the same motion."""
-    weights = curves_of(spoken.motion, spoken.units, "arkit")
+    weights = make_curves(spoken.motion, spoken.units, "arkit")
     from_s, to_s, shown = 0.3, 2.7, 8
     figure, (above, below) = plt.subplots(2, 1, figsize=(12, 4), dpi=100, height_ratios=(1, 1.2))
     times = from_s + (np.arange(shown) + 0.5) * (to_s - from_s) / shown

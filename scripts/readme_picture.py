@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 import lipmotion
-from lipmotion_faces import Staging, staged_face
+from lipmotion_faces import Staging, stage_face
 
 ROOT = Path(__file__).parent.parent
 FPS = 25.0
@@ -26,7 +26,7 @@ def main() -> None:
     mpl.use("agg")
     speech = ROOT / "examples" / "welcome.flac"
     result = lipmotion.animate(speech, transcript=(ROOT / "examples" / "welcome.txt").read_text())
-    frames = list(staged_face("head", Staging(size=720)).render(result.motion, result.units, fps=FPS))
+    frames = list(stage_face("head", Staging(size=720)).render(result.motion, result.units, fps=FPS))
     figure = plt.figure(figsize=(12, 4.2), dpi=110)
     grid = figure.add_gridspec(2, COLUMNS + 4, height_ratios=(1, 1.7), hspace=0, wspace=0.05)
     portrait = figure.add_subplot(grid[:, :4])

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from lipmotion.cli.terminal.status import outcome
-from lipmotion.corpora.discover import READERS
+from lipmotion.corpora.folder import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry, install_command
 from lipmotion.formats.base import MOTION_FORMATS, MotionFormat, check_motion
 from lipmotion.testing.examples import example
-from lipmotion_faces import FACES, Face, face_named
+from lipmotion_faces import FACES, Face, make_face
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_what_is_of_another_kind_is_refused(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(InputError, match="required a class of Engine"):
         engine_named("wrong")
     with pytest.raises(InputError, match="required a class of Face"):
-        face_named("wrong")
+        make_face("wrong")
     with pytest.raises(ExportError, match=r"cannot write motion as '\.wrong'"):
         check_motion(tmp_path / "a.wrong", example(("aa",)).motion)
 

@@ -135,9 +135,9 @@ def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     if name in _ADDED:
-        from lipmotion.extensions import provided
+        from lipmotion.extensions import load_provided
 
-        value = provided(name)
+        value = load_provided(name)
     else:
         value = getattr(import_module(_HOMES.get(present, "lipmotion.types")), present)
     globals()[name] = value

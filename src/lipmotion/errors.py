@@ -10,7 +10,7 @@ SHOWN_CHARACTERS = 80
 """Largest number of characters of a text from a user that a message repeats."""
 
 
-def shortened(text: str) -> str:
+def shorten(text: str) -> str:
     """Return a text, or its first ``SHOWN_CHARACTERS`` characters and ``...``, for a message."""
     return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 

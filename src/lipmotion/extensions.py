@@ -124,7 +124,7 @@ class Registry(Generic[ExtensionT]):
         return {entry.name: entry for entry in _entries(self.group)}
 
 
-def provided(name: str) -> Any:
+def load_provided(name: str) -> Any:
     """Return what a package beside the core (faces, studio, lab) provides by a name, as ``shown_face``.
 
     They declare such names as entry points of the group ``lipmotion.names``; the core imports none of them itself.
@@ -136,7 +136,7 @@ def provided(name: str) -> Any:
 NAMES: Registry[Any] = Registry("name", "lipmotion.names", {})
 
 
-def failed_extension(error: BaseException) -> str | None:
+def describe_failed_extension(error: BaseException) -> str | None:
     """Return a message for an error that came out of the code of an extension; None: it did not.
 
     An extension is recognised by the first part of its module's name.

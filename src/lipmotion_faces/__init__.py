@@ -8,9 +8,9 @@ if TYPE_CHECKING:
     from typing import Any
 
     from lipmotion_faces.base import Face, Stageable, Staging
-    from lipmotion_faces.registry import FACES, face_named, staged_face
+    from lipmotion_faces.registry import FACES, make_face, stage_face
 
-__all__ = ["FACES", "Face", "Stageable", "Staging", "face_named", "staged_face"]
+__all__ = ["FACES", "Face", "Stageable", "Staging", "make_face", "stage_face"]
 
 
 def __getattr__(name: str) -> "Any":

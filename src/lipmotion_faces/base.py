@@ -89,7 +89,7 @@ class DrawnMotion(Generic[PoseT]):
 class DrawsSingly(Protocol):
     """A face that can draw single pictures; a face has this ability if it has the method."""
 
-    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[Any]:
+    def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[Any]:
         """Return the pictures of ``Face.render``, each of which can be drawn alone. Raises as ``render``.
 
         A face that is asked again, for other motion, does not paint again what does not move.
@@ -100,7 +100,7 @@ class DrawsSingly(Protocol):
 class Stageable(Protocol):
     """A face that can be staged; a face has this ability if it has the method."""
 
-    def staged(self, staging: Staging, prosody: Prosody | None = None) -> Face:
+    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> Face:
         """Return the same face with other settings.
 
         prosody : of the speech that will be rendered, for movements of brows and head; None: not known
@@ -120,3 +120,12 @@ class DrawsPlanes(Protocol):
         Of each frame the brightness (Y) comes first [shape=(H, W)], then the colours U and V [shape=(H / 2, W / 2)]:
         ITU-R BT.601, limited range. H and W are even.
         """
+
+
+def rotate_head(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]:
+    """Return the rotation to the character's left, upwards and to the left shoulder, in radians [shape=(3, 3)]."""
+    (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch, roll))
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]])
+    about_z = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]])
+    return np.asarray(about_y @ about_x @ about_z)

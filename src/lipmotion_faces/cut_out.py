@@ -24,7 +24,7 @@ Picture = NDArray[np.uint8]
 SUFFIXES = (".png", ".webp", ".jpg", ".jpeg")
 BASE = "base"
 REQUIRED = "".join(name for name, shape in SHAPES.items() if not shape.fallback)
-LARGEST_PX, MOST_PIXELS = 4096, 1 << 26
+LARGEST_PX, MAX_PIXELS = 4096, 1 << 26
 """Largest side of a picture, and most pixels of all together."""
 LARGEST_BYTES = 1 << 26
 MOST_FILES = 1000
@@ -51,16 +51,15 @@ class CutOut:
 
         staging : size (0: that of the drawings) and background (``scene``: white) count
         """
-        staged = {name: _staged(picture, staging) for name, picture in self.pictures.items()}
+        staged = {name: _stage(picture, staging) for name, picture in self.pictures.items()}
         for shape in shapes:
             yield staged[shape]
 
 
 def picture_files(folder: Path) -> list[Path]:
     """Return the pictures in a folder, by their names, in order; at most ``MOST_FILES``."""
-    return [path for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES and path.is_file()][
-        :MOST_FILES
-    ]
+    files = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES and path.is_file()]
+    return files[:MOST_FILES]
 
 
 def read_cut_out(folder: Path) -> CutOut:
@@ -69,9 +68,9 @@ def read_cut_out(folder: Path) -> CutOut:
     Raises InputError: a shape from A to F is missing or drawn twice, a picture cannot be read, or their sizes differ.
     """
     files = picture_files(folder)
-    named = {path: found[1].lower() for path in files if (found := _NAME.search(path.stem))}
+    named = {path: match[1].lower() for path in files if (match := _NAME.search(path.stem))}
     readings = (_shapes(named, names) for names in (LETTERS, BLAIR))
-    chosen = max(readings, key=lambda found: len(found.keys() & set(REQUIRED)))
+    chosen = max(readings, key=lambda reading: len(reading.keys() & set(REQUIRED)))
     missing = [name for name in REQUIRED if name not in chosen]
     if missing:
         names = " ".join(f"{name}.png" for name in missing)
@@ -83,56 +82,43 @@ def read_cut_out(folder: Path) -> CutOut:
         picture = _read(chosen[name])
         first = next(iter(pictures.values()), picture if below is None else below)
         if picture.shape != first.shape:
-            sizes = " and ".join(f"{each.shape[1]} × {each.shape[0]}" for each in (first, picture))
-            raise InputError(
-                f"{chosen[name]}: the pictures are {sizes} pixels large, required one size; export them alike"
-            )
-        if (len(pictures) + 1) * picture.shape[0] * picture.shape[1] > MOST_PIXELS:
-            raise InputError(
-                f"{folder}: the pictures have more than {MOST_PIXELS} pixels together; export them smaller"
-            )
+            sizes = " and ".join(f"{each.shape[1]} × {each.shape[0]}" for each in (first, picture)) + " pixels large"
+            raise InputError(f"{chosen[name]}: the pictures are {sizes}, required one size; export them alike")
+        if (len(pictures) + 1) * picture.shape[0] * picture.shape[1] > MAX_PIXELS:
+            raise InputError(f"{folder}: the pictures have more than {MAX_PIXELS} pixels together; export them smaller")
         pictures[name] = picture if below is None else _over(picture, below)
     return CutOut(pictures)
 
 
 def _shapes(named: Mapping[Path, str], names: Mapping[str, str]) -> dict[str, Path]:
     """Return the pictures by the letters of their shapes. Raises InputError: two of one shape."""
-    found: dict[str, Path] = {}
+    shapes: dict[str, Path] = {}
     for path, name in named.items():
         shape = names.get(name)
-        if shape is None or (name == "wq" and shape in found):
+        if shape is None or (name == "wq" and shape in shapes):
             continue
-        if shape in found and named[found[shape]] != "wq":
-            raise InputError(
-                f"{path}: a second picture of the mouth shape {shape}, beside {found[shape].name}; keep one"
-            )
-        found[shape] = path
-    return found
+        if shape in shapes and named[shapes[shape]] != "wq":
+            other = shapes[shape].name
+            raise InputError(f"{path}: a second picture of the mouth shape {shape}, beside {other}; keep one")
+        shapes[shape] = path
+    return shapes
 
 
 def _read(path: Path) -> Picture:
     """Return a picture [shape=(H, W, 4)]. Raises InputError: it is none, or too large."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         if path.stat().st_size > LARGEST_BYTES:
-            raise InputError(
-                f"{path}: {path.stat().st_size} bytes, required at most {LARGEST_BYTES}; export it smaller"
-            )
+            size = path.stat().st_size
+            raise InputError(f"{path}: {size} bytes, required at most {LARGEST_BYTES}; export it smaller")
         with Image.open(io.BytesIO(path.read_bytes()), formats=("PNG", "WEBP", "JPEG")) as picture:
             if max(picture.size) > LARGEST_PX:
                 raise InputError(f"{path}: {picture.width} × {picture.height} pixels, required at most {LARGEST_PX}")
             return np.array(picture.convert("RGBA"))
     except InputError:
         raise
-    except (
-        OSError,
-        UnidentifiedImageError,
-        ValueError,
-        SyntaxError,
-        MemoryError,
-        Image.DecompressionBombError,
-    ) as error:
+    except (OSError, ValueError, SyntaxError, MemoryError, Image.DecompressionBombError) as error:
         raise InputError(f"{path}: no picture that can be read ({error}); export it as PNG") from error
 
 
@@ -146,7 +132,7 @@ def _over(upper: Picture, lower: Picture) -> Picture:
     return np.rint(np.concatenate([mixed, 255 * alpha], axis=-1)).astype(np.uint8)
 
 
-def _staged(picture: Picture, staging: Staging) -> Picture:
+def _stage(picture: Picture, staging: Staging) -> Picture:
     """Return a picture in the size and on the background of a staging."""
     from PIL import Image
 

@@ -23,7 +23,7 @@ FACES: Registry[type[Face]] = Registry(
 )
 
 
-def face_named(name: str = "portrait") -> Face:
+def make_face(name: str = "portrait") -> Face:
     """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md).
 
     Raises InputError: none of that name, a drawing that cannot be used, or what an installed package adds is no face.
@@ -43,16 +43,16 @@ def is_drawings(face: str | Path, folder: Path = Path()) -> bool:
     return str(face) not in FACES.names and (folder / face).is_dir()
 
 
-def staged_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
+def stage_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
     """Return a face, or the one of a name, with settings.
 
     prosody : of the speech that will be rendered; None: not known
-    Raises InputError: as ``face_named``, or the face cannot be staged and settings differ from the defaults.
+    Raises InputError: as ``make_face``, or the face cannot be staged and settings differ from the defaults.
     """
     if isinstance(face, str):
-        face = face_named(face)
+        face = make_face(face)
     if isinstance(face, Stageable):
-        return face.staged(staging, prosody)
+        return face.with_staging(staging, prosody)
     if staging != Staging():
         kind = type(face).__name__
         raise InputError(f"the face {kind!r} has no settings, as size and background; leave them out")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import make_folder, whole_file
+from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.testing.contract import require, require_error
 from lipmotion.testing.examples import example
 from lipmotion.testing.toy import CAMERA_HZ, MOTION_HZ, toy_motion, toy_sentences
@@ -29,8 +29,8 @@ def check_face(face: Face) -> None:
 
     Raises ContractError: what was found.
 
-    >>> from lipmotion_faces import face_named
-    >>> check_face(face_named("portrait"))
+    >>> from lipmotion_faces import make_face
+    >>> check_face(make_face("portrait"))
     """
     one = example(("m", "aa"))
     motion, units = one.motion, one.speech.units
@@ -50,21 +50,16 @@ def check_face(face: Face) -> None:
     require_error(InputError, lambda: list(face.render(broken, units, fps=10.0)), "values that are not finite")
     require_error(InputError, lambda: list(face.render(motion, units, fps=0.0)), "fps of 0")
     if isinstance(face, Stageable):
-        _check_staged(face)
 
+        def first(**settings: Any) -> NDArray[np.uint8]:
+            return next(iter(face.with_staging(Staging(**settings)).render(one.motion, one.speech.units, fps=10.0)))
 
-def _check_staged(face: Stageable) -> None:
-    one = example(("m", "aa"))
-
-    def first(**settings: Any) -> NDArray[np.uint8]:
-        return next(iter(face.staged(Staging(**settings)).render(one.motion, one.speech.units, fps=10.0)))
-
-    small = first(size=64)
-    require(small.shape[0] == 64, f"a picture {small.shape[0]} pixels high, required the 64 that were asked for")
-    clear = first(size=64, background=TRANSPARENT)
-    require(clear.shape == (*small.shape[:2], 4), f"transparent frames of shape {clear.shape}, required RGBA")
-    require(bool(np.any(clear[..., 3] == 0)), "no pixel is transparent")
-    require(isinstance(face.staged(Staging()), Face), "a staged face is no face")
+        small = first(size=64)
+        require(small.shape[0] == 64, f"a picture {small.shape[0]} pixels high, required the 64 that were asked for")
+        clear = first(size=64, background=TRANSPARENT)
+        require(clear.shape == (*small.shape[:2], 4), f"transparent frames of shape {clear.shape}, required RGBA")
+        require(bool(np.any(clear[..., 3] == 0)), "no pixel is transparent")
+        require(isinstance(face.with_staging(Staging()), Face), "a staged face is no face")
 
 
 def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0, fps: float = CAMERA_HZ) -> list[Path]:
@@ -89,5 +84,5 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
 
 
 def _write_lines(path: Path, lines: list[str]) -> None:
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

@@ -9,7 +9,6 @@ from pathlib import Path
 from zipfile import is_zipfile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
@@ -17,21 +16,22 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import resample_track
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.motion.transfer_map import count_speech_s, fit_transfer_map, select_channels
+from lipmotion.pipeline.analysis.read_request import read_recording
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.generation import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request
-from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source
-from lipmotion.types import Audio, Example, Motion, Speech, Track
+from lipmotion.types import Audio, Example, Track
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 
 MOST_FOOTAGE_S = 60.0
 """Seconds of footage that are used: the first of a video, utterances spread evenly over a corpus."""
-LEAST_SPEECH_S = 0.5
+MIN_SPEECH_S = 0.5
 """Fewest seconds of speech, with the face measured, of which a map is made."""
 
 
@@ -66,23 +66,23 @@ def map_onto(
     if isinstance(onto, SpeakerMap):
         return onto
     person = speaker_map(model.speakers, speaker)
-    opened, where = _opened(onto)
+    opened, where = _open(onto)
     source, target = [], []
-    for name, request, measured in _takes(opened, where, onto_speaker, speech):
+    for name, request, measured in _list_takes(opened, where, onto_speaker, speech):
         recognised = replace(request, recogniser=recogniser)
-        pair = measured_pair(model, person, name, recognised, measured, where, onto_speaker)
+        pair = measure_pair(model, person, name, recognised, measured, where, onto_speaker)
         source.append(pair[0])
         target.append(pair[1])
     spoken_s = count_speech_s(target)
-    if spoken_s < LEAST_SPEECH_S:
+    if spoken_s < MIN_SPEECH_S:
         raise InputError(
-            f"{where}: {spoken_s:.2f} s of speech with a measured face, required {LEAST_SPEECH_S} s or more; give a "
+            f"{where}: {spoken_s:.2f} s of speech with a measured face, required {MIN_SPEECH_S} s or more; give a "
             "recording in which the person speaks, with sound"
         )
     return fit_transfer_map(source, target)
 
 
-def measured_pair(
+def measure_pair(
     model: Model,
     person: SpeakerMap | None,
     name: str,
@@ -101,9 +101,18 @@ def measured_pair(
     speaker  : of the model in ``measured``
     Raises InputError: the person's motion has other channels.
     """
-    speech = _understood(model, request)
+    try:
+        speech = analyse(model, request)
+    except AlignmentError:  # its transcript cannot be aligned
+        speech = analyse(model, replace(request, transcript=None))
     generated = generate_for(person, model.engine, model.learned, speech).motion
-    motion, valid = _measured(measured, request, speech, speaker)
+    if isinstance(measured, Track):
+        motion, valid = resample_track(measured, len(speech.features.values))
+    else:
+        same = analyse(measured, Request(read_recording(request), units=speech.units))
+        of_speaker = speaker_map(measured.speakers, speaker)
+        motion = generate_for(of_speaker, measured.engine, measured.learned, same).motion
+        valid = np.ones(len(motion.values), bool)
     motion = select_channels(motion, generated.channels, where)
     return Example(name, speech, generated, valid), Example(name, speech, motion, valid)
 
@@ -111,7 +120,7 @@ def measured_pair(
 _Opened = Corpus | Model | FilmedFace | Path
 
 
-def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]:
+def _open(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]:
     """Return the corpus, the model, or the path of the video; and its name for messages."""
     if isinstance(onto, Corpus):
         return onto, str(onto.path)
@@ -128,13 +137,10 @@ def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, st
     return (load_model(path) if is_zipfile(path) else path), str(path)
 
 
-def _takes(
+def _list_takes(
     opened: _Opened, where: str, speaker: str, speech: Request | None
 ) -> Iterator[tuple[str, Request, Track | Model]]:
-    """Yield recordings of a person: name, request, and the tracked motion, or the model that generates it.
-
-    Raises InputError: several people, or no such speaker; no speech for a model.
-    """
+    """Yield recordings of a person: name, request, and the tracked motion, or the model that generates it."""
     if isinstance(opened, Model):
         if speech is None:
             raise InputError("the person of a model is measured in some speech; give a request (speech=...)")
@@ -143,7 +149,7 @@ def _takes(
         for number, take in enumerate(opened.takes):
             yield f"take {number + 1}", Request(take.sound), Track(take.motion, take.seen)
     elif isinstance(opened, Corpus):
-        names = _names(opened, where, speaker)
+        names = _choose_names(opened, where, speaker)
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
         for index in choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
             utterance = opened.utterance(names[index])
@@ -157,38 +163,14 @@ def _takes(
         yield where, Request(first), track(opened, crops=False, span=VideoSpan(0.0, MOST_FOOTAGE_S))
 
 
-def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
-    """Return the utterances of one person: those of the training list if there are any.
-
-    Raises InputError: there are several people, no such person, or no utterances.
-    """
+def _choose_names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
+    """Return the utterances of one person: those of the training list if there are any."""
     known = [name for name in corpus.speakers if name]
     if (speaker and speaker not in known) or (not speaker and len(corpus.speakers) > 1):
-        found = f"no speaker {speaker!r}" if speaker else f"{len(corpus.speakers)} speakers"
-        raise InputError(f"{where}: {found}, required one of: {', '.join(known)}; name it (--onto-speaker)")
+        problem = f"no speaker {speaker!r}" if speaker else f"{len(corpus.speakers)} speakers"
+        raise InputError(f"{where}: {problem}, required one of: {', '.join(known)}; name it (--onto-speaker)")
     speakers = [speaker] if speaker else []
     names = corpus.names("train", speakers) or corpus.names(None, speakers)
     if not names:
         raise InputError(f"{where}: the corpus is empty; prepare recordings of the person")
     return names
-
-
-def _understood(model: Model, request: Request) -> Speech:
-    """Return the speech of a recording; without its transcript where that cannot be aligned."""
-    try:
-        return understand(model, request)
-    except AlignmentError:
-        return understand(model, replace(request, transcript=None))
-
-
-def _measured(
-    measured: Track | Model, request: Request, speech: Speech, speaker: str
-) -> tuple[Motion, NDArray[np.bool_]]:
-    """Return the motion of a person in speech at 100 Hz, and the frames in which it is valid [shape=(T,)]."""
-    if isinstance(measured, Track):
-        return resample_track(measured, len(speech.features.values))
-    same = Request(audio_of(request), units=speech.units)
-    other = generate_for(
-        speaker_map(measured.speakers, speaker), measured.engine, measured.learned, understand(measured, same)
-    )
-    return other.motion, np.ones(len(other.motion.values), bool)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
 from lipmotion.formats.markers import MILLIMETRES
-from lipmotion.measures import curves, vertices
+from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold, closure_figures
 from lipmotion.measures.curves import modulation_distance_db
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
@@ -130,7 +130,7 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
         figures["points"] = _point_figures(made, original, points)
     if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
         generated, recorded = ([_values(side, upper)[:, :, None]] for side in (made, original))
-        deviation = vertices.upper_face_deviation(generated, recorded, rest=np.zeros((len(upper), 1)))
+        deviation = curves.upper_face_deviation(generated, recorded, rest=np.zeros((len(upper), 1)))
         figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
     return figures
 
@@ -223,7 +223,7 @@ def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[st
         "points": len(points),
         "lip_points": len(lips),
         "upper_points": len(upper),
-        "landmark_distance_mm": vertices.landmark_distance(*both(list(points))),
-        "lip_vertex_error_mm": vertices.lip_vertex_error(*both(lips)) if lips else None,
-        "upper_face_deviation_mm": vertices.upper_face_deviation(*both(upper), rest) if upper else None,
+        "landmark_distance_mm": curves.landmark_distance(*both(list(points))),
+        "lip_vertex_error_mm": curves.lip_vertex_error(*both(lips)) if lips else None,
+        "upper_face_deviation_mm": curves.upper_face_deviation(*both(upper), rest) if upper else None,
     }

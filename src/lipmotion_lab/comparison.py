@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import clip_closure_counts
-from lipmotion.measures.curves import Clips
+from lipmotion.measures.curves import Clips, bootstrap_interval
 from lipmotion.stats.rounding import varies
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings
 

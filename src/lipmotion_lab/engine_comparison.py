@@ -14,7 +14,7 @@ from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.training.train import Run, about_training, train
+from lipmotion.pipeline.training.train import Run, describe_training, train
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.files import make_folder, unfinished_work
@@ -72,7 +72,7 @@ def engine_models(
         models = {name: EngineModel(load_model(path), None) for name, path in paths.items() if path.is_file()}
         if models:
             utterances = [corpus.utterance(name) for name in training]
-            required = about_training(corpus, utterances, "train", len(training))
+            required = describe_training(corpus, utterances, "train", len(training))
             for name, kept in models.items():
                 _check_model(paths[name], name, kept.model, required)
     missing = [name for name in names if name not in models]

@@ -135,7 +135,7 @@ def hofer2008(
             team.ordered_map,
         )
 
-    def recordings_of(chosen: Sequence[str], part: Monitor) -> HeldOutRecordings:
+    def list_recordings(chosen: Sequence[str], part: Monitor) -> HeldOutRecordings:
         return load_held_out(
             corpus,
             cached_recogniser(phones),
@@ -145,8 +145,8 @@ def hofer2008(
             monitor=part,
         )
 
-    choosing = recordings_of(validation, sub_monitor(monitor, 0.1, 0.12))
-    recordings = recordings_of(held_out, sub_monitor(monitor, 0.12, 0.15))
+    choosing = list_recordings(validation, sub_monitor(monitor, 0.1, 0.12))
+    recordings = list_recordings(held_out, sub_monitor(monitor, 0.12, 0.15))
     cells = [(states, units) for states in options.states for units in PAPER_SCORES]
     systems: dict[int, dict[str, _System]] = {states: {} for states in options.states}
     generated: dict[tuple[int, str], dict[tuple[str, str], Sequence[ComparedClip]]] = {}

@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY, Model
-from lipmotion.pipeline.training.fingerprint import fingerprint
+from lipmotion.pipeline.training.fingerprint import fingerprint_training
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -171,7 +171,7 @@ def open_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSettings
         return NO_CHECKPOINT
     make_folder(folder)
     config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
-    of_input = fingerprint(corpus, key.names, key.engine, config, lexicon, key.visual, key.model)
+    of_input = fingerprint_training(corpus, key.names, key.engine, config, lexicon, key.visual, key.model)
     return Checkpoint(folder, f"{of_input} {settings.seed} {key.others}")
 
 

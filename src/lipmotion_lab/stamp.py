@@ -16,11 +16,11 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import ENGINES
 from lipmotion.kernels.threads import blas_kernels
-from lipmotion.pipeline.training.fingerprint import corpus_digest
+from lipmotion.pipeline.training.fingerprint import digest_corpus
 from lipmotion_lab.runner import ExperimentSettings
 
 PACKAGES = ("lipmotion", "numpy", "scipy", "numba", "av", "pocketsphinx", "hama", "matplotlib")
@@ -60,7 +60,7 @@ class Stamp:
             "begun": self._begun.isoformat(timespec="seconds"),
             "seconds": round(seconds, 1),
             "processor seconds": round(used, 1),
-            "corpus": {"name": corpus.path.resolve().name, "SHA-256": corpus_digest(corpus), **lists},
+            "corpus": {"name": corpus.path.resolve().name, "SHA-256": digest_corpus(corpus), **lists},
             "seed": settings.seed,
             "options": {"workers": settings.workers, "lexicon": lexicon},
             "commit": commit(ROOT),

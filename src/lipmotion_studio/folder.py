@@ -24,9 +24,10 @@ from lipmotion.pipeline.batch.lines import is_recording, read_lines
 from lipmotion.pipeline.edit_files import EditFile, check_sound, read_edits, write_edits
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import (
+    atomic_file,
+    create_folders,
     is_link,
-    locked,
-    made_folders,
+    lock_folder,
     make_folder,
     portable_name,
     read_text_file,
@@ -34,7 +35,6 @@ from lipmotion.storage.files import (
     remove_unfinished,
     sha256_of,
     sound_reference,
-    whole_file,
 )
 from lipmotion.storage.json_text import as_json, as_json_rows, from_json
 from lipmotion.types.languages import AUTO, ENGLISH
@@ -233,7 +233,7 @@ class ProjectFolder:
     def write_edits(self, recording: ProjectRecording, file: EditFile) -> None:
         """Write a recording's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
         path, copy = self.edits(recording), self._copy(recording)
-        with self.lock, made_folders([path.parent, copy.parent]):
+        with self.lock, create_folders([path.parent, copy.parent]):
             write_with_copy(path, copy, lambda first: write_edits(file, first))
             self._summaries[recording.number] = self._file_state(recording), summary_of(file)
 
@@ -253,7 +253,7 @@ class ProjectFolder:
             file = replace(file, sha256=digest)
             self.write_edits(recording, file)
         elif not copy.exists() or copy.read_bytes() != path.read_bytes():  # others may have edited it
-            with self.lock, made_folders([copy.parent]):
+            with self.lock, create_folders([copy.parent]):
                 copy_file(path, copy)
         return file
 
@@ -317,7 +317,7 @@ class ProjectFolder:
         """Write the project. Raises ExportError: it cannot be written."""
         with self.lock:
             text = as_json_rows(project_document(self.project), ensure_ascii=False)
-            with whole_file(self.path / PROJECT) as temporary:
+            with atomic_file(self.path / PROJECT) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
@@ -360,7 +360,7 @@ class ProjectFolder:
             recording = self._choose_name(recording, taken)
             recording = replace(recording, sound=f"{SOUNDS}/{recording.name}{suffix}")
             check_recordings(self.project.with_recordings([recording]))
-            with whole_file(self.sound(recording)) as temporary:
+            with atomic_file(self.sound(recording)) as temporary:
                 content.replace(temporary)
             self.change(lambda project: project.with_recordings([recording]))
             return number
@@ -417,7 +417,7 @@ class ProjectFolder:
         """Write a vote behind those that were cast before; return all. Raises InputError, ExportError: not possible."""
         with self.lock:
             votes = (*read_votes(self.path / VOTES), vote)
-            with whole_file(self.path / VOTES) as temporary:
+            with atomic_file(self.path / VOTES) as temporary:
                 temporary.write_text(votes_text(votes), encoding="utf-8")
             return votes
 
@@ -441,7 +441,7 @@ class ProjectFolder:
             known = self.lexicon().user
             user = {**known, word: tuple(dict.fromkeys((phones, *known.get(word, ()))))}
             rows = [f"{each} {' '.join(variant)}\n" for each, variants in sorted(user.items()) for variant in variants]
-            with whole_file(self.path / LEXICON) as temporary:
+            with atomic_file(self.path / LEXICON) as temporary:
                 temporary.write_text("".join(rows), encoding="utf-8")
 
 
@@ -482,7 +482,7 @@ def open_folder(source: Path | None, out: Path | None = None) -> Iterator[Projec
     """
     path = project_path(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
-    with locked(path):
+    with lock_folder(path):
         remove_unfinished(path)  # what was dropped on a studio that was killed
         folder = ProjectFolder(path)
         if recordings is not None:
@@ -498,7 +498,7 @@ def _key(name: str) -> str:
 
 def copy_file(source: Path, target: Path) -> None:
     """Copy a file, whole or not at all. Raises ExportError: it cannot be written."""
-    with whole_file(target) as temporary:
+    with atomic_file(target) as temporary:
         shutil.copyfile(source, temporary)
 
 
@@ -514,7 +514,7 @@ def write_with_copy(path: Path, copy: Path, write: Callable[[Path], object]) -> 
 
 def restore_copy(path: Path, copy: Path) -> None:
     """Put a copy in the place of a damaged file, which stays beside it under another name. Raises ExportError."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         shutil.copyfile(copy, temporary)
         if path.exists():
             path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))

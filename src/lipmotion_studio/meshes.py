@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.expression import is_mood, with_moods
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.meshes.model.scene import Scene
@@ -59,7 +59,7 @@ class Faces:
         """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
         if name not in self._shown:
             if name not in self.names:
-                raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
+                raise InputError(f"no face {shorten(repr(name))}; required one of: {', '.join(self.names)}")
             path = self._characters.get(name)
             face = name if path is None else path if self.is_filmed(name) else MeshFace(load_character(path))
             self._shown[name] = shown_face(face)
@@ -84,7 +84,7 @@ class Faces:
         elif name in (HEAD, HEAD_OF_MOODS):
             scene = head_scene(_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
         else:
-            raise InputError(f"no mesh {shortened(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
+            raise InputError(f"no mesh {shorten(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
         with temporary_folder() as folder:
             write_scene(folder / "face.glb", scene)
             self._meshes[name] = (folder / "face.glb").read_bytes()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.outputs.output import OutputSettings, output_suffixes
 from lipmotion_faces.outputs.shown_faces import shown_face
 
@@ -58,12 +58,12 @@ def find_preset(name: str, files: tuple[str, ...]) -> Preset:
     """
     if name:
         if name not in PRESETS:
-            raise InputError(f"no preset {shortened(repr(name))}; required one of: {', '.join(PRESETS)}")
+            raise InputError(f"no preset {shorten(repr(name))}; required one of: {', '.join(PRESETS)}")
         return PRESETS[name]
     known = suffixes()
     for suffix in files:
         if suffix not in known or not _SUFFIX.fullmatch(suffix):
-            raise InputError(f"nothing is written as {shortened(repr(suffix))}; required some of: {' '.join(known)}")
+            raise InputError(f"nothing is written as {shorten(repr(suffix))}; required some of: {' '.join(known)}")
     if not files:
         raise InputError("no preset and no files; required one of both")
     return Preset("", "", tuple(dict.fromkeys(files)))

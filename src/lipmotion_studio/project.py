@@ -8,7 +8,7 @@ from functools import partial
 from hashlib import sha256
 from typing import Any
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
 from lipmotion.types.values import (
@@ -110,7 +110,7 @@ class ProjectRecording:
 
     def __post_init__(self) -> None:
         if self.mark not in MARKS:
-            raise InputError(f"the mark is {shortened(repr(self.mark))}, required one of: {', '.join(MARKS)}")
+            raise InputError(f"the mark is {shorten(repr(self.mark))}, required one of: {', '.join(MARKS)}")
 
     def with_version(self, steps: tuple[str, ...]) -> ProjectRecording:
         """Return it with a version of these edits; as it is, where there is one. Raises InputError: too many."""
@@ -132,7 +132,7 @@ class ProjectRecording:
             if version.name == name:
                 return version
         known = ", ".join(version.name for version in self.versions) or "nothing: none is kept"
-        raise InputError(f"no version {shortened(repr(name))} of the recording, required one of: {known}")
+        raise InputError(f"no version {shorten(repr(name))} of the recording, required one of: {known}")
 
 
 @dataclass(frozen=True)

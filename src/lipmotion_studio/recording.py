@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.edit_files import EditFile, begun_with
-from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, step_of
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
+from lipmotion.pipeline.analysis.transcribe import guess_pronunciations
+from lipmotion.pipeline.edit_files import EditFile, create_edit_file
+from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, parse_step
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.session import Session, own_pronunciations
-from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
-from lipmotion.pipeline.understand.transcribe import guesses
+from lipmotion.pipeline.session import Session, read_pronunciations
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import (
@@ -90,7 +90,7 @@ class OpenRecording:
         request = replace(read_request(file.named), onto=onto) if onto is not None else None
         self.session = file.session(request, model=model, audio=audio)
         self._pictures = SessionPictures(self.session)
-        self.session.generated(file.edits)
+        self.session.generate(file.edits)
 
     def with_model(self, model: Model, onto: FilmedFace | None) -> OpenRecording:
         """Return it with its edits as another model moves it, or mapped onto another person; to be read only.
@@ -113,12 +113,12 @@ class OpenRecording:
     def generation(self) -> Generation:
         """The motion with all edits, but for its delivery."""
         with self._preview():
-            return self.session.generated(self.file.edits)
+            return self.session.generate(self.file.edits)
 
     @property
     def _styled(self) -> Motion:
         with self._preview():
-            return self.session.delivered(self.file.edits).motion
+            return self.session.deliver(self.file.edits).motion
 
     def _preview(self, *, settled: bool | None = None) -> AbstractContextManager[None]:
         """Return what motion is asked for within; ``settled``: None: as it is."""
@@ -157,12 +157,15 @@ class OpenRecording:
         """
         check_revision("the recording", self.revision, revision)
         file = self.file.undo(instead).then(*steps) if steps else self.file.undo(instead)
-        changed, lexicon = self._change(file, revision), lexicon_of(self.session.request)
+        changed, lexicon = self._change(file, revision), read_lexicon(self.session.request)
         guessed: dict[str, Pronunciation] = {}
-        for step in map(step_of, map(str, steps)):
+        for step in map(parse_step, map(str, steps)):
             if isinstance(step, WordStep):
-                known, text = own_pronunciations(step), step.word if isinstance(step, WordIs | WordSaid) else step.words
-                guessed |= guesses([word for word in split_words(text) if word not in known], lexicon)
+                known, text = (
+                    read_pronunciations(step),
+                    step.word if isinstance(step, WordIs | WordSaid) else step.words,
+                )
+                guessed |= guess_pronunciations([word for word in split_words(text) if word not in known], lexicon)
         rows = [{"word": word, "phones": list(phones)} for word, phones in guessed.items()]
         return changed | {"guessed": rows}
 
@@ -193,7 +196,7 @@ class OpenRecording:
         """Go over to other edits: compute, then write, then use them; nothing, where somebody else was first."""
         before, settled = self._styled, self.audio.duration_s <= LONG_S
         with self._preview(settled=settled):
-            after = self.session.delivered(file.edits).motion
+            after = self.session.deliver(file.edits).motion
         is_other = file.edits.steps != self.file.edits.steps or file.undone != self.file.undone
         if is_other or keep_version:
             with self.folder.check_out(self.number, revision) as recording:
@@ -412,7 +415,7 @@ def analyse_recording(
     if recording.transcript:
         request = replace(request, transcript=recording.transcript)
     session = Session(request, model=model, monitor=monitor, audio=audio)
-    file, generation = begun_with(replace(named, lexicon=None), session)
+    file, generation = create_edit_file(replace(named, lexicon=None), session)
     digest = recording.sha256 or file.sha256
     folder.check_sound(replace(recording, sha256=digest))  # it may have been replaced since
     duration_s, doubt = audio.duration_s, mean_doubt(generation)

@@ -12,7 +12,7 @@ import numpy as np
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.storage.files import temporary_folder
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Motion
@@ -279,7 +279,7 @@ def _choose_channels(motion: Motion, names: list[str]) -> Motion:
     """Return some channels of a motion, in the order of their names. Raises InputError: it has none of a name."""
     for name in names:
         if name not in motion.names:
-            raise InputError(f"names: there is no {shortened(repr(name))}, required some of: {', '.join(motion.names)}")
+            raise InputError(f"names: there is no {shorten(repr(name))}, required some of: {', '.join(motion.names)}")
     columns = list(map(motion.column, names))
     channels = tuple(motion.channels[column] for column in columns)
     return replace(motion, values=motion.values[:, columns], channels=channels)

@@ -13,16 +13,16 @@ from typing import Any
 
 from starlette.exceptions import HTTPException
 
-from lipmotion.errors import InputError, LipMotionError, shortened
+from lipmotion.errors import InputError, LipMotionError, shorten
 from lipmotion.extensions import installed_version
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
-from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
+from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, parse_step
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
-from lipmotion.storage.files import made_folders, sha256_of, temporary_folder
+from lipmotion.storage.files import create_folders, sha256_of, temporary_folder
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
@@ -121,7 +121,7 @@ class Studio:
         status, mark : only recordings with these; empty: all
         """
         if order not in ORDERS:
-            raise InputError(f"order is {shortened(repr(order))}, required doubt, or nothing")
+            raise InputError(f"order is {shorten(repr(order))}, required doubt, or nothing")
         with self.folder.lock:
             project, revision = self.folder.project, self.folder.revision
         recordings = [
@@ -202,7 +202,7 @@ class Studio:
         """Return path and model of a voice. Raises InputError: none of that name. Others as ``load_model``."""
         voices = self.voices()
         if name not in voices:
-            raise InputError(f"no voice {shortened(repr(name))}; required one of: {', '.join(filter(None, voices))}")
+            raise InputError(f"no voice {shorten(repr(name))}; required one of: {', '.join(filter(None, voices))}")
         file = Path(os.path.normpath(self.folder.path / voices[name])) if voices[name] else None
         return voices[name], known_model(file)
 
@@ -259,7 +259,7 @@ class Studio:
 
         Raises InputError: a sentence is no edit.
         """
-        steps = [step_of(sentence) for sentence in sentences]
+        steps = [parse_step(sentence) for sentence in sentences]
         if not any(isinstance(step, WordIs | WordsSaid) for step in steps):
             return tuple(steps)
         user = self.folder.lexicon().user
@@ -388,7 +388,7 @@ class Studio:
         copy = out / f"{recording.name}.{EDITS_SUFFIX}"
         files = tuple(str(out / f"{recording.name}{suffix}") for suffix in preset.files)
         file = replace(self.folder.read_edits(recording), undone=(), sha256=recording.sha256)
-        with made_folders([copy.parent]):
+        with create_folders([copy.parent]):
             write_edits(file, copy)
             request = replace(file.named, recording=self.folder.check_sound(recording), edits=copy)
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)

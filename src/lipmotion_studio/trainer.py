@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
-from lipmotion.errors import ExportError, InputError, shortened
-from lipmotion.pipeline.workers import begun_apart
-from lipmotion.storage.files import UNFINISHED, make_folder, read_text_file, remove, whole_file, work_folder
+from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.pipeline.workers import start_process
+from lipmotion.storage.files import UNFINISHED, atomic_file, make_folder, read_text_file, remove, work_folder
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import (
     any_members,
@@ -156,10 +156,10 @@ class Trainer:
         ExportError: the folder of the project cannot be written.
         """
         if kind not in KINDS:
-            raise InputError(f"no kind {shortened(repr(kind))}; required {' or '.join(KINDS)}")
+            raise InputError(f"no kind {shorten(repr(kind))}; required {' or '.join(KINDS)}")
         plain = clean_name(name, "")
         if "/" in name or "\\" in name:
-            raise InputError(f"the name {shortened(repr(name))} has a slash; give it a name without one, as Anna")
+            raise InputError(f"the name {shorten(repr(name))} has a slash; give it a name without one, as Anna")
         if not plain:
             raise InputError(f"the {kind} has no name; give it a name, as that of the person")
         request, number = TrainingRequest(kind, plain, tuple(numbers), options.as_mapping()), 1
@@ -211,7 +211,7 @@ class Trainer:
                 self._request, self._status = before
                 raise
             self._begun_s, self._first_share, self._ends_s = self._clock(), None, None
-            process, pipe = begun_apart(run_training, order)
+            process, pipe = start_process(run_training, order)
             self._process = process
             self._thread = threading.Thread(target=self._follow, args=(process, pipe), name="training", daemon=True)
             self._thread.start()
@@ -293,7 +293,7 @@ class Trainer:
         text = as_json(document, indent=1, ensure_ascii=False)
 
         def write(path: Path) -> None:
-            with whole_file(path) as temporary:
+            with atomic_file(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
         write_with_copy(self._file, self._copy, write)

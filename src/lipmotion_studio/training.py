@@ -16,13 +16,13 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.registry import DEFAULT
 from lipmotion.errors import InputError, LipMotionError
-from lipmotion.extensions import provided
+from lipmotion.extensions import load_provided
 from lipmotion.formats.label_files import find_label_files
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, train
-from lipmotion.storage.files import confined, made_folders, remove, unfinished_work, whole_file
+from lipmotion.storage.files import atomic_file, confine, create_folders, remove, unfinished_work
 from lipmotion.types import Item, Monitor, Progress, sub_monitor
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.units import Lexicon
@@ -105,9 +105,9 @@ def run_training(order: TrainingOrder, report: Report) -> None:
     handler = _WarningHandler(report)
     LOG.addHandler(handler)
     try:
-        with confined(order.work.parent):  # the project, in this process
+        with confine(order.work.parent):  # the project, in this process
             begun_s = time.monotonic()
-            with made_folders([order.target.parent, order.work]), gather_recordings(order) as recordings:
+            with create_folders([order.target.parent, order.work]), gather_recordings(order) as recordings:
                 if order.kind == VOICE:
                     facts = _train_voice(order, recordings, monitor)
                 else:
@@ -143,7 +143,7 @@ def gather_recordings(order: TrainingOrder) -> Iterator[Path]:
         return
     place = order.work / GATHERED / order.target.stem
     remove(place.parent)  # of a process that was killed
-    with made_folders([place]):
+    with create_folders([place]):
         try:
             taken: set[str] = set()
             for recording in order.source:
@@ -155,7 +155,7 @@ def gather_recordings(order: TrainingOrder) -> Iterator[Path]:
                     check_sound(recording.path, recording.sha256)
                 _put(recording.path, place / f"{stem}{recording.path.suffix}")
                 if recording.transcript:
-                    with whole_file(place / f"{stem}.txt") as text:
+                    with atomic_file(place / f"{stem}.txt") as text:
                         text.write_text(recording.transcript, encoding="utf-8")
                     continue
                 for labels in find_label_files(recording.path):
@@ -170,7 +170,7 @@ def _put(file: Path, place: Path) -> None:
     try:
         os.link(file.resolve(), place)
     except OSError:
-        with whole_file(place) as copy:
+        with atomic_file(place) as copy:
             shutil.copyfile(file, copy)
 
 
@@ -217,7 +217,7 @@ def _measure(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monito
     if not names:
         return {}
     try:
-        figures = provided("evaluate")(model, corpus, selection=Selection(names=names), monitor=monitor)
+        figures = load_provided("evaluate")(model, corpus, selection=Selection(names=names), monitor=monitor)
     except LipMotionError as error:
         LOG.warning("the voice could not be measured: %s", error)
         return {}

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import as_tuple, items, members, optional, text, value_of, whole
@@ -32,7 +32,7 @@ class Side:
 
     def __post_init__(self) -> None:
         if not self.name or not DIGEST.fullmatch(self.model) or not DIGEST.fullmatch(self.edits):
-            raise InputError(f"{shortened(repr(self))}: required a name, and digests as hexadecimal figures")
+            raise InputError(f"{shorten(repr(self))}: required a name, and digests as hexadecimal figures")
 
     @property
     def motion(self) -> tuple[str, str]:
@@ -58,7 +58,7 @@ class Vote:
         if len(self.shown) != 2 or self.shown[0].motion == self.shown[1].motion:
             raise InputError("these are not two motions that differ: required two models, or other edits")
         if self.better not in (0, 1, None):
-            raise InputError(f"better is {shortened(repr(self.better))}, required 0, 1, or null: no difference")
+            raise InputError(f"better is {shorten(repr(self.better))}, required 0, 1, or null: no difference")
 
     @property
     def compared(self) -> tuple[tuple[str, str], ...]:

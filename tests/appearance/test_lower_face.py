@@ -15,6 +15,7 @@ from lipmotion_faces.appearance.lower_face import (
     LEAST_BOTTOM_PX,
     MARGIN_PX,
     NARROWEST_PX,
+    SAME_PERSON_LIKENESS,
     TOP_PX,
     WIDEST_PX,
     WIDTH,
@@ -22,6 +23,8 @@ from lipmotion_faces.appearance.lower_face import (
     best_scale,
     cheek_light,
     face_shape,
+    face_signature,
+    likeness,
     mouth_ellipse,
     mouth_part,
     region_map,
@@ -147,3 +150,26 @@ def test_normalised_light_is_the_same_in_all_pictures() -> None:
     level = relight(seen, light[0] / light)
     assert cheek_light(level) == pytest.approx(np.tile(light[0], (3, 1)), abs=0.3)
     assert np.abs(level.astype(int) - mouth).max() <= 1
+
+
+def face(seed: int) -> np.ndarray:
+    coarse = np.random.default_rng(seed).uniform(40, 200, (16, 16, 3))
+    return np.kron(coarse, np.ones((8, 8, 1)))
+
+
+def test_light_and_noise_leave_a_person_the_same() -> None:
+    draw = np.random.default_rng(9)
+    one = np.stack([face(1) + draw.normal(0, 5, (128, 128, 3)) for _ in range(4)])
+    assert likeness(face_signature(one), face_signature(0.6 * one[:1] + 20)) == pytest.approx(1, abs=0.02)
+
+
+def test_other_faces_and_neck_and_background() -> None:
+    other = face(1)
+    other[112:] = 0
+    other[:, :18] = 255
+    assert likeness(face_signature(face(1)), face_signature(face(2))) < SAME_PERSON_LIKENESS
+    assert likeness(face_signature(face(1)), face_signature(other)) == pytest.approx(1)
+
+
+def test_a_flat_picture_is_like_nothing() -> None:
+    assert likeness(face_signature(np.full((128, 128, 3), 7)), face_signature(face(1))) == pytest.approx(0)

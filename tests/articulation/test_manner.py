@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.pipeline.outputs.delivered import FACTORS, with_detected, with_manners
+from lipmotion.pipeline.outputs.deliver import FACTORS, with_detected, with_manners
 from lipmotion.types import Generation, StateTrace, VoiceEvent
 from lipmotion.types.moods import MANNERS, PLAIN, format_moods, parse_moods
 from lipmotion.types.voice_event import BREATH, LAUGHTER, SHOUT, WHISPER

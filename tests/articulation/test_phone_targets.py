@@ -1,8 +1,14 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from lipmotion.articulation.lip_points import make_symmetrical
 from lipmotion.articulation.phone_targets import GESTURES, TIP_OUT, gesture_curves, with_gestures
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit
+from meshes.speech import motion
 
 TIME_S = np.arange(0, 1.2, 0.01)
 
@@ -67,3 +73,23 @@ def test_channels_are_added_where_they_lack():
     assert more["tongue"] == pytest.approx(0.3)
     assert more["lip_tuck"].max() > 0.9
     assert with_gestures(more, said("f")) is more
+
+
+def test_both_sides_move_alike_by_as_much_as_is_asked_for():
+    moved = motion()
+    values = moved.values.copy()
+    values[:, moved.column("y_61")] += 0.02
+    lopsided = replace(moved, values=values)
+    for asymmetry, left in ((0.0, 0.0), (0.5, 0.01), (1.0, 0.02)):
+        alike = make_symmetrical(lopsided, asymmetry)
+        assert alike["y_61"] - alike["y_291"] == pytest.approx(left, abs=1e-9)
+        assert alike["x_61"] + alike["x_291"] == pytest.approx(0.0, abs=1e-9)
+        assert alike["opening"] == pytest.approx(moved["opening"])
+    assert make_symmetrical(make_symmetrical(lopsided), 0.0)["y_61"] == pytest.approx(
+        make_symmetrical(lopsided)["y_61"]
+    )
+
+
+def test_motion_without_points_stays_as_it_is():
+    distances = motion(points=False)
+    assert make_symmetrical(distances) is distances

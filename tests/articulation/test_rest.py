@@ -1,9 +1,30 @@
+"""Pauses: the mouth rests in them, softly, and starts no earlier than a breath before the next phrase."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
-from lipmotion.articulation.rest import LARGEST_REST, find_rest_frames, measure_at_rest
+from lipmotion.articulation.contact import CLOSED_OPENING
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.rest import (
+    BREATH_GAP,
+    INHALING_GAP,
+    LARGEST_REST,
+    LAUGH_GAP,
+    LAUGH_SHARE,
+    NATURAL,
+    OPENING_S,
+    REST,
+    find_rest_frames,
+    measure_at_rest,
+    pause_weight,
+    rest_in_pauses,
+    share_short_pauses,
+)
 from lipmotion.errors import InputError
-from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit, VoiceEvent
+from lipmotion.types.voice_event import BREATH, LAUGHTER
 
 SILENCE = Timeline((Span(0.0, 0.2, Unit("sil")), Span(0.2, 1.0, Unit("aa"))))
 
@@ -35,3 +56,111 @@ def test_sizes_at_rest_are_positive():
     assert measure_at_rest("width", np.array([0.5, 0.6]), rest) == pytest.approx(0.5)
     with pytest.raises(InputError, match="the width is 0 at rest, required more than 0"):
         measure_at_rest("width", np.array([0.0, 0.6]), rest)
+
+
+TIME_S = np.arange(301) / 100
+
+
+def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
+    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
+
+
+def generation(units: Timeline[Unit], opening: float = 0.1) -> Generation:
+    values = np.column_stack([np.full(301, opening), np.where(TIME_S < 0.3, 0.5, 0.55)])
+    motion = Motion(values, 100.0, (Channel("opening"), Channel("width")))
+    return Generation(motion, np.zeros_like(values), units, StateTrace(("",), np.zeros(301, np.intp)))
+
+
+LINE = said((0, 0.4, "sil"), (0.4, 1.0, "aa"), (1.0, 1.5, "sp"), (1.5, 2.0, "aa"), (2.0, 2.15, "sp"), (2.15, 2.9, "eh"),
+            (2.9, 3.0, "sil"))  # fmt: skip
+
+
+def test_the_mouth_rests_in_pauses_and_at_both_ends_and_goes_on_in_short_ones():
+    weight = pause_weight(LINE, TIME_S)
+    assert weight[:25] == pytest.approx(1)
+    assert weight[122:136] == pytest.approx(1)
+    assert weight[300] == pytest.approx(1)
+    assert not weight[40:100].any()
+    assert not weight[150:290].any()
+    assert np.abs(np.diff(weight)).max() < 0.2
+
+
+def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
+    moved = rest_in_pauses(generation(LINE), REST)
+    opening = moved.motion["opening"]
+    for start_s in (0.4, 1.5):
+        before = opening[round((start_s - 0.2) * 100) : round((start_s - OPENING_S) * 100)]
+        assert np.ptp(before) < 1e-9
+        assert before.max() <= CLOSED_OPENING
+        assert opening[round(start_s * 100) - 4] >= BREATH_GAP - 1e-9
+    assert opening[60] == pytest.approx(0.1)
+    mouth = spoken_mouth(moved.motion, LINE)
+    assert mouth.contact[[0, 20, 125, 135, 300]].all()
+    assert not mouth.contact[200:289].any()
+
+
+def test_a_phrase_that_begins_with_closed_lips_takes_no_breath():
+    units = said((0, 1, "sil"), (1, 1.2, "m"), (1.2, 2.5, "aa"), (2.5, 3.0, "sil"))
+    moved = rest_in_pauses(generation(units, 0.01), REST)
+    assert moved.motion["opening"][80:110].max() <= 0.0101
+
+
+def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
+    assert rest_in_pauses(generation(LINE), NATURAL).motion is not None
+    for units, style in ((LINE, NATURAL), (said((0, 3, "aa")), REST), (Timeline(()), REST)):
+        given = generation(units)
+        assert rest_in_pauses(given, style) is given
+
+
+def test_a_pin_in_a_pause_holds():
+    moved = rest_in_pauses(generation(LINE), REST, [1.25])
+    assert moved.motion["opening"][125] == pytest.approx(0.1)
+    assert moved.motion["opening"][20] <= CLOSED_OPENING
+
+
+def test_all_silence_is_rest():
+    moved = rest_in_pauses(generation(said((0, 3, "sil"))), REST)
+    assert moved.motion["opening"].max() <= CLOSED_OPENING
+
+
+def test_short_pauses_are_shared_by_the_phones_beside_them():
+    shared = share_short_pauses(LINE)
+    assert [span.label.phone for span in shared] == ["sil", "aa", "sp", "aa", "eh", "sil"]
+    assert shared[3].end_s == pytest.approx(2.075)
+    assert shared[4].start_s == pytest.approx(2.075)
+    assert shared[2] == LINE[2]
+
+
+LAUGH = VoiceEvent(0.4, 1.4, LAUGHTER, 0.9, ((0.5, 1.0), (0.7, 0.5), (1.3, 0.5)))
+QUIET = said((0, 2.0, "sil"), (2.0, 2.6, "aa"), (2.6, 3.0, "sil"))
+
+
+def test_a_breath_that_is_detected_parts_the_lips_and_they_close_after_it():
+    opening = rest_in_pauses(generation(QUIET), REST, events=[VoiceEvent(0.8, 1.2, BREATH, 1.0)]).motion["opening"]
+    assert opening[90:111] == pytest.approx(INHALING_GAP)
+    assert opening[[60, 140]].max() <= CLOSED_OPENING
+    assert np.abs(np.diff(opening[60:140])).max() < 0.01
+
+
+def test_laughter_opens_the_mouth_with_its_calls_and_leaves_speech_alone():
+    moved = rest_in_pauses(generation(QUIET), REST, events=[LAUGH]).motion
+    opening = moved["opening"]
+    assert opening[50] == pytest.approx(LAUGH_GAP, rel=0.02)
+    assert opening[100] == pytest.approx(LAUGH_SHARE * LAUGH_GAP, rel=0.02)
+    assert opening[100] < opening[70] < opening[50]
+    assert opening[160] <= CLOSED_OPENING
+    assert opening[210:250] == pytest.approx(0.1)
+    speaking = rest_in_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"]
+    assert speaking[45:95] == pytest.approx(0.1)
+
+
+def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
+    plain = generation(QUIET)
+    values = plain.motion.values.copy()
+    values[:, 0] = np.where((TIME_S > 2.1) & (TIME_S < 2.5), 0.2, 0.0)
+    values[:, 1] = 0.6 - 0.5 * values[:, 0]
+    moving = Generation(Motion(values, 100.0, plain.motion.channels), plain.spread, QUIET, plain.trace)
+    moved = rest_in_pauses(moving, REST, events=[LAUGH]).motion
+    assert moved["width"][50] == pytest.approx(0.6 - 0.5 * moved["opening"][50], abs=1e-6)
+    natural = rest_in_pauses(moving, NATURAL, events=[LAUGH])
+    assert natural is moving

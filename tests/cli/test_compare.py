@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion import compare
-from lipmotion.measures.comparison_table import comparison_table
+from lipmotion.measures.evaluation_table import comparison_table
 
 
 def table(factor: float) -> str:

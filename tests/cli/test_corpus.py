@@ -88,7 +88,7 @@ def test_without_the_packages_for_video(run: RunCommand, here: Path, monkeypatch
     def missing() -> dict[str, str]:
         raise MissingDependencyError('face tracking needs MediaPipe; pip install "lipmotion[video]"')
 
-    monkeypatch.setattr(prepare, "tracker_named", lambda _: SimpleNamespace(versions=missing))
+    monkeypatch.setattr(prepare, "make_tracker", lambda _: SimpleNamespace(versions=missing))
     (here / "videos").mkdir()
     (here / "videos" / "a.mp4").touch()
     assert is_one_error(run("corpus", "prepare", "videos", "-o", "mine"), 8)

@@ -8,7 +8,7 @@ import pytest
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion import Corpus, evaluate, load_model
-from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.model import VERSION
 from lipmotion_lab.evaluation import evaluate as evaluation_figures

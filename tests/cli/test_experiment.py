@@ -11,7 +11,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.measures.curves import bootstrap_interval
 from lipmotion_lab import comparison, folds, learning_curve, runner
 from lipmotion_lab import engine_comparison as text
 from lipmotion_lab import hofer2008 as table1

@@ -191,11 +191,7 @@ def test_a_face_of_another_person(
 
 
 def test_speak(
-    run: RunCommand,
-    here: Path,
-    toy_model_file: Path,
-    filmed_face_file: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    run: RunCommand, here: Path, toy_model_file: Path, filmed_face_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stand_in_voice.install(monkeypatch)
     done = run("speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "a.mp4")

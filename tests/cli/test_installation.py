@@ -43,12 +43,12 @@ def test_packages(declared: Callable[..., dict[str, InstalledPart]]) -> None:
     )
     assert found["numpy"].state == "works"
     assert found["pytest"].state == "broken"
-    assert "required <1: pip install 'pytest<1'" in found["pytest"].told
-    assert found["no-such-package"].told.startswith("not installed, required ==1")
+    assert "required <1: pip install 'pytest<1'" in found["pytest"].text
+    assert found["no-such-package"].text.startswith("not installed, required ==1")
     assert (found["no-such-kind"].state, found["[plots]"].state) == ("absent", "works")
     assert found["[study]"].state == "absent"
-    assert f"{install_command('study')}; there is no no-such-package (required >=1)" in found["[study]"].told
-    assert "not for this Python or system (required: sys_platform == 'none')" in found["[video]"].told
+    assert f"{install_command('study')}; there is no no-such-package (required >=1)" in found["[study]"].text
+    assert "not for this Python or system (required: sys_platform == 'none')" in found["[video]"].text
 
 
 def test_without_metadata(declared: Callable[..., dict[str, InstalledPart]]) -> None:
@@ -65,33 +65,34 @@ def test_voices(monkeypatch: pytest.MonkeyPatch) -> None:
     speaking = replace(some, name="c", voices=lambda: (SyntheticVoice("kal", "c", "kal"),))
     changed = {"a": replace(some, name="a", voices=fails), "b": replace(some, name="b"), "c": speaking}
     monkeypatch.setattr("lipmotion.speech.voices.installed.SYNTHESISERS", changed)
-    found = doctor_module._looked("voices", doctor_module._PARTS["voices"])
-    assert (found.state, found.told) == ("works", "c 1; a does not work (no data); no b (apt install flite)")
+    found = doctor_module.look_at("voices")
+    assert (found.state, found.text) == ("works", "c 1; a does not work (no data); no b (apt install flite)")
     del changed["c"]
-    found = doctor_module._looked("voices", doctor_module._PARTS["voices"])
+    found = doctor_module.look_at("voices")
     assert found.state == "absent"
-    assert "no speech synthesiser is installed; install one: pip install" in found.told
+    assert "no speech synthesiser is installed; install one: pip install" in found.text
 
 
 def test_folders_that_cannot_be_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     monkeypatch.setattr("os.access", lambda *_: False)
     monkeypatch.setattr("lipmotion.kernels.compiler.cache_folder", lambda: None)
-    parts = {name: doctor_module._looked(name, look) for name, look in doctor_module._PARTS.items() if "folder" in name}
+    parts = {name: doctor_module.look_at(name) for name in ("temporary folder", "current folder")}
     assert [parts[name].state for name in ("temporary folder", "current folder")] == ["broken", "absent"]
-    assert "set TMPDIR" in parts["temporary folder"].told
-    kernels = doctor_module._looked("kernels", doctor_module._PARTS["compiled kernels"])
-    assert (kernels.state, "NUMBA_CACHE_DIR" in kernels.told) == ("absent", True)
+    assert "set TMPDIR" in parts["temporary folder"].text
+    kernels = doctor_module.look_at("compiled kernels")
+    assert (kernels.state, "NUMBA_CACHE_DIR" in kernels.text) == ("absent", True)
 
 
 def test_whatever_a_part_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails() -> str:
         raise OSError("libfoo.so: cannot open")
 
-    found = doctor_module._looked("foo", fails)
+    monkeypatch.setitem(doctor_module._PARTS, "foo", fails)
+    found = doctor_module.look_at("foo")
     assert found == InstalledPart("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
     monkeypatch.setattr("av.codec.codecs_available", {"aac"})
-    assert "no libx264, so no .mp4" in doctor_module._looked("FFmpeg", doctor_module._PARTS["FFmpeg"]).told
+    assert "no libx264, so no .mp4" in doctor_module.look_at("FFmpeg").text
 
 
 @pytest.mark.parametrize(("version", "told"), [("4.10.0", "4.10.0, MediaPipe"), ("5.1.0", "another OpenCV lies over")])
@@ -99,9 +100,9 @@ def test_face_tracking(monkeypatch: pytest.MonkeyPatch, version: str, told: str)
     monkeypatch.setattr("lipmotion_faces.tracking.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
     monkeypatch.setattr("lipmotion_faces.tracking.packages.import_face_mesh", lambda: None)
     monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
-    found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
+    found = doctor_module.look_at("face tracking")
     assert found.state == "works"
-    assert told in found.told
+    assert told in found.text
 
 
 def test_no_face_tracking(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,24 +110,24 @@ def test_no_face_tracking(monkeypatch: pytest.MonkeyPatch) -> None:
         raise missing("OpenCV", ImportError("libGL.so.1"))
 
     monkeypatch.setattr("lipmotion_faces.tracking.packages.import_opencv", fails)
-    found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
+    found = doctor_module.look_at("face tracking")
     assert found.state == "absent"
-    assert "libGL.so.1" in found.told
+    assert "libGL.so.1" in found.text
 
 
 def test_a_damaged_model(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "grid.lipmotion").write_bytes(b"damaged")
     monkeypatch.setattr("lipmotion.pipeline.model.shipped_path", lambda: tmp_path / "grid.lipmotion")
-    found = doctor_module._looked("model", doctor_module._PARTS["model that ships"])
+    found = doctor_module.look_at("model that ships")
     assert found.state == "broken"
-    assert "not a lipmotion model" in found.told
+    assert "not a lipmotion model" in found.text
 
 
 @pytest.mark.long
 def test_the_main_path() -> None:
-    found = doctor_module._looked("main path", doctor_module._PARTS["main path"])
+    found = doctor_module.look_at("main path")
     assert found.state == "works"
-    assert "1.0 s of made-up speech → json, cues.tsv, mp4; the lips open by 0." in found.told
+    assert "1.0 s of made-up speech → json, cues.tsv, mp4; the lips open by 0." in found.text
 
 
 @pytest.mark.long

@@ -67,7 +67,7 @@ needs_toml = pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 
 
 
 def parsed(*words: str) -> Job:
-    options = command_line._parsed(command_line.parser(), words, argparse.Namespace())
+    options = command_line.parse_words(words, argparse.Namespace())
     speech = options.speech[0] if isinstance(options.speech, list) else options.speech
     request = part_of(options, options.start.request, recording=speech)
     return part_of(options, options.start, request=request)
@@ -119,7 +119,7 @@ def test_each_option_is_declared_once() -> None:
 
 @pytest.mark.usefixtures("here")
 def test_only_files_that_are_read_are_declared_as_inputs() -> None:
-    options = command_line._parsed(command_line.parser(), LINE.split(), argparse.Namespace())
+    options = command_line.parse_words(LINE.split(), argparse.Namespace())
     read = {one.name for one in options.reads}
     assert {"speech", "transcript", "lexicon", "units", "model", "onto", "face", "background", "job"} <= read
     assert {one.name for one in options.writes} == {"output", "posteriors"}

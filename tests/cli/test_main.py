@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from children import PIPE, child
+from children import PIPE, child, run_child
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli import main
 from lipmotion.cli.verbs import info
@@ -35,6 +35,11 @@ def test_the_version(run: RunCommand) -> None:
     from importlib.metadata import version
 
     assert run("--version") == (0, [f"lipmotion {version('lipmotion')}"], [])
+
+
+def test_the_package_is_a_program() -> None:
+    done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
+    assert done.stdout.startswith("usage: lipmotion info ")
 
 
 def test_a_wrong_command_line(run: RunCommand) -> None:

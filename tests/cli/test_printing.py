@@ -23,7 +23,7 @@ from lipmotion import Corpus
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
-from lipmotion.cli.terminal.progress import reporting
+from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.cli.verbs import info
 from lipmotion.measures.evaluation_table import figures_table
@@ -165,7 +165,7 @@ def test_warnings(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("watched", [False, True])
 def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, watched: bool) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: watched, raising=False)
-    with reporting(Namespace(machine_readable=False, stopper=Stopper(), events=Events())) as report:
+    with report_progress(Namespace(machine_readable=False, stopper=Stopper(), events=Events())) as report:
         report.receive(Progress(EVIL, 0, 2, 0.0))
         report.receive(Item(EVIL, "skipped", EVIL))
         report.warn(EVIL)

@@ -19,7 +19,7 @@ from cli.conftest import Done, RunCommand
 from lipmotion import Corpus
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, JsonLines
-from lipmotion.cli.terminal.progress import reporting
+from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.errors import CorpusError
 from lipmotion.types import Item, Progress
@@ -45,7 +45,7 @@ def options(machine_readable: bool) -> Namespace:
 
 
 def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:
-    with reporting(options(machine_readable=True)) as report:
+    with report_progress(options(machine_readable=True)) as report:
         for event in EVENTS:
             report.receive(event)
         logging.getLogger("lipmotion").warning("strange %s", "word")
@@ -64,7 +64,7 @@ def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[
 
 
 def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pytest.CaptureFixture[str]) -> None:
-    with reporting(options(machine_readable=False)) as report:
+    with report_progress(options(machine_readable=False)) as report:
         for event in EVENTS:
             report.receive(event)
         report.finish("done", used=3, kind="video")
@@ -73,7 +73,7 @@ def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pyte
 
 def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    with reporting(options(machine_readable=False)) as report:
+    with report_progress(options(machine_readable=False)) as report:
         for event in EVENTS:
             report.receive(event)
         report.finish("done")
@@ -180,7 +180,7 @@ def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPat
     """As when the signal comes during an import that treats any exception as a missing package."""
 
     def swallows(given: Namespace) -> None:
-        with reporting(given) as report:
+        with report_progress(given) as report:
             try:
                 import signal
 

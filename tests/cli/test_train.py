@@ -120,7 +120,7 @@ def test_other_voices_are_learned_from_but_those_for_judging(
 
     both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
     monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.installed_voices", lambda: both)
-    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthetic_sentences", say)
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthesise_sentences", say)
     monkeypatch.setattr("lipmotion.pipeline.training.train.train", learn)
     (here / "open" / "friend").mkdir(parents=True)
     shutil.copy(toy_speech, here / "open" / "friend" / "one.wav")
@@ -135,7 +135,7 @@ def test_an_engine_without_a_use_for_voices(
 ) -> None:
     sentence = toy_sentences(3)[0]
     one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
-    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthetic_sentences", lambda **_: iter([one]))
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthesise_sentences", lambda **_: iter([one]))
     refused = run("train", toy_corpus.path, "-o", "other", "--voices")
     assert is_one_error(refused, 3)
     assert "the engine 'trajectory' does not learn from other voices without motion" in refused.err[0]

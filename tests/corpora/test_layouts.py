@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.discover import discover
+from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import RecordingFolder
 
 

@@ -4,8 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
-from lipmotion.corpora.splits import LARGEST_LIST_BYTES, MOST_MISSING_NAMES, assign_splits, read_names
+from lipmotion.corpora.source_recordings import (
+    LARGEST_LIST_BYTES,
+    MAX_MISSING_NAMES,
+    RecordingFolder,
+    SourceRecording,
+    assign_splits,
+    read_names,
+)
 from lipmotion.errors import CorpusError
 
 
@@ -30,9 +36,9 @@ def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
 
 
 def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MOST_MISSING_NAMES + 1)))
+    (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MAX_MISSING_NAMES + 1)))
     with pytest.raises(
-        CorpusError, match=f"name {MOST_MISSING_NAMES + 1} recordings that are not in it, at most {MOST_MISSING_NAMES}"
+        CorpusError, match=f"name {MAX_MISSING_NAMES + 1} recordings that are not in it, at most {MAX_MISSING_NAMES}"
     ):
         assign_splits(recordings(2), tmp_path)
 

@@ -19,7 +19,7 @@ from lipmotion import Corpus, load_model
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.pipeline.training import train as train_module
 from lipmotion.testing import toy_utterances
 from lipmotion.types import Track, Utterance
@@ -29,7 +29,7 @@ from lipmotion_lab.evaluation import evaluate as evaluation_figures
 FOLDER = Path(__file__).parents[2] / "recipes"
 INDEX = FOLDER / "README.md"
 PAGES = sorted(page for page in FOLDER.glob("*.md") if page != INDEX)
-MOST_LINES = 40
+MAX_LINES = 40
 PEOPLE = ("6331559613336179781", "anna", "ben")
 
 
@@ -44,7 +44,7 @@ def test_a_recipe_is_a_short_page_with_three_commands() -> None:
     assert len(PAGES) >= 6
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
-        assert len(text.splitlines()) <= MOST_LINES
+        assert len(text.splitlines()) <= MAX_LINES
         assert f"({page.name})" in index
         prepare, train, folds = map(understood.parse_args, commands(page))
         assert (prepare.verb, train.verb, folds.verb) == ("corpus", "train", "experiment")
@@ -76,7 +76,7 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     monkeypatch.setattr(prepare_module, "track", track)
     versions: Callable[[], dict[str, str]] = lambda: {"mediapipe": "0"}  # noqa: E731
-    monkeypatch.setattr(prepare_module, "tracker_named", lambda _: SimpleNamespace(versions=versions))
+    monkeypatch.setattr(prepare_module, "make_tracker", lambda _: SimpleNamespace(versions=versions))
     monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.chdir(tmp_path)

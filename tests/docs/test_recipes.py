@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 
 from lipmotion.meshes.files.rig_tables import read_rig_table
-from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.curve_sets import make_curves
 from meshes.speech import motion, units
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "recipes").glob("*.md"))
 TABLES = sorted((ROOT / "examples" / "rigs").glob("*.csv"))
-MOST_LINES = 60
+MAX_LINES = 60
 
 
 def test_a_jaw_opens_and_closes() -> None:
-    jaw = curves_of(motion(), units(), ROOT / "examples" / "rigs" / "jaw-bone.csv")["jaw.rotation.x"]
+    jaw = make_curves(motion(), units(), ROOT / "examples" / "rigs" / "jaw-bone.csv")["jaw.rotation.x"]
     assert jaw.max() == pytest.approx(65 * 0.2 - 0.8, abs=0.5)
     assert jaw[[20, 55, 95]] == pytest.approx(0.0)
 
 
 def test_pages_are_short() -> None:
-    assert [page for page in PAGES if len(page.read_text(encoding="utf-8").splitlines()) > MOST_LINES] == []
+    assert [page for page in PAGES if len(page.read_text(encoding="utf-8").splitlines()) > MAX_LINES] == []
 
 
 def test_every_table_moves_its_rig_and_is_in_a_recipe() -> None:
@@ -32,7 +32,7 @@ def test_every_table_moves_its_rig_and_is_in_a_recipe() -> None:
     assert TABLES
     for table in TABLES:
         rows = read_rig_table(table)
-        said = curves_of(motion(), units(), table)
+        said = make_curves(motion(), units(), table)
         assert said.names == tuple(dict.fromkeys(row.control for row in rows))
         assert np.ptp(said.values, axis=0).max() > 0
         first = {row.control: row for row in reversed(rows)}

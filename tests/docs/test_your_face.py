@@ -15,7 +15,7 @@ from lipmotion.cli.main import main
 from lipmotion.formats.sound import write_sound
 from lipmotion.testing.toy import CAMERA_HZ, toy_motion, toy_sentences
 from lipmotion.types import Audio, Timeline
-from lipmotion_faces import Staging, staged_face
+from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import write_mp4
 
 SENTENCES = 6
@@ -24,7 +24,7 @@ SENTENCES = 6
 def write_clip(path: Path) -> None:
     """Write a drawn person who says toy sentences, in one take."""
     spoken = toy_sentences(SENTENCES)
-    face = staged_face("woman", Staging(size=360, blinks=False, gaze=False, brows=False, head=False))
+    face = stage_face("woman", Staging(size=360, blinks=False, gaze=False, brows=False, head=False))
     frames = chain.from_iterable(
         face.render(toy_motion(each.units, CAMERA_HZ), Timeline(()), fps=CAMERA_HZ) for each in spoken
     )

@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.measures.curves import bootstrap_interval
 from lipmotion_lab import comparison
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import Staging, face_named, staged_face
+from lipmotion_faces import Staging, make_face, stage_face
 from lipmotion_faces.portrait.geometry import MouthPose
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths, paint_shapes
 from lipmotion_faces.portrait.svg_document import parse_drawing
@@ -32,7 +32,7 @@ def picture(inside: str, size: int = 40) -> np.ndarray:
 
 @pytest.mark.long
 def test_the_example_keeps_the_contract():
-    check_face(face_named(str(ROBOT)))
+    check_face(make_face(str(ROBOT)))
 
 
 @pytest.mark.parametrize(
@@ -174,12 +174,12 @@ def test_a_drawing_needs_a_resting_mouth_and_known_ones(tmp_path):
     path = tmp_path / "a.svg"
     path.write_bytes(svg('<g id="mouth-aa"><rect width="1" height="1"/></g>'))
     with pytest.raises(InputError, match="no layer mouth-rest"):
-        face_named(str(path))
+        make_face(str(path))
     path.write_bytes(svg(MOUTH_ONLY + '<g id="mouth-q"><rect width="1" height="1"/></g>'))
     with pytest.raises(InputError, match=r"mouth-q.*mouth-oo"):
-        face_named(str(path))
+        make_face(str(path))
     with pytest.raises(InputError, match="cannot be read"):
-        face_named(str(tmp_path / "none.svg"))
+        make_face(str(tmp_path / "none.svg"))
 
 
 def said(*phones: str) -> Timeline[Unit]:
@@ -218,10 +218,10 @@ def test_the_picture_has_the_shape_of_the_drawing_and_may_be_transparent(tmp_pat
     ground = '<g id="background"><rect width="80" height="40" fill="#00ff00"/></g>'
     path.write_bytes(svg(ground + f'<g id="head">{MOUTH_ONLY}</g>', "0 0 80 40"))
     motion = Motion(np.zeros((3, 1)), 25.0, (Channel("opening"),))
-    frame = next(iter(staged_face(str(path), Staging(size=64)).render(motion, said("sil"))))
+    frame = next(iter(stage_face(str(path), Staging(size=64)).render(motion, said("sil"))))
     assert frame.shape == (64, 128, 3)
     assert frame[60, 100].tolist() == [0, 255, 0]
-    clear = next(iter(staged_face(str(path), Staging(size=64, background="transparent")).render(motion, said("sil"))))
+    clear = next(iter(stage_face(str(path), Staging(size=64, background="transparent")).render(motion, said("sil"))))
     assert clear.shape == (64, 128, 4)
     assert clear[60, 100, 3] == 0
     assert clear[..., 3].max() > 200

@@ -30,7 +30,7 @@ def character(tmp_path_factory) -> DrivenCharacter:
 
 
 def drawn(character, staging: Staging) -> list[np.ndarray]:
-    return list(MeshFace(character, 256, 144).staged(staging).render(motion(), units(), fps=10.0))
+    return list(MeshFace(character, 256, 144).with_staging(staging).render(motion(), units(), fps=10.0))
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_another_seed_gives_other_movements(character):
 
 
 def test_a_size_is_the_height_of_the_picture(character):
-    picture = next(MeshFace(character).staged(Staging(size=90)).render(motion(), units()))
+    picture = next(MeshFace(character).with_staging(Staging(size=90)).render(motion(), units()))
     assert picture.shape == (90, 160, 3)
 
 

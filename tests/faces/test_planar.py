@@ -13,7 +13,7 @@ from lipmotion_faces.portrait.geometry import MouthPose
 from lipmotion_faces.portrait.movement import HeadPlacement
 from lipmotion_faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
-from lipmotion_faces.registry import staged_face
+from lipmotion_faces.registry import stage_face
 
 MOTION = Motion(np.linspace(0, 0.2, 30)[:, None], 25.0, (Channel("opening"),))
 POSES = (
@@ -70,13 +70,13 @@ def test_all_even_sizes_have_planes():
 
 
 def test_a_transparent_face_has_no_planes():
-    face = staged_face("woman", Staging(background=base.TRANSPARENT))
+    face = stage_face("woman", Staging(background=base.TRANSPARENT))
     assert isinstance(face, DrawsPlanes)
     assert face.render_planes(MOTION, Timeline(())) is None
 
 
 def test_there_are_as_many_planes_as_pictures():
-    face = staged_face("man", Staging(size=64))
+    face = stage_face("man", Staging(size=64))
     assert isinstance(face, DrawsPlanes)
     assert isinstance(face, Face)
     planes = face.render_planes(MOTION, Timeline(()), fps=20)

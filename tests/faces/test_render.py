@@ -5,7 +5,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import FACES, Staging, staged_face
+from lipmotion_faces import FACES, Staging, stage_face
 from lipmotion_faces.portrait.characters import WOMAN
 from lipmotion_faces.portrait.geometry import MouthPose
 from lipmotion_faces.portrait.layer import View
@@ -24,7 +24,7 @@ def opening(*values: float, rate_hz: float = 25.0) -> Motion:
 
 
 def frames(motion, units=NOTHING_SAID, face="woman", fps=25.0, **staging):
-    return list(staged_face(face, Staging(**staging)).render(motion, units, fps=fps))
+    return list(stage_face(face, Staging(**staging)).render(motion, units, fps=fps))
 
 
 def hole(frame: np.ndarray) -> int:
@@ -35,7 +35,7 @@ def hole(frame: np.ndarray) -> int:
 
 @pytest.mark.parametrize("name", [name for name in FACES.names if name in (*DRAWN, "portrait")])
 def test_characters_keep_the_contract(name):
-    check_face(staged_face(name, Staging(size=96)))
+    check_face(stage_face(name, Staging(size=96)))
 
 
 def test_the_number_of_frames_follows_the_frame_rate():
@@ -141,7 +141,7 @@ def test_unusable_settings_are_refused():
 
 
 def test_an_unusable_motion_is_refused_at_once():
-    face = staged_face("woman", Staging())
+    face = stage_face("woman", Staging())
     with pytest.raises(InputError, match="no channel 'opening'"):
         face.render(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID)
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import Staging, staged_face
+from lipmotion_faces import Staging, stage_face
+from lipmotion_faces.head import Head
 
 pytestmark = pytest.mark.video
 mediapipe = pytest.importorskip("mediapipe")
@@ -38,22 +39,20 @@ def tracked(frames: list[np.ndarray]) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.fixture(scope="module")
-def drawn_and_tracked() -> tuple[np.ndarray, np.ndarray]:
+FACES = {
+    "woman": (stage_face("woman", Staging(size=480)), (0.95, 0.85, 0.9), 1.25),
+    "head": (Head(size=(720, 720)), (0.97, 0.9, 0.95), 1.35),
+}
+"""Faces, how closely what is measured follows opening, width and outer, and the largest ratio of the openings."""
+
+
+@pytest.mark.parametrize("name", ["woman", pytest.param("head", marks=pytest.mark.long)])
+def test_the_drawn_motion_is_tracked_as_large_as_given_and_closed_where_closed(name):
+    face, correlations, largest = FACES[name]
     motion, units = syllables()
-    return motion.resampled(25.0).values, tracked(
-        list(staged_face("woman", Staging(size=480)).render(motion, units, fps=25.0))
-    )
-
-
-def test_the_drawn_motion_is_tracked(drawn_and_tracked):
-    drawn, measured = drawn_and_tracked
+    drawn, measured = motion.resampled(25.0).values, tracked(list(face.render(motion, units, fps=25.0)))
     assert np.isfinite(measured).all()  # the face is found in every frame
-    for column, least in enumerate((0.95, 0.85, 0.9)):  # opening, width, outer
+    for column, least in enumerate(correlations):
         assert np.corrcoef(drawn[:, column], measured[:, column])[0, 1] >= least
-
-
-def test_the_opening_is_tracked_as_large_as_given_and_closed_where_closed(drawn_and_tracked):
-    drawn, measured = drawn_and_tracked[0][:, 0], drawn_and_tracked[1][:, 0]
-    assert 0.9 < np.polyfit(drawn, measured, 1)[0] < 1.25
-    assert measured[drawn < 0.01].max() < 0.02
+    assert 0.9 < np.polyfit(drawn[:, 0], measured[:, 0], 1)[0] < largest
+    assert measured[drawn[:, 0] < 0.01, 0].max() < 0.02

@@ -15,7 +15,7 @@ import pytest
 from lipmotion import read_motion
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.shape_names import ARKIT_52
-from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
+from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
 from lipmotion.types import Motion
 
 CASES = Path(__file__).parents[1] / "data" / "cases" / "motion"
@@ -262,13 +262,13 @@ def test_timecodes_that_count_whole_frames_of_television(
     jaw = (np.arange(int(duration_s * rate_hz)) / rate_hz > 118).astype(int)
     (tmp_path / "a.csv").write_text(take([f"{code(n, counted)},2,{each},0" for n, each in enumerate(jaw)]))
     generation = read_generation(tmp_path / "a.csv")
-    motion = as_long_as(generation, duration_s).motion
+    motion = match_duration(generation, duration_s).motion
     assert counted / motion.rate_hz == pytest.approx(1.001, abs=1e-6)
     assert motion.time_s[first_open(motion)] == pytest.approx(118, abs=2 / counted)
     assert " times as long" in caplog.text
-    assert as_long_as(generation, duration_s, keeps_rate=True).motion.rate_hz == counted
+    assert match_duration(generation, duration_s, keeps_rate=True).motion.rate_hz == counted
     for other_s in (120.2, 119.87, 119.93, 121.0):
-        assert as_long_as(generation, other_s).motion.rate_hz == counted
+        assert match_duration(generation, other_s).motion.rate_hz == counted
     given = read_generation(tmp_path / "a.csv", rate_hz=rate_hz).motion
     assert given.time_s[first_open(given)] == pytest.approx(118, abs=2 / counted)
 

@@ -11,10 +11,10 @@ import pytest
 
 from lipmotion import load_model
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generation import outlook_of
+from lipmotion.pipeline.analysis.read_request import read_units
+from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis, analyse_speech
+from lipmotion.pipeline.generation import predict_outlook
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import read_units
-from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech, understood_speech
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
@@ -99,14 +99,14 @@ def audio() -> AnalysedAudio:
 def right(audio: AnalysedAudio) -> Timeline[Unit]:
     """Its phones in time."""
     words = WELCOME.with_suffix(".txt").read_text()
-    return understood_speech(load_model(), Request(audio, transcript=words)).speech.units
+    return analyse_speech(load_model(), Request(audio, transcript=words)).speech.units
 
 
-def followed(audio: Audio, units: Timeline[Unit]) -> tuple[UnderstoodSpeech, float]:
+def followed(audio: Audio, units: Timeline[Unit]) -> tuple[SpeechAnalysis, float]:
     """Return speech of given phones, and the confidence in the outlook."""
     request = Request(audio, units=units)
-    understood = understood_speech(load_model(), request)
-    return understood, outlook_of(request, understood).confidence
+    understood = analyse_speech(load_model(), request)
+    return understood, predict_outlook(request, understood).confidence
 
 
 def test_right_phones_are_followed_without_a_word(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import LARGEST_LABELS, find_labels, read_labels
-from lipmotion.formats.label_tiers import MOST_LABELS
+from lipmotion.formats.label_tiers import MAX_LABELS
 from lipmotion.units import PHONES, find_phone
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 
@@ -199,7 +199,7 @@ def test_real_ones(recordings: Path):
         (f"0 {'9' * 5000} p\n", "line 1 has the time '9{79}\\.\\.\\., required a finite one"),
         (f"0 sil\n1000000 p\n{'9' * 5000} aa\n", "line 3 has the time '9"),
         (f"0.0\t{'9' * 400}.0\tp\n", "line 1 has the time '9"),
-        ("0 1000000 p\n" * (MOST_LABELS + 1), "more than 250000 labels; give those of one recording"),
+        ("0 1000000 p\n" * (MAX_LABELS + 1), "more than 250000 labels; give those of one recording"),
         ("a" * (LARGEST_TRANSCRIPT_BYTES + 1), "4194305 characters, required at most 4194304: is it a transcript"),
         (" " * (LARGEST_LABELS + 1), "16777217 bytes, required at most 16777216"),
     ],

@@ -13,7 +13,7 @@ import pytest
 from lipmotion import Request
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_labels, read_phones, read_transcript, speakers_in
-from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.types import TimedTranscript
 from lipmotion.units import UNKNOWN_PHONES
 

@@ -25,7 +25,7 @@ from formats.timing_samples import (
 )
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels, holds_timings, read_labels, read_phones, read_transcript
-from lipmotion.pipeline.understand.read_request import read_units
+from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.types import TimedTranscript
 
 

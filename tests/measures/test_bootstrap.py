@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.measures.bootstrap import bootstrap_interval
-from lipmotion.measures.curves import mean_distance, pooled_correlation
+from lipmotion.measures.curves import bootstrap_interval, mean_distance, pooled_correlation
 
 
 def acc(generated, original) -> float:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from lipmotion.measures.offset import LEAST_CLIPS, LEAST_SCORE, best_offset, pooled_offset, shift_scores
+from lipmotion.measures.offset import MIN_CLIPS, MIN_SCORE, best_offset, pooled_offset, shift_scores
 
 RATE_HZ = 100.0
 REACH = 40
@@ -85,9 +85,9 @@ def test_clips_that_correlate_little_and_agree_are_known_together() -> None:
     clips = [scores(6.0, seed, noise=12.0) for seed in range(13)]
     assert not any(best_offset(clip, RATE_HZ).known for clip in clips)
     found = pooled_offset(clips, RATE_HZ)
-    assert found.score < LEAST_SCORE
+    assert found.score < MIN_SCORE
     assert found.known
-    assert not pooled_offset(clips[: LEAST_CLIPS - 1], RATE_HZ).known
+    assert not pooled_offset(clips[: MIN_CLIPS - 1], RATE_HZ).known
     others = [shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH) for n in range(len(clips))]
     assert not pooled_offset(others, RATE_HZ).known
     assert found == pooled_offset(clips, RATE_HZ)

@@ -82,7 +82,7 @@ def _shapes(mesh: Mesh):
 
     def shape(name, x=0.0, y=0.0, z=0.0):
         moved = np.stack(np.broadcast_arrays(x, y, z, np.zeros(len(places))), axis=1)[:, :3]
-        return Blendshape.between(name, places, places + moved, least=1e-9)
+        return Blendshape.between(name, places, places + moved, smallest=1e-9)
 
     yield shape("jawOpen", y=drop)
     yield shape("mouthClose", y=np.where(under, -drop * near, 0.0))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,15 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
-from lipmotion.meshes.fitting.driven import load_character
+from lipmotion.meshes.files.gltf_scene import read_gltf
+from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
+from lipmotion.meshes.fitting.driven import JAW_OPEN, load_character, with_jaw
+from lipmotion.meshes.model.bones import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merge_bones
+from lipmotion.meshes.model.face_shapes import life_scale
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.types.moods import parse_moods
-from meshes.heads import head, lip_points, write_glb
+from meshes.gltf import POSITIONS, document, glb
+from meshes.heads import SEAM, head, lip_points, shaped, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
 
@@ -137,3 +144,178 @@ def test_control_points_raise_the_corners_in_a_smile(files):
         next(character.vertices(of, units(), TIME_S)) for of in (motion(), with_moods(motion(), parse_moods("happy")))
     )
     assert happy[corner, 1] > plain[corner, 1] + 0.05 * placement.scale
+
+
+COLUMNS = "control,source,gain,offset\n"
+CLOSED = [20, 55, 95]
+"""Frames of silence, m and p."""
+
+
+@pytest.fixture
+def file(tmp_path):
+    write_glb(tmp_path / "head.glb", head())
+    return tmp_path / "head.glb"
+
+
+def _parted(character, weights):
+    """How far the middles of the inner lips are apart, in eye distances."""
+    rows = character.placement.vertices[[character.placement.row(point) for point in (13, 14)]]
+    moved = np.einsum("ts,snd->tnd", weights.values, character.mesh.displacements(rows, weights.names))
+    return (moved[:, 0, 1] - moved[:, 1, 1]) / character.placement.scale
+
+
+def test_any_names_are_understood_by_their_rows(file):
+    plain = load_character(file).weights(motion(), units())
+    shapes = {shape.name: f"あ {number}" for number, shape in enumerate(head().shapes)}
+    halves = [
+        replace(shape, name=shapes[shape.name], displacements=shape.displacements / (1 + (shape.name == "mouthFunnel")))
+        for shape in head().shapes
+    ]
+    halves.append(replace(next(each for each in halves if each.name == shapes["mouthFunnel"]), name="other half"))
+    write_glb(file, replace(head(), shapes=tuple(halves)))
+    rows = "".join(f"{own},{known},,\n" for known, own in shapes.items())
+    table_path(file).write_text(f"{COLUMNS}{rows}other half,mouthFunnel,,\n", encoding="utf-8")
+    character = load_character(file)
+    weights = character.weights(motion(), units())
+    for name in plain.names:
+        np.testing.assert_allclose(weights[shapes[name]], plain[name], atol=1e-4)
+    np.testing.assert_array_equal(weights["other half"], weights[shapes["mouthFunnel"]])
+    assert character.has_shape("eyeBlinkLeft")
+    assert [*character.weigh_others({"eyeBlinkLeft": np.ones(2)}, 2)] == [shapes["eyeBlinkLeft"]]
+
+
+def test_the_table_of_what_was_found_changes_nothing(file):
+    before = load_character(file)
+    write_rig_table(before.table_file, before.table_rows())
+    after = load_character(file)
+    assert after.table_rows() == before.table_rows()
+    np.testing.assert_array_equal(after.weights(motion(), units()).values, before.weights(motion(), units()).values)
+
+
+def test_gains_weaken_the_mouth_and_lips_still_touch(file):
+    table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,\nmouthPressLeft,mouthPressLeft,1,0.2\n")
+    character = load_character(file)
+    weights = character.weights(motion(), units())
+    whole = load_character(file.rename(file.with_name("other.glb"))).weights(motion(), units())
+    assert weights["jawOpen"][75] == pytest.approx(0.5 * whole["jawOpen"][75], abs=0.02)  # aa
+    assert _parted(character, weights)[75] < 0.7 * _parted(character, whole)[75]
+    assert _parted(character, weights)[CLOSED].max() < 0.004
+    assert weights["mouthPressLeft"].min() == pytest.approx(0.2)
+    assert np.abs(np.diff(weights.values, axis=0)).max() < 1.5 * np.abs(np.diff(whole.values, axis=0)).max()
+
+
+def test_weights_that_are_given_back_stay(file):
+    table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,0.03\nmouthPucker,mouthPucker,1.2,\n")
+    character = load_character(file)
+    weights = character.weights(motion(), units())
+    np.testing.assert_allclose(character.weights(weights, units()).values, weights.values, atol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [("jawOpn,jawOpen,,\n", "head.glb.character.csv: there is no blendshape 'jawOpn'; nearest: jawOpen"),
+     ("jawOpen,jawopen,,\n", "'jawOpen' follows 'jawopen', which is no curve; nearest: jawOpen"),
+     ("jawOpen,jawOpen,,\njawOpen,,,\n", "'jawOpen' occurs twice"),
+     ("jawOpen,jawOpen,,\nmouthPucker,ou,,\n", "has jawOpen and ou; leave the sources of one kind empty")],
+)  # fmt: skip
+def test_damaged_tables_are_refused(file, rows, message):
+    table_path(file).write_text(COLUMNS + rows)
+    with pytest.raises(InputError, match=message):
+        load_character(file)
+
+
+def test_a_head_in_metres_parts_its_lips_as_far_as_in_centimetres(file):
+    mesh, found = head(), []
+    for unit in (1.3, 0.013):  # 22 cm
+        shapes = tuple(replace(each, displacements=unit * each.displacements) for each in mesh.shapes)
+        write_glb(file, replace(mesh, vertices=unit * mesh.vertices, shapes=shapes))
+        found.append(load_character(file))
+    centimetres, metres = found
+    assert life_scale(centimetres.mesh, centimetres.placement) == pytest.approx(9.0)
+    np.testing.assert_allclose(metres.shapes.gap, centimetres.shapes.gap, rtol=1e-3, atol=1e-6)
+
+
+def with_bone(mesh):
+    """A jaw bone that everything below the mouth follows."""
+    jaw = next(shape for shape in head().shapes if shape.name == "jawOpen")
+    shares = -jaw.displacements[:, 1] / -jaw.displacements[:, 1].min()
+    return replace(mesh, bones=(Bone(JAW, np.array([0.0, 10 * SEAM + 2, -9.0]), jaw.rows, shares),))
+
+
+def test_bones_are_known_by_their_names():
+    kinds = {"Head": HEAD, "mixamorig:Neck1": NECK, "J_Bip_C_Head": HEAD, "JawBone": JAW, "jaw_01": JAW}
+    kinds |= {"LeftEye": LEFT_EYE, "eye_r": RIGHT_EYE, "HeadTop_End": None, "Hips": None, "": None}
+    kinds |= {"mixamorigHead": HEAD, "headphones": None, "CC_Base_JawRoot": JAW, "Head_nub": None}
+    assert {name: bone_kind(name) for name in kinds} == kinds
+
+
+def test_a_jaw_bone_opens_the_mouth():
+    mesh = with_jaw(with_bone(head(shapes=False)))
+    assert mesh.shape_names == (JAW_OPEN,)
+    moved = shaped(mesh, {JAW_OPEN: 1}) - mesh.vertices
+    chin = int(np.abs(mesh.vertices - [0, -16, 0]).sum(axis=1).argmin())
+    assert moved[chin, 1] < -1
+    assert np.abs(moved[mesh.vertices[:, 1] > 10 * SEAM + 1]).max() == pytest.approx(0)
+
+
+def test_a_mesh_that_opens_its_mouth_already_keeps_its_shapes():
+    mesh = with_bone(head())
+    assert with_jaw(mesh).shape_names == mesh.shape_names
+    assert with_jaw(head(shapes=False)).shape_names == ()
+
+
+def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
+    """The square of two triangles is no head; the made head has no skin. So the bone is put on the read mesh."""
+    from lipmotion.meshes.fitting import driven
+
+    path = tmp_path / "head.glb"
+    write_glb(path, head(shapes=False))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(driven, "read_character", lambda _: with_bone(head(shapes=False)))
+        character = load_character(path)
+    weights = character.weights(motion(), units())
+    assert weights.names == (JAW_OPEN,)
+    assert np.corrcoef(weights.values[:, 0], motion()["opening"])[0, 1] > 0.95
+
+
+def test_bones_of_one_kind_become_one():
+    one = Bone(HEAD, np.zeros(3), np.array([1, 2]), np.array([0.5, 1.0]))
+    two = Bone(HEAD, np.ones(3), np.array([2, 4]), np.array([0.25, 1.0]))
+    (merged,) = merge_bones([one, two, Bone(JAW, np.zeros(3), np.zeros(0, int), np.zeros(0))])
+    assert merged.rows.tolist() == [1, 2, 4]
+    assert merged.shares.tolist() == [0.5, 1.0, 1.0]
+    np.testing.assert_array_equal(merged.place, np.zeros(3))
+
+
+def test_bones_are_read_from_skins_and_nodes(tmp_path):
+    content, binary = document()
+    joints, weights = np.zeros((4, 4), np.uint8), np.zeros((4, 4), "<f4")
+    joints[:, 1], weights[:] = 1, [[1, 0, 0, 0], [1, 0, 0, 0], [0.25, 0.75, 0, 0], [0, 1, 0, 0]]
+    content["nodes"] = [
+        {"mesh": 0, "skin": 0},
+        {"name": "Neck", "translation": [0, 1, 0], "children": [2]},
+        {"name": "Head", "translation": [0, 2, 0], "children": [3]},
+        {"mesh": 1, "name": "glasses"},
+    ]
+    content["scenes"] = [{"nodes": [0, 1]}]
+    content["skins"] = [{"joints": [1, 2]}]
+    content["meshes"].append({"primitives": [{"attributes": {"POSITION": 0}, "indices": 3}]})
+    start = len(binary)
+    content["bufferViews"] += [
+        {"buffer": 0, "byteOffset": start, "byteLength": 16},
+        {"buffer": 0, "byteOffset": start + 16, "byteLength": 64},
+    ]
+    content["accessors"] += [
+        {"bufferView": 4, "componentType": 5121, "count": 4, "type": "VEC4"},
+        {"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"},
+    ]
+    content["meshes"][0]["primitives"][0]["attributes"] |= {"JOINTS_0": 4, "WEIGHTS_0": 5}
+    path = tmp_path / "head.glb"
+    path.write_bytes(glb(content, binary + joints.tobytes() + weights.tobytes()))
+    mesh = read_gltf(path)
+    bones = {bone.kind: bone for bone in mesh.bones}
+    assert len(mesh.vertices) == 2 * len(POSITIONS)
+    assert bones[NECK].rows.tolist() == [*range(8)]
+    assert bones[HEAD].rows.tolist() == [2, 3, 4, 5, 6, 7]
+    np.testing.assert_allclose(bones[HEAD].shares, [0.75, 1, 1, 1, 1, 1], atol=1e-6)
+    np.testing.assert_allclose(bones[HEAD].place, [0, 3, 0], atol=1e-6)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.articulation.crossfade import FADE_S, crossfade_phones
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.articulation.pauses import rest_in_pauses
+from lipmotion.articulation.phone_targets import FADE_S, crossfade_phones
+from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.meshes.fitting.oculus_visemes import MAX_CLOSED_WEIGHT, VISEME_OF_PHONE, weigh_visemes
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
 from lipmotion.meshes.fitting.point_motion import move_points
-from lipmotion.meshes.fitting.shape_weights import CurveCosts, SolverOptions, solve_shape_weights
+from lipmotion.meshes.fitting.shape_weights import (
+    CurveCosts,
+    SolverOptions,
+    fit_bounded_curves,
+    round_lips,
+    solve_shape_weights,
+)
 from lipmotion.meshes.model.face_shapes import find_face_shapes
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.surface import build_surface
@@ -126,3 +134,79 @@ def _phones():
     from meshes.speech import PHONES
 
     return PHONES
+
+
+def test_each_frame_is_the_bounded_least_squares_solution():
+    rng = np.random.default_rng(0)
+    matrix, targets = rng.normal(size=(6, 20)), 2 * rng.normal(size=(5, 20))
+    found = fit_bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.0))
+    rows = np.concatenate([matrix.T, np.sqrt(1e-2) * np.eye(6)])
+    for frame, target in zip(found, targets, strict=True):
+        exact = lsq_linear(rows, np.concatenate([target, np.zeros(6)]), (0, 1), tol=1e-12).x
+        np.testing.assert_allclose(frame, exact, atol=1e-4)
+
+
+def test_all_frames_together_are_the_exact_solution():
+    rng = np.random.default_rng(9)
+    frames, matrix = 7, rng.normal(size=(3, 8))
+    targets = rng.normal(size=(frames, 8))
+    found = fit_bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.7), np.array([[0.3, -0.3, 0.0]]))
+    second = np.zeros((frames - 2, frames))
+    for row in range(frames - 2):
+        second[row, row : row + 3] = 1, -2, 1
+    rows = np.concatenate(
+        [
+            np.kron(np.eye(frames), matrix.T),
+            np.sqrt(1e-2) * np.eye(3 * frames),
+            np.kron(np.eye(frames), [[0.3, -0.3, 0.0]]),
+            np.sqrt(0.7) * np.kron(second, np.eye(3)),
+        ]
+    )
+    wanted = np.concatenate([targets.reshape(-1), np.zeros(len(rows) - targets.size)])
+    exact = lsq_linear(rows, wanted, (0, 1), tol=1e-12).x.reshape(frames, 3)
+    np.testing.assert_allclose(found, exact, atol=1e-4)
+
+
+def test_more_cost_is_smoother():
+    targets = np.random.default_rng(2).random((50, 4))
+    rough, smooth = (
+        np.abs(np.diff(fit_bounded_curves(np.eye(4), targets, CurveCosts(smooth=cost)), axis=0)).sum()
+        for cost in (0.0, 5.0)
+    )
+    assert smooth < rough / 2
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(InputError, match="do not fit"):
+        fit_bounded_curves(np.zeros((2, 3)), np.zeros((5, 4)))
+    with pytest.raises(InputError, match="not finite"):
+        fit_bounded_curves(np.full((2, 3), np.nan), np.zeros((5, 3)))
+
+
+TIME_S = np.arange(201) / 100
+
+
+def test_the_weights_are_never_less_round_than_before():
+    shapes = arkit_mouth()
+    weights = np.full((3, len(shapes.names)), 0.3)
+    result = round_lips(weights, shapes, np.array([0.0, 0.5, 1.0]))
+    pucker, smile = shapes.row("mouthPucker"), shapes.row("mouthSmileLeft")
+    assert result[:2, pucker] == pytest.approx([0.3, 0.3])
+    assert 0.3 <= result[2, pucker] <= 0.5
+    assert result[:, smile] == pytest.approx([0.3, 0.15, 0.0])
+
+
+def test_the_solved_weights_pucker_in_oo():
+    weights = solve_shape_weights(motion(), units(), arkit_mouth())
+    assert weights["mouthPucker"][115] > 0.38
+    assert weights["mouthPucker"][75] < 0.3
+
+
+def test_points_of_round_lips_come_together_and_forward():
+    template = mouth_template()
+    moved = move_points(motion(points=False), units()).displacements
+    right, left = moved[115, template.row(RIGHT_CORNER)], moved[115, template.row(LEFT_CORNER)]  # uw
+    assert right[0] > 0.03
+    assert left[0] < -0.03
+    assert min(right[2], left[2]) > 0.02
+    assert np.abs(moved[20]).max() < 1e-6  # silence

@@ -91,8 +91,8 @@ def test_unknown_contexts_follow_the_table_and_unreliable_phones_do_not(prior: A
     beside = replace(prior, known_voice_share=0.3)
     unknown_voice, _ = beside.blended(statistics, units, frames, 1.0, voice=0.0)(slice(0, frames))
     np.testing.assert_allclose(unknown_voice, followed)
-    known_voice, _ = beside.blended(statistics, units, frames, 1.0)(slice(0, frames))
-    less = (known_voice - own)[100, 0] / (table - own)[100, 0]
+    measure_voice_similarity, _ = beside.blended(statistics, units, frames, 1.0)(slice(0, frames))
+    less = (measure_voice_similarity - own)[100, 0] / (table - own)[100, 0]
     np.testing.assert_allclose(less / (1 - less), 0.3 * share / (1 - share))
 
 

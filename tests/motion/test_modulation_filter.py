@@ -122,6 +122,6 @@ def test_it_is_stored() -> None:
     assert filter_from_arrays(filter_to_arrays(None), 2) is None
     with pytest.raises(ModelFormatError), format_errors("the model"):
         filter_from_arrays(filter_to_arrays(None), 2, needed=True)
-    for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], np.full_like(FILTER.taps, MODULATION["modulation"].most + 1)):
+    for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], np.full_like(FILTER.taps, MODULATION["modulation"].maximum + 1)):
         with pytest.raises(ModelFormatError), format_errors("the model"):
             filter_from_arrays(filter_to_arrays(ModulationFilter(taps)), 2)

@@ -23,8 +23,8 @@ from lipmotion.motion.unknown_voice import (
     raise_contrast,
     widen_range,
 )
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.recogniser import voice_knowledge
 from lipmotion.testing.examples import timeline
 from lipmotion.types import Constraints, Generation, Motion, Pin, Span, Speech, Timeline, Unit
@@ -39,7 +39,7 @@ CONFIDENCES = (0.0, 0.25, 0.5, 0.75, 1.0)
 @pytest.fixture(scope="module")
 def welcome() -> Speech:
     """Recognised phones of a voice that the model does not know."""
-    return understand(load_model(), Request(WELCOME, recogniser="fast"))
+    return analyse(load_model(), Request(WELCOME, recogniser="fast"))
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def test_vowels_are_open_at_any_confidence(welcome: Speech, confidence: float) -
 @pytest.mark.usefixtures("no_distortion_is_low")
 def test_vowels_of_other_talkers_are_open(recordings: Path, confidence: float) -> None:
     for clip in sorted((recordings / "grid-others").glob("*.mpg")):
-        speech = understand(load_model(), Request(clip, recogniser="fast"))
+        speech = analyse(load_model(), Request(clip, recogniser="fast"))
         assert shut_share(generated(replace(speech, confidence=confidence))) <= 0.03, clip.stem
 
 
@@ -177,7 +177,7 @@ def test_lips_close_within_the_phones_of_unknown_voices() -> None:
 
 def test_voices_are_known_by_their_similarity(welcome: Speech) -> None:
     assert [voice_knowledge(score) for score in (-20.0, -9.0, -6.0, -3.0, 2.0)] == pytest.approx([0, 0, 0.5, 1, 1])
-    with_units = understand(load_model(), Request(WELCOME, units=welcome.units))
+    with_units = analyse(load_model(), Request(WELCOME, units=welcome.units))
     assert with_units.voice == pytest.approx(welcome.voice)
 
 
@@ -185,4 +185,4 @@ def test_voices_are_known_by_their_similarity(welcome: Speech) -> None:
 def test_the_models_own_voice_is_known(recordings: Path) -> None:
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[:3]
     clips = [recordings / "grid-s1" / "clips" / f"{name}.mkv" for name in names]
-    assert [understand(load_model(), Request(clip)).voice for clip in clips] == pytest.approx([1, 1, 1])
+    assert [analyse(load_model(), Request(clip)).voice for clip in clips] == pytest.approx([1, 1, 1])

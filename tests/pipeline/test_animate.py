@@ -177,10 +177,7 @@ def test_a_lexicon_gives_pronunciations(
 
 
 def test_a_transcript_that_cannot_be_used(move: Animate) -> None:
-    for transcript, error, message in (
-        ("", InputError, "holds no word"),
-        ("真", InputError, "how '真' is said"),
-    ):
+    for transcript, error, message in (("", InputError, "holds no word"), ("真", InputError, "how '真' is said")):
         with pytest.raises(error, match=message):
             move(transcript=transcript)
 

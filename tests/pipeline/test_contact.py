@@ -20,9 +20,9 @@ from lipmotion.formats.fap import FAP
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, curves_of
-from lipmotion.pipeline.outputs.delivered import delivered
-from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
+from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, make_curves
+from lipmotion.pipeline.outputs.deliver import deliver
+from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.moods import MOODS
 from lipmotion.units import mark_closing_phones
@@ -139,18 +139,18 @@ def _of_character(character: DrivenCharacter) -> Reader:
 
 def _of_curves(name: str) -> Reader:
     def read(generation: Generation, fps: float) -> Mask:
-        curves = curves_of(generation.motion, generation.units, name)
+        curves = make_curves(generation.motion, generation.units, name)
         return _closed(_sampled(generation, curves, fps))
 
     return read
 
 
 def _of_take(generation: Generation, fps: float) -> Mask:
-    return _closed(in_format(Path("a.livelink.csv"), generation, generation, fps).motion)
+    return _closed(fit_to_format(Path("a.livelink.csv"), generation, generation, fps).motion)
 
 
 def _of_clip(generation: Generation, fps: float) -> Mask:
-    return _closed(in_format(Path("a.tres"), generation, generation, fps).motion)
+    return _closed(fit_to_format(Path("a.tres"), generation, generation, fps).motion)
 
 
 def _of_scene(character: DrivenCharacter) -> Reader:
@@ -180,7 +180,7 @@ def _of_head_scene(generation: Generation, fps: float) -> Mask:
 def _sampled(generation: Generation, curves: Motion, fps: float) -> Motion:
     """Return curves as files of another rate hold them."""
     whole = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
-    return resampled_curves(whole, generation, fps).motion
+    return resample_curves(whole, generation, fps).motion
 
 
 def _closed(curves: Motion) -> Mask:
@@ -231,14 +231,14 @@ def test_lips_touch_in_the_same_frames_everywhere(
     readers = _readers(characters)
     if kind != "generated":
         del readers["head scene"]  # takes longer
-    _check(delivered(KINDS[kind](), Delivery()), fps, readers)
+    _check(deliver(KINDS[kind](), Delivery()), fps, readers)
 
 
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_files_of_vowels_have_the_same_contact(kind: str, name: str, tmp_path: Path) -> None:
-    generation = delivered(KINDS[kind](), Delivery())
-    write_motion(tmp_path / name, in_format(Path(name), generation, generation, None), source={}, model={})
+    generation = deliver(KINDS[kind](), Delivery())
+    write_motion(tmp_path / name, fit_to_format(Path(name), generation, generation, None), source={}, model={})
     read, _ = read_motion(tmp_path / name)
     contact = spoken_mouth(with_mouth(generation.motion), generation.units, read.rate_hz).contact
     assert np.flatnonzero(_closed(read)[: len(contact)] != contact).tolist() == []
@@ -247,14 +247,14 @@ def test_files_of_vowels_have_the_same_contact(kind: str, name: str, tmp_path: P
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_at_all_rates(kind: str, characters: dict[str, DrivenCharacter]) -> None:
-    generation = delivered(KINDS[kind](), Delivery())
+    generation = deliver(KINDS[kind](), Delivery())
     for fps in RATES:
         _check(generation, fps, _readers(characters))
 
 
 def _closures_kept(kind: str, mood: str) -> Generation:
     """Return motion in a mood; every p, b and m closes the lips in it for as long as in none."""
-    generation, moody = (delivered(KINDS[kind](), Delivery(mood=name)) for name in ("", mood))
+    generation, moody = (deliver(KINDS[kind](), Delivery(mood=name)) for name in ("", mood))
     plain, mouth = (spoken_mouth(with_mouth(each.motion), each.units).contact for each in (generation, moody))
     time_s = generation.motion.time_s
     for span, closing in zip(generation.units, mark_closing_phones(generation.units), strict=True):

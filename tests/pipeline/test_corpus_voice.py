@@ -30,6 +30,7 @@ def test_a_recorded_sentence_is_said_by_its_recording(toy_corpus: Corpus, select
     name = toy_corpus.names()[0]
     utterance = toy_corpus.utterance(name)
     assert utterance.words
+    assert repr(selection_model.learned).startswith("SelectionModel(6 recordings, ")
     sound, generation = speak_from_corpus(" ".join(utterance.words), toy_corpus, selection_model)
     spoken = [span for span in generation.units if span.label.phone not in ("sil", "sp")]
     assert [span.label.phone for span in spoken] == [

@@ -12,8 +12,8 @@ from lipmotion import Model
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_to_arrays
 from lipmotion.motion.eigenlips import eigenlips_to_arrays
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
 from lipmotion.testing.toy import ToySentence
 from pipeline.damage import DAMAGES, LARGEST_DIFFERENCE, QUICK, UNREADABLE, animated, damaged, distance, refused
@@ -31,7 +31,7 @@ def quiet() -> Iterator[None]:
 
 def absurd(model: Model, sentence: ToySentence, damages: tuple[str, ...]) -> tuple[list[str], int, int]:
     """Return what gave absurd motion, or was not noticed; how much was refused, and how much was harmless."""
-    speech = understand(model, Request(sentence.audio, recogniser="own"))
+    speech = analyse(model, Request(sentence.audio, recogniser="own"))
     arrays = model.engine.to_arrays(model.learned)
     whole = animated(model, arrays, speech)
     assert whole is not None

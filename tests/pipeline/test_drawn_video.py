@@ -6,7 +6,7 @@ from lipmotion.kernels.compiler import numba_works
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, silent_monitor
 from lipmotion_faces.outputs.drawn_video import load_drawing, write_drawn_face
 from lipmotion_faces.portrait.planar import PlanarRasteriser
-from lipmotion_faces.registry import face_named
+from lipmotion_faces.registry import make_face
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def generation() -> Generation:
 
 def write(path, generation, **staging) -> None:
     sound = Audio(np.zeros(48_000 * 4 // 10, np.float32), 48_000)
-    face = face_named("woman")
+    face = make_face("woman")
     write_drawn_face(path, generation, sound, 25.0, face, Staging(size=64, **staging), silent_monitor)
 
 
@@ -51,5 +51,5 @@ def test_other_files_are_drawn_in_red_green_and_blue(tmp_path, generation, drawn
 
 @pytest.mark.skipif(not numba_works(), reason="numba is not installed")
 def test_what_draws_is_loaded_by_drawing(drawn_poses):
-    load_drawing(face_named("man"))
+    load_drawing(make_face("man"))
     assert len(drawn_poses) == 1

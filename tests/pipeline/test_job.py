@@ -14,8 +14,8 @@ import lipmotion
 from lipmotion import Delivery, Job, Outputs, Request, Staging, animate, load_model, write
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import write_labels
-from lipmotion.pipeline.request import located
-from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.analysis.read_request import read_request
+from lipmotion.pipeline.request import locate_paths
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Timeline
@@ -52,10 +52,10 @@ def test_paths_begin_at_the_folder_of_the_file(tmp_path: Path) -> None:
         "[outputs]\nfiles = ['out/', '{name}.vtt', '-']\nface = 'my.svg'\ncurves = 'arkit'\n"
     )
     (tmp_path / "head").mkdir()
-    assert located(Outputs(face="head/"), tmp_path).face == f"{tmp_path}/head"
-    assert located(Outputs(face="head"), tmp_path).face == "head"
+    assert locate_paths(Outputs(face="head/"), tmp_path).face == f"{tmp_path}/head"
+    assert locate_paths(Outputs(face="head"), tmp_path).face == "head"
     (tmp_path / "anna").mkdir()
-    assert located(Outputs(face="anna"), tmp_path).face == str(tmp_path / "anna")
+    assert locate_paths(Outputs(face="anna"), tmp_path).face == str(tmp_path / "anna")
     assert Job.from_file(file) == Job(
         Request(tmp_path / "takes", "my words", model=Path("/else/m.lipmotion")),
         Outputs((f"{tmp_path}/out/", f"{tmp_path}/{{name}}.vtt", "-"), face=str(tmp_path / "my.svg"), curves="arkit"),

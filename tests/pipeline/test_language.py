@@ -10,28 +10,33 @@ import pytest
 import lipmotion
 from lipmotion import Model, Request
 from lipmotion.errors import InputError
-from lipmotion.pipeline.request import request_of
-from lipmotion.pipeline.understand import language as told
-from lipmotion.pipeline.understand.language import in_language
-from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.analysis import language
+from lipmotion.pipeline.analysis.language import detect_english, resolve_language, warn_of_another_language
+from lipmotion.pipeline.analysis.read_request import read_request
+from lipmotion.pipeline.request import as_request
+from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE, LanguageLexicon
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine
+from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.units import Lexicon
 
-SILENCE = Audio(np.zeros(1600, np.float32), 16_000)
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SILENCE = Audio(np.zeros(16_000, np.float32), 16_000)
 USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
 
 
 def test_english_stays_as_it_is() -> None:
     request = Request(SILENCE, "two papas")
-    assert in_language(request) is request
+    assert resolve_language(request) is request
 
 
 def test_another_language_has_its_own_words_and_lexicon(tmp_path: Path) -> None:
     (tmp_path / "words.txt").write_text("¡Papa, 2!", encoding="utf-8")
     for transcript in ("¡Papa, 2!", tmp_path / "words.txt"):
-        request = in_language(read_request(Request(SILENCE, transcript, lexicon=USER, language="es"), is_typed=False))
+        request = resolve_language(
+            read_request(Request(SILENCE, transcript, lexicon=USER, language="es"), is_typed=False)
+        )
         assert isinstance(request.transcript, TimedTranscript)
         assert request.transcript.words == ("papa", "2")
         assert isinstance(request.lexicon, LanguageLexicon)
@@ -41,7 +46,9 @@ def test_another_language_has_its_own_words_and_lexicon(tmp_path: Path) -> None:
 def test_written_forms_in_subtitles_are_not_read_as_english() -> None:
     written = tuple(map(TimedWord, ("perro", "$20M", "&", "St.", "21")))
     user = Lexicon(dict.fromkeys(("perro", "20m", "st", "21"), (("m", "aa"),)))
-    request = in_language(Request(SILENCE, TimedTranscript((TranscriptLine(written),)), lexicon=user, language="es"))
+    request = resolve_language(
+        Request(SILENCE, TimedTranscript((TranscriptLine(written),)), lexicon=user, language="es")
+    )
     assert isinstance(request.transcript, TimedTranscript)
     assert request.transcript.words == ("perro", "20m", "st", "21")
     assert request.lexicon is not None
@@ -50,18 +57,18 @@ def test_written_forms_in_subtitles_are_not_read_as_english() -> None:
 
 def test_unknown_languages_are_refused() -> None:
     with pytest.raises(InputError, match="language is 'xx', required one of: en, es, fr, "):
-        request_of(SILENCE, language="xx")
+        as_request(SILENCE, language="xx")
     with pytest.raises(InputError, match="the language of the transcript is not known; give it, one of: en, es"):
-        in_language(Request(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
+        resolve_language(Request(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
 
 
 def test_auto_says_what_it_takes_the_speech_for(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert in_language(Request(SILENCE, "bin blue at f two now", language="auto")).language == "en"
-    for english, language in ((True, "en"), (False, "auto"), (None, "en")):
-        monkeypatch.setattr(told, "english_spoken", lambda _, english=english: english)
-        assert in_language(Request(SILENCE, language="auto")).language == language
+    assert resolve_language(Request(SILENCE, "bin blue at f two now", language="auto")).language == "en"
+    for english, expected in ((True, "en"), (False, "auto"), (None, "en")):
+        monkeypatch.setattr(language, "detect_english", lambda _, english=english: english)
+        assert resolve_language(Request(SILENCE, language="auto")).language == expected
     said = [record.getMessage().partition(";")[0] for record in caplog.records]
     assert said == [
         "the transcript is taken for English",
@@ -88,5 +95,29 @@ def test_mapped_phones_are_not_called_sure(toy_model: Model, toy_sentence: ToySe
 
 def test_the_option_reaches_the_request() -> None:
     assert read_request(Request("a.wav", language="ko")).language == "ko"
-    assert request_of(Request(SILENCE, language="ko"), language="fr").language == "fr"
-    assert request_of(Request(SILENCE, language="ko")).language == "ko"
+    assert as_request(Request(SILENCE, language="ko"), language="fr").language == "fr"
+    assert as_request(Request(SILENCE, language="ko")).language == "ko"
+
+
+def test_nothing_is_said_without_the_network_or_speech(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert detect_english(SILENCE) is None
+    monkeypatch.setattr(language, "installed_phone_recogniser", lambda: None)
+    assert detect_english(SILENCE) is None
+
+
+@pytest.mark.long
+def test_the_words_of_english_are_known() -> None:
+    pytest.importorskip("hama.asr")
+    welcome = read_audio(EXAMPLES / "welcome.flac").samples
+    assert detect_english(Audio(np.tile(welcome, 4), 16_000)) is True
+    assert detect_english(Audio(np.tile(welcome[::-1], 4), 16_000)) is not True
+
+
+@pytest.mark.parametrize(("confidence", "lasts_s", "warns"), [(0.2, 2.0, True), (0.85, 2.0, False), (0.2, 0.5, False)])
+def test_words_that_are_hardly_understood_are_told(
+    confidence: float, lasts_s: float, warns: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    words = Timeline((Span(0.0, lasts_s, RecognisedWord("hola", confidence)),))
+    warn_of_another_language(Recognition(Timeline(()), words, lasts_s, 0.0, None))
+    assert ("--language" in caplog.text) == warns
+    assert (f"confidence {confidence:.2f}" in caplog.text) == warns

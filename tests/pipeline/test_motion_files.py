@@ -18,8 +18,8 @@ from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_livin
 from lipmotion.meshes.model.bones import ANGLES as HEAD
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
-from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.pipeline.outputs.motion_files import in_format, thinned
+from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion.pipeline.outputs.motion_files import fit_to_format, thin_keys
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.moods import parse_moods
@@ -38,11 +38,11 @@ def generation() -> Generation:
 
 def test_plain_formats_hold_what_was_chosen(generation: Generation) -> None:
     chosen = generation.selected(["opening"])
-    assert in_format(Path("a.csv"), generation, chosen, None) is chosen
+    assert fit_to_format(Path("a.csv"), generation, chosen, None) is chosen
 
 
 def test_a_take_holds_a_whole_face_at_60_frames(generation: Generation) -> None:
-    held = in_format(TAKE, generation, generation.selected(["opening"]), None)
+    held = fit_to_format(TAKE, generation, generation.selected(["opening"]), None)
     assert held.motion.rate_hz == pytest.approx(60.0)
     assert set(ARKIT_MOUTH) < set(held.motion.names)
     assert {"eyeBlinkLeft", "browInnerUp", *HEAD} < set(held.motion.names)
@@ -50,8 +50,8 @@ def test_a_take_holds_a_whole_face_at_60_frames(generation: Generation) -> None:
 
 
 def test_a_take_shows_the_closures_of_the_motion(generation: Generation) -> None:
-    at_100 = curves_of(generation.motion, generation.units, "arkit")
-    held = in_format(TAKE, generation, generation, 12.0).motion
+    at_100 = make_curves(generation.motion, generation.units, "arkit")
+    held = fit_to_format(TAKE, generation, generation, 12.0).motion
     for start_s, end_s in ((0.46, 0.64), (0.86, 1.04)):
         slow, fast = (
             (each["jawOpen"] - each["mouthClose"])[(each.time_s >= start_s) & (each.time_s <= end_s)].min()
@@ -66,12 +66,12 @@ def test_blendshapes_that_the_motion_has_are_kept(generation: Generation) -> Non
     values = np.random.default_rng(2).random((frames, 4))
     given = Motion(values, 100.0, tuple(Channel(name, WEIGHT) for name in names))
     edited = replace(generation, motion=given, spread=np.zeros(values.shape), units=Timeline(()))
-    held = in_format(TAKE, edited, edited, 100.0).motion
+    held = fit_to_format(TAKE, edited, edited, 100.0).motion
     for column, name in enumerate(("jawOpen", "mouthSmileLeft", "eyeBlinkLeft")):
         assert held[name] == pytest.approx(values[:, column])
     assert "eyeBlinkRight" in held.names
     alone = edited.selected(["head.jawOpen", "mouthSmile_L"])
-    held = in_format(TAKE, alone, alone, 100.0).motion
+    held = fit_to_format(TAKE, alone, alone, 100.0).motion
     assert held.names[:2] == ("jawOpen", "mouthSmileLeft")
     assert {"eyeBlinkLeft", "browInnerUp", *HEAD} < set(held.names)
 
@@ -79,8 +79,8 @@ def test_blendshapes_that_the_motion_has_are_kept(generation: Generation) -> Non
 def test_the_script_takes_controls_that_were_asked_for(generation: Generation) -> None:
     control = Motion(np.zeros((201, 1)), 100.0, (Channel("Jaw.rotation.x", "control"),))
     chosen = replace(generation, motion=control, spread=np.zeros((201, 1)))
-    assert in_format(Path("a.blender.py"), generation, chosen, None).motion.names == ("Jaw.rotation.x",)
-    assert "jawOpen" in in_format(Path("a.blender.py"), generation, generation, None).motion.names
+    assert fit_to_format(Path("a.blender.py"), generation, chosen, None).motion.names == ("Jaw.rotation.x",)
+    assert "jawOpen" in fit_to_format(Path("a.blender.py"), generation, generation, None).motion.names
 
 
 def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> None:
@@ -145,7 +145,7 @@ def test_controls_of_a_rig_follow_brows_in_every_mood(generation: Generation, tm
     table = tmp_path / "rig.csv"
     table.write_text("control,source\nfrown,browDownLeft\ncheek,cheekSquintRight\n")
     plain, angry = (
-        curves_of(with_moods(generation.motion, parse_moods(mood)), generation.units, table) for mood in ("", "angry")
+        make_curves(with_moods(generation.motion, parse_moods(mood)), generation.units, table) for mood in ("", "angry")
     )
     assert not plain["frown"].any()
     assert angry["frown"].min() > 0.5
@@ -168,8 +168,8 @@ def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(
     assert sum(map(len, fewer)) < 0.5 * sum(map(len, plain))
     names = [line for line in fewer if "NodePath" in line]
     assert 5 < len(names) < sum("NodePath" in line for line in plain)
-    held = in_format(Path("a.tres"), generation, generation, None)
-    thin = thinned(held, Thinning(0.03, tuple(find_closed_times(held)))).motion
+    held = fit_to_format(Path("a.tres"), generation, generation, None)
+    thin = thin_keys(held, Thinning(0.03, tuple(find_closed_times(held)))).motion
     for name in thin.names:
         assert np.abs(thin[name] - held.motion[name]).max() < 0.0301
     assert all(held.motion[name].max() <= 0.03 for name in {*held.motion.names} - {*thin.names})

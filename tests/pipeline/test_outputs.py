@@ -14,7 +14,7 @@ from lipmotion.extensions import Registry
 from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.cues import CueOutput
 from lipmotion.pipeline.outputs.motion_files import MotionOutput
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, plan
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, create_outputs, plan
 from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Generation
@@ -30,7 +30,7 @@ class WordOutput(Output):
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: ARG003
         return (".words.csv",)
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:
+    def prepare(self, performance: Performance) -> Callable[[], None]:
         phones = [span.label.phone for span in performance.generation.units]
         if not phones:
             raise ExportError(f"{self.path}: no phones")
@@ -75,7 +75,7 @@ def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path
     with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
         plan("a.wav", replace(settings, sounded=False))
     with pytest.raises(InputError, match="the frame rate is 101"):
-        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, outputs=Outputs(fps=101.0)))
+        create_outputs([tmp_path / "a.cues.tsv"], replace(settings, outputs=Outputs(fps=101.0)))
 
 
 def test_cues_beside_other_outputs_are_those_of_the_function(result: Generation, tmp_path: Path) -> None:

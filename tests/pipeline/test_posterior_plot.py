@@ -9,9 +9,9 @@ from PIL import Image
 
 from lipmotion.pipeline.generate.posteriors import (
     COLOURS,
-    LEAST_COLUMNS,
     LEFT_PX,
-    MOST_COLUMNS,
+    MAX_COLUMNS,
+    MIN_COLUMNS,
     RIGHT_PX,
     ROW_PX,
     TITLE_PX,
@@ -85,16 +85,16 @@ def test_the_asynchrony_is_a_panel_of_its_own() -> None:
 
 
 def test_recordings_of_any_length() -> None:
-    for frames, columns in {1: LEAST_COLUMNS, 400: 800, 5_345: MOST_COLUMNS}.items():
+    for frames, columns in {1: MIN_COLUMNS, 400: 800, 5_345: MAX_COLUMNS}.items():
         picture = draw_posteriors(generated(frames), [posteriors("phone", halves(frames))])
         assert picture.width == LEFT_PX + columns + RIGHT_PX
 
 
 def test_a_column_of_a_long_recording_is_the_mean_of_its_frames() -> None:
-    probability = np.zeros((8 * MOST_COLUMNS, 1))
+    probability = np.zeros((8 * MAX_COLUMNS, 1))
     probability[::4] = 1
-    shown = pixels(draw_posteriors(generated(8 * MOST_COLUMNS), [posteriors("phone", probability)]))
-    row = shown[2 * TITLE_PX + ROW_PX // 2, LEFT_PX + 10 : LEFT_PX + MOST_COLUMNS // 2 - 10]
+    shown = pixels(draw_posteriors(generated(8 * MAX_COLUMNS), [posteriors("phone", probability)]))
+    row = shown[2 * TITLE_PX + ROW_PX // 2, LEFT_PX + 10 : LEFT_PX + MAX_COLUMNS // 2 - 10]
     assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.understand.read_request import text_or_file_content
+from lipmotion.pipeline.analysis.read_request import read_text_or_file
 from lipmotion.types import TimedTranscript
 
 
@@ -19,24 +19,24 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_text_is_itself() -> None:
     texts = ["hello there", "see p. 3", "", "α" * 3000, "a/b/c", "the file words.txt", "..", "\n"]
     for text in (*texts, "é" * 130, "é" * 130 + ".abc", "你好.世界", "a" * 300 + ".txt"):
-        assert text_or_file_content(text) == text
+        assert read_text_or_file(text) == text
 
 
 def test_a_file_is_its_content(here: Path) -> None:
     (here / "words").write_text("näh\n", encoding="utf-8-sig")
-    assert text_or_file_content("words") == "näh\n"
+    assert read_text_or_file("words") == "näh\n"
 
 
 def test_a_file_deep_in_folders(here: Path) -> None:
     deep = here / ("a" * 200) / ("b" * 200)
     deep.mkdir(parents=True)
     (deep / "words.txt").write_text("hello")
-    assert text_or_file_content(str(deep / "words.txt")) == "hello"
+    assert read_text_or_file(str(deep / "words.txt")) == "hello"
 
 
 def test_subtitles_keep_their_times(here: Path) -> None:
     (here / "words.srt").write_text("1\n00:00:01,000 --> 00:00:02,500\n<i>Hello</i> there\n")
-    transcript = text_or_file_content("words.srt")
+    transcript = read_text_or_file("words.srt")
     assert isinstance(transcript, TimedTranscript)
     assert transcript.words == ("hello", "there")
     assert (transcript.lines[0].start_s, transcript.lines[0].end_s) == pytest.approx((1.0, 2.5))
@@ -46,13 +46,13 @@ def test_a_name_in_a_folder_that_exists_is_no_text(here: Path) -> None:
     (here / "subs").mkdir()
     for name in ("subs/nofile", "./nofile", "../nofile", "subs/../nofile", "nofile.txt"):
         with pytest.raises(InputError, match=r"nofile(\.txt)?: no such transcript file"):
-            text_or_file_content(name)
-    assert text_or_file_content("either/or") == "either/or"
-    assert text_or_file_content("subs/ nofile") == "subs/ nofile"
-    assert text_or_file_content("x" * 5000 + "/a") == "x" * 5000 + "/a"
+            read_text_or_file(name)
+    assert read_text_or_file("either/or") == "either/or"
+    assert read_text_or_file("subs/ nofile") == "subs/ nofile"
+    assert read_text_or_file("x" * 5000 + "/a") == "x" * 5000 + "/a"
 
 
 def test_a_file_that_is_not_text(here: Path) -> None:
     (here / "words.txt").write_bytes(b"\x81\xfe")
     with pytest.raises(InputError, match=r"words.txt: not a readable UTF-8 transcript"):
-        text_or_file_content("words.txt")
+        read_text_or_file("words.txt")

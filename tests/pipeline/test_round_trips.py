@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, animate, cues, read_motion, speak, write
+from lipmotion.pipeline.analysis.read_request import read_units
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import read_units
-from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Generation, Span, StateTrace, Timeline, Unit
@@ -53,11 +53,11 @@ def test_phones_of_a_recording_say_what_is_known_of_them(
 ) -> None:
     transcript = " ".join(toy_sentence.words) if words else None
     request = Request(toy_sentence.audio, transcript=transcript, recogniser="own")
-    first = understand(toy_model, request)
+    first = analyse(toy_model, request)
     result = animate(request, model=toy_model)
     write(result, tmp_path / name)
     given = Request(toy_sentence.audio, units=read_units(tmp_path / name), recogniser="own")
-    again = understand(toy_model, given)
+    again = analyse(toy_model, given)
     assert (
         (again.units_known, again.confidence)
         == (first.units_known, first.confidence)
@@ -81,7 +81,7 @@ def test_corrected_phones_are_known_and_all_others_as_doubtful_as_before(
     spans[at + 1] = replace(spans[at + 1], start_s=border_s)
     edited = tmp_path / f"b{Path(name).suffix}"
     write_as_edited(edited, Timeline(tuple(spans)), found, generation)
-    speech = understand(toy_model, Request(toy_sentence.audio, units=read_units(edited)))
+    speech = analyse(toy_model, Request(toy_sentence.audio, units=read_units(edited)))
     assert [span.label.confidence for span in speech.units].count(None) == 2
     confidence = np.asarray(speech.confidence)
     known = np.flatnonzero(confidence == 1) / 100

@@ -24,13 +24,7 @@ from lipmotion.types.moods import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
-from lipmotion_faces.outputs.scenes import (
-    SceneOutput,
-    character_scene,
-    delivered_scene,
-    head_scene,
-    write_scene,
-)
+from lipmotion_faces.outputs.scenes import SceneOutput, character_scene, delivered_scene, head_scene, write_scene
 from lipmotion_faces.outputs.shown_faces import shown_face
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units

@@ -144,7 +144,7 @@ def test_neighbouring_silences_are_one_and_short_ones_are_pauses() -> None:
         Span(0.8, 1.0, Unit("sil")),
         Span(1.05, 1.2, Unit("p")),
     ]
-    joined = [(span.label.phone, span.start_s, span.end_s) for span in module._joined(spans, 1.5)]
+    joined = [(span.label.phone, span.start_s, span.end_s) for span in module._join_silences(spans, 1.5)]
     assert joined == [
         ("sil", 0.0, 0.3),
         ("aa", 0.3, 0.5),

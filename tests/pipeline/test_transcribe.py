@@ -7,8 +7,8 @@ import pytest
 
 from lipmotion import Model, load_model
 from lipmotion.errors import AlignmentError
-from lipmotion.pipeline.understand.transcribe import (
-    MOST_WARNINGS,
+from lipmotion.pipeline.analysis.transcribe import (
+    MAX_WARNINGS,
     Transcription,
     transcribe,
     warn_of_guesses,
@@ -89,7 +89,7 @@ def test_a_transcript_of_something_else_is_doubted(
     if network and installed_phone_recogniser() is None:
         pytest.skip("no phone recogniser is installed")
     if not network:
-        monkeypatch.setattr("lipmotion.pipeline.understand.transcribe.network_of", lambda _: None)
+        monkeypatch.setattr("lipmotion.pipeline.analysis.transcribe.network_of", lambda _: None)
     phones = Recogniser(toy_model.phones, "auto")
     recognised = lambda: phones.recognise(audio, features)  # noqa: E731
     units, _ = transcribe(phones, audio, features, WRONG, Lexicon(), recognised)
@@ -222,9 +222,9 @@ def test_a_long_word_is_not_repeated_in_full(caplog: pytest.LogCaptureFixture) -
 
 @pytest.mark.usefixtures("rules")
 def test_of_many_guesses_some_are_reported_one_by_one(caplog: pytest.LogCaptureFixture) -> None:
-    warn_of_guesses([f"bimab{'ab' * i}" for i in range(MOST_WARNINGS + 7)], Lexicon())
+    warn_of_guesses([f"bimab{'ab' * i}" for i in range(MAX_WARNINGS + 7)], Lexicon())
     *each, last = [record.getMessage() for record in caplog.records]
-    assert len(each) == MOST_WARNINGS
+    assert len(each) == MAX_WARNINGS
     assert last == "7 more words are not in the dictionary; a lexicon file can say better"
 
 

@@ -10,17 +10,7 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import (
-    Corpus,
-    Model,
-    animate,
-    explain,
-    load_model,
-    map_onto,
-    save_model,
-    train,
-    with_person,
-)
+from lipmotion import Corpus, Model, animate, explain, load_model, map_onto, save_model, train, with_person
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig

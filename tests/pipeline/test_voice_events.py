@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, animate
-from lipmotion.articulation.pauses import LAUGH_GAP
-from lipmotion.pipeline.outputs.delivered import delivered
+from lipmotion.articulation.rest import LAUGH_GAP
+from lipmotion.pipeline.outputs.deliver import deliver
 from lipmotion.pipeline.request import Request
 from lipmotion.types import Delivery
 from lipmotion.types.voice_event import LAUGHTER
@@ -29,10 +29,10 @@ def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with
     opening = laughing.motion["opening"]
     loudest_s = max(event.calls, key=lambda call: call[1])[0]
     assert opening[round(loudest_s * 100)] == pytest.approx(LAUGH_GAP, rel=0.1)
-    happy = delivered(laughing, Delivery()).motion["mood_happy"]
+    happy = deliver(laughing, Delivery()).motion["mood_happy"]
     assert happy[round(loudest_s * 100)] > 0.7
     assert not happy[:150].any()
-    assert "mood_happy" not in delivered(laughing, Delivery(mood="neutral")).motion.names
+    assert "mood_happy" not in deliver(laughing, Delivery(mood="neutral")).motion.names
 
 
 def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(toy_model: Model, request_with_laughter: Request):

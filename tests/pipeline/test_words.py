@@ -7,9 +7,9 @@ import pytest
 
 from lipmotion import animate, load_model
 from lipmotion.errors import ExportError
+from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech
+from lipmotion.pipeline.analysis.words import format_words, recognise_words, write_words
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.understood_speech import understand, understood_speech
-from lipmotion.pipeline.understand.words import recognise_words, words_as_text, write_words
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.types import Span, Timeline, Unit
 
@@ -30,8 +30,8 @@ def found() -> Recognition:
 
 
 def test_long_pauses_end_a_line() -> None:
-    assert words_as_text(words((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))) == "oh no\nyes\n"
-    assert words_as_text(words()) == ""
+    assert format_words(words((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))) == "oh no\nyes\n"
+    assert format_words(words()) == ""
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".JSON"])
@@ -70,14 +70,14 @@ def test_files_that_cannot_be_written(found: Recognition, tmp_path: Path) -> Non
 
 def test_speech_is_as_reliable_as_its_words(found: Recognition) -> None:
     request, model = Request(WELCOME), load_model()
-    understood = understood_speech(model, request)
+    understood = analyse_speech(model, request)
     assert understood.recognition is not None
     assert understood.recognition.units == found.units
     assert understood.speech.confidence == pytest.approx(found.reliability)
-    assert understood.speech.units == understand(model, request).units
-    given = understood_speech(model, Request(WELCOME, transcript="please speak"))
+    assert understood.speech.units == analyse(model, request).units
+    given = analyse_speech(model, Request(WELCOME, transcript="please speak"))
     assert given.recognition is None
-    assert understand(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
+    assert analyse(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
 
 
 @pytest.mark.long

@@ -19,10 +19,11 @@ from lipmotion.speech.sound.voice_activity import (
     PASSAGE_MARGIN,
     SAME_LEVEL,
     Stretch,
+    apply_gain,
     fill_gaps,
     find_passages,
     find_tones,
-    level_passage,
+    passage_gain,
     stretches_of_sound,
 )
 from lipmotion.testing.toy import toy_sentences
@@ -211,6 +212,12 @@ def test_what_is_no_voice_is_no_passage(sound: NDArray[np.float64], units: float
     assert passages(around, sound.astype(np.float32), around) == []
 
 
+def level_passage(samples: Samples) -> Samples:
+    """Return a passage at the level of all passages."""
+    gain = passage_gain(log_energy(samples))
+    return apply_gain(samples, np.arange(len(gain)), gain)
+
+
 def loudness_db(samples: Samples, seconds: slice) -> float:
     """Return the level of the loudest quarter of a second in some seconds of a recording."""
     level = average_power(log_energy(samples)) - np.log(WINDOW)
@@ -220,7 +227,7 @@ def loudness_db(samples: Samples, seconds: slice) -> float:
 @pytest.mark.parametrize("decibels", [0, -40])
 def test_a_passage_has_one_gain_and_the_level_of_all(decibels: float) -> None:
     samples = louder(spoken(0), decibels)
-    levelled = level_passage(samples, log_energy(samples))
+    levelled = level_passage(samples)
     heard = np.abs(samples) > np.abs(samples).max() / 100
     assert np.ptp(levelled[heard] / samples[heard]) < 1e-3 * np.mean(levelled[heard] / samples[heard])
     assert loudness_db(levelled, slice(0, 9)) == pytest.approx(20 * np.log10(SAME_LEVEL), abs=0.1)
@@ -231,7 +238,7 @@ def test_a_voice_that_becomes_softer_is_raised() -> None:
     samples = np.concatenate([spoken(number)[40 * HOP : 240 * HOP] for number in range(4)])
     fall_db = np.interp(np.arange(len(samples)) / RATE_HZ, [2, 4], [0, 28])
     falling = (samples * 10 ** (-fall_db / 20)).astype(np.float32)
-    levelled = level_passage(falling, log_energy(falling))
+    levelled = level_passage(falling)
     start, last = slice(0, 2), slice(5, 7)
     assert loudness_db(levelled, start) == pytest.approx(20 * np.log10(SAME_LEVEL), abs=0.1)
     assert loudness_db(falling, start) - loudness_db(falling, last) > 24

@@ -12,7 +12,7 @@ from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.word_decoder import FoundWord
-from lipmotion.speech.recognition.word_search import confidence_of
+from lipmotion.speech.recognition.word_search import score_words
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent
@@ -70,12 +70,12 @@ def test_other_kinds_do_not_search_for_words(welcome: Audio, kind: str, monkeypa
 
 
 def test_confidences_grow_with_fit_and_posterior() -> None:
-    by_fit = [confidence_of(fit, 0.5) for fit in np.linspace(-40, 5, 100)]
-    by_posterior = [confidence_of(-0.5, share) for share in np.linspace(0, 1, 100)]
+    by_fit = [score_words(fit, 0.5) for fit in np.linspace(-40, 5, 100)]
+    by_posterior = [score_words(-0.5, share) for share in np.linspace(0, 1, 100)]
     assert by_fit == sorted(by_fit)
     assert by_posterior == sorted(by_posterior)
-    assert 0 <= confidence_of(-99, 0) < 0.1
-    assert 0.7 < confidence_of(0, 1) <= 1
+    assert 0 <= score_words(-99, 0) < 0.1
+    assert 0.7 < score_words(0, 1) <= 1
 
 
 def recognise_as(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:

@@ -13,8 +13,8 @@ from lipmotion.storage.coded_video import (
     decode_pictures,
     encode_pictures,
     encode_video,
-    stored_video_arrays,
     stored_video_from_arrays,
+    stored_video_to_arrays,
 )
 
 
@@ -80,7 +80,7 @@ def test_a_smaller_factor_is_better():
 
 def test_an_archive_holds_it(stored, tmp_path: Path):
     path = tmp_path / "a.face"
-    write_archive(path, {}, stored_video_arrays(stored))
+    write_archive(path, {}, stored_video_to_arrays(stored))
     read = stored_video_from_arrays(read_archive(path))
     assert (read.rate_hz, read.size, read.count) == (25.0, (48, 64), 21)
     np.testing.assert_array_equal(next(read.frames([9])), next(stored.frames([9])))
@@ -153,7 +153,7 @@ class TestDamage:
             list(replace(stored, size=(40, 64)).frames([0]))
 
     def test_arrays_of_wrong_kinds(self, stored):
-        arrays = stored_video_arrays(stored)
+        arrays = stored_video_to_arrays(stored)
         for wrong in (
             {name: value for name, value in arrays.items() if name != "size"},
             arrays | {"more": np.zeros(3)},
@@ -168,6 +168,6 @@ class TestDamage:
         from lipmotion.storage import coded_video
 
         data = encode_pictures(film(4))
-        monkeypatch.setattr(coded_video, "MOST_PICTURE_BYTES", 4 * 48 * 64 * 3 - 1)
+        monkeypatch.setattr(coded_video, "MAX_PICTURE_BYTES", 4 * 48 * 64 * 3 - 1)
         with pytest.raises(ModelFormatError, match="4 pictures of 9216 bytes"):
             decode_pictures(data)

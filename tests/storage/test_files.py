@@ -16,15 +16,15 @@ from lipmotion.storage import files
 from lipmotion.storage.files import (
     LOCK,
     TEMPORARY,
+    atomic_file,
+    atomic_folder,
     check_distinct,
     check_target,
-    confined,
-    locked,
+    confine,
+    lock_folder,
     portable_name,
     remove_unfinished,
     unfinished_work,
-    whole_file,
-    whole_folder,
 )
 
 Context = Callable[[Path], AbstractContextManager[Path]]
@@ -37,7 +37,7 @@ def names(folder: Path) -> list[str]:
 
 def test_a_file_appears_when_it_is_whole(tmp_path: Path) -> None:
     target = tmp_path / "motion.json"
-    with whole_file(target) as unfinished:
+    with atomic_file(target) as unfinished:
         unfinished.write_text("half")
         assert not target.exists()
         assert unfinished.suffix == target.suffix
@@ -57,15 +57,15 @@ def test_an_old_file_stays_until_the_new_one_is_whole(tmp_path: Path) -> None:
     target = tmp_path / "motion.json"
     target.write_text("old")
     with pytest.raises(RuntimeError):
-        fail(whole_file(target), RuntimeError())
+        fail(atomic_file(target), RuntimeError())
     assert target.read_text() == "old"
     assert names(tmp_path) == ["motion.json"]
-    with whole_file(target) as unfinished:
+    with atomic_file(target) as unfinished:
         unfinished.write_text("new")
     assert target.read_text() == "new"
 
 
-@pytest.mark.parametrize("context", [whole_file, whole_folder])
+@pytest.mark.parametrize("context", [atomic_file, atomic_folder])
 @pytest.mark.parametrize("error", [RuntimeError(), KeyboardInterrupt()])
 def test_a_failure_leaves_nothing(tmp_path: Path, context: Context, error: BaseException) -> None:
     with pytest.raises(type(error)):
@@ -73,7 +73,7 @@ def test_a_failure_leaves_nothing(tmp_path: Path, context: Context, error: BaseE
     assert names(tmp_path) == []
 
 
-@pytest.mark.parametrize("context", [whole_file, whole_folder])
+@pytest.mark.parametrize("context", [atomic_file, atomic_folder])
 def test_what_the_system_refuses_is_an_export_error(tmp_path: Path, context: Context) -> None:
     with pytest.raises(ExportError, match=r"one: cannot be written: No space left"):
         fail(context(tmp_path / "one"), OSError(28, "No space left on device"))
@@ -81,7 +81,7 @@ def test_what_the_system_refuses_is_an_export_error(tmp_path: Path, context: Con
 
 
 def test_writers_do_not_share_a_temporary_name(tmp_path: Path) -> None:
-    with whole_file(tmp_path / "a.json") as one, whole_file(tmp_path / "a.json") as two:
+    with atomic_file(tmp_path / "a.json") as one, atomic_file(tmp_path / "a.json") as two:
         assert one != two
         one.touch()
         two.touch()
@@ -90,14 +90,14 @@ def test_writers_do_not_share_a_temporary_name(tmp_path: Path) -> None:
 def test_a_longer_name_is_refused_in_words(tmp_path: Path) -> None:
     with (
         pytest.raises(ExportError, match="cannot be written: File name too long"),
-        whole_file(tmp_path / TOO_LONG) as new,
+        atomic_file(tmp_path / TOO_LONG) as new,
     ):
         new.touch()
     assert names(tmp_path) == []
 
 
 def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
-    with whole_folder(tmp_path / "one") as unfinished:
+    with atomic_folder(tmp_path / "one") as unfinished:
         (unfinished / "entry.json").touch()
         assert not (tmp_path / "one").exists()
     assert names(tmp_path / "one") == ["entry.json"]
@@ -107,13 +107,13 @@ def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
 def test_a_folder_does_not_replace_one_that_holds_something(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "one" / "precious").touch()
-    with pytest.raises(ExportError, match="one: cannot be written"), whole_folder(tmp_path / "one"):
+    with pytest.raises(ExportError, match="one: cannot be written"), atomic_folder(tmp_path / "one"):
         pass
     assert names(tmp_path) == ["one"]
     assert names(tmp_path / "one") == ["precious"]
 
 
-@pytest.mark.parametrize("context", [whole_file, whole_folder])
+@pytest.mark.parametrize("context", [atomic_file, atomic_folder])
 def test_the_parent_must_exist(tmp_path: Path, context: Context) -> None:
     with (
         pytest.raises(ExportError, match=r"missing does not exist; create it first"),
@@ -147,18 +147,18 @@ def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_pat
     target = tmp_path / "motion.json"
     program = (
         "import os, pathlib, sys\n"
-        "from lipmotion.storage.files import whole_file\n"
-        "with whole_file(pathlib.Path(sys.argv[1])) as unfinished:\n"
+        "from lipmotion.storage.files import atomic_file\n"
+        "with atomic_file(pathlib.Path(sys.argv[1])) as unfinished:\n"
         "    unfinished.write_text('half')\n"
         "    os._exit(1)\n"
     )
     run_child([sys.executable, "-c", program, target])
     assert len(names(tmp_path)) == 1
-    with whole_file(tmp_path / "other.json") as other, whole_file(target) as mine:
+    with atomic_file(tmp_path / "other.json") as other, atomic_file(target) as mine:
         assert len(names(tmp_path)) == 0
         other.touch()
         mine.touch()
-        with whole_file(target) as same:  # the file of a running process is not removed
+        with atomic_file(target) as same:  # the file of a running process is not removed
             same.touch()
         assert mine.exists()
     assert names(tmp_path) == ["motion.json", "other.json"]
@@ -166,8 +166,8 @@ def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_pat
 
 HOLD = (
     "import pathlib, sys\n"
-    "from lipmotion.storage.files import locked\n"
-    "with locked(pathlib.Path(sys.argv[1])):\n"
+    "from lipmotion.storage.files import lock_folder\n"
+    "with lock_folder(pathlib.Path(sys.argv[1])):\n"
     "    print('held', flush=True)\n"
     "    sys.stdin.read()\n"
 )
@@ -179,18 +179,18 @@ def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_pat
         assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         with pytest.raises(ExportError, match=rf"work: another lipmotion \(process {process.pid}\) is at work on it"):
-            locked(folder).__enter__()
+            lock_folder(folder).__enter__()
         process.kill()
         process.wait()
     assert names(folder) == [LOCK]  # the file stays, but is not locked
-    with locked(folder):
+    with lock_folder(folder):
         assert (folder / LOCK).read_text() == str(os.getpid())
     assert names(folder) == []
 
 
 def test_a_folder_that_cannot_be_made_is_an_export_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(ExportError, match="file: is a file; give the name of a new"), locked(tmp_path / "file"):
+    with pytest.raises(ExportError, match="file: is a file; give the name of a new"), lock_folder(tmp_path / "file"):
         raise AssertionError
 
 
@@ -228,7 +228,7 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
     for name, target in (("a.json", "there/b.json"), ("c.json", "a.json")):
         (tmp_path / name).symlink_to(target)
     for name in ("c.json", "a.json"):
-        with whole_file(tmp_path / name) as unfinished:
+        with atomic_file(tmp_path / name) as unfinished:
             assert unfinished.parent == (tmp_path / "there").resolve()
             unfinished.write_text(name)
         assert (tmp_path / "there" / "b.json").read_text() == name
@@ -240,7 +240,7 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
 def test_a_link_is_replaced_where_it_must_not_lead_away(tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("old")
     (tmp_path / "corpus.json").symlink_to("precious")
-    with confined(tmp_path), whole_file(tmp_path / "corpus.json") as unfinished:
+    with confine(tmp_path), atomic_file(tmp_path / "corpus.json") as unfinished:
         unfinished.write_text("new")
     assert not (tmp_path / "corpus.json").is_symlink()
     assert (tmp_path / "precious").read_text() == "old"
@@ -252,7 +252,7 @@ def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
     for name, words in (("loop", "leads back to itself"), ("away", "the folder .*missing does not exist")):
         with pytest.raises(ExportError, match=words):
             check_target(tmp_path / name)
-        with pytest.raises(ExportError, match=words), whole_file(tmp_path / name):
+        with pytest.raises(ExportError, match=words), atomic_file(tmp_path / name):
             raise AssertionError
     assert names(tmp_path) == ["away", "loop"]
 
@@ -277,8 +277,7 @@ def test_two_outputs_that_are_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["CON", "nul", "Aux.wav", "prn.tar.gz", "com1", "LPT9.csv", "COM\u00b2", "conin$", "NUL .txt", "a.", "a "],
+    "name", ["CON", "nul", "Aux.wav", "prn.tar.gz", "com1", "LPT9.csv", "COM\u00b2", "conin$", "NUL .txt", "a.", "a "]
 )
 def test_a_name_that_windows_does_not_take_gets_another_one(name: str) -> None:
     assert portable_name(name) != name
@@ -307,7 +306,7 @@ def interrupted(folder: Path, step: int) -> bool:
     before = sys.gettrace()
     sys.settrace(trace)
     try:
-        with locked(folder):
+        with lock_folder(folder):
             pass
     except KeyboardInterrupt:
         return True

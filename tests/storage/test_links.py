@@ -13,21 +13,21 @@ import pytest
 
 from lipmotion import Corpus
 from lipmotion.errors import ExportError, LipMotionError
-from lipmotion.pipeline.batch.ledger import Place, opened_ledger
+from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.files import (
     LOCK,
     TEMPORARY,
-    confined,
-    locked,
+    atomic_file,
+    atomic_folder,
+    confine,
+    lock_folder,
     make_folder,
     open_own,
     remove,
     remove_unfinished,
     temporary_folder,
     unfinished_work,
-    whole_file,
-    whole_folder,
 )
 from lipmotion.testing import toy_utterances
 from lipmotion_faces.corpus.sync import sync
@@ -89,7 +89,7 @@ def sync_corpus(folder: Path) -> None:
 
 
 def begin_batch(folder: Path) -> None:
-    with opened_ledger(Place(str(folder), "1"), []):
+    with open_ledger(Place(str(folder), "1"), []):
         pass
 
 
@@ -138,13 +138,13 @@ def test_no_verb_follows_a_link_in_a_folder_of_a_stranger(tmp_path: Path, verb: 
         assert content_of(outside) == before, aim
 
 
-@pytest.mark.parametrize("write", [whole_file, whole_folder])
+@pytest.mark.parametrize("write", [atomic_file, atomic_folder])
 def test_a_confined_folder_may_be_a_link_itself(
     tmp_path: Path, write: Callable[[Path], AbstractContextManager[Path]]
 ) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "given").symlink_to("there")
-    with locked(tmp_path / "given"):
+    with lock_folder(tmp_path / "given"):
         make_folder(tmp_path / "given" / "a" / "b")
         with write(tmp_path / "given" / "a" / "b" / "c") as new:
             new.touch()
@@ -157,7 +157,7 @@ def test_what_is_removed_is_not_behind_a_link(tmp_path: Path) -> None:
     (tmp_path / "given").mkdir()
     for name, aim in (("one", outside), ("two", outside / "folder")):
         (tmp_path / "given" / name).symlink_to(aim)
-    with confined(tmp_path / "given"):
+    with confine(tmp_path / "given"):
         remove(tmp_path / "given" / "one" / "file")
         remove_unfinished(tmp_path / "given" / "one")
         remove(tmp_path / "given" / "two")

@@ -8,8 +8,8 @@ from lipmotion.storage.schema import (
     NEGATIVE,
     POSITIVE,
     ArraySpec,
+    check_arrays,
     check_index,
-    checked_arrays,
     refuse_undeclared,
 )
 
@@ -38,14 +38,14 @@ def good() -> dict[str, np.ndarray]:
 
 
 def test_arrays_become_what_the_table_says() -> None:
-    found = checked_arrays(good(), TABLE)
+    found = check_arrays(good(), TABLE)
     assert found.sizes == {"G": 4, "D": 2, "n": 0}
     assert {name: found[name].dtype.kind for name in found.arrays} == dict.fromkeys(TABLE.keys() - {"weights"}) | {
         "means": "f", "variances": "f", "log_weights": "f", "share": "f", "log_stay": "f", "rows": "i", "names": "U",
     }  # fmt: skip
     assert (found["means"].dtype, found["share"].dtype, found["rows"].dtype) == (np.float32, np.float64, np.int32)
     assert np.array_equal(found["means"], good()["means"])
-    assert checked_arrays(good() | {"weights": np.array([1, 2])}, TABLE)["weights"].tolist() == [1.0, 2.0]
+    assert check_arrays(good() | {"weights": np.array([1, 2])}, TABLE)["weights"].tolist() == [1.0, 2.0]
 
 
 def put(name: str, value: float) -> dict[str, np.ndarray]:
@@ -81,25 +81,25 @@ def test_what_is_refused() -> None:
         ({"rows": np.array([2**63], np.uint64)}, "rows holds"),
     ):
         with pytest.raises(ValueError, match=says) as caught:
-            checked_arrays(good() | changes, TABLE)
+            check_arrays(good() | changes, TABLE)
         assert "\n" not in str(caught.value)
 
 
 def test_a_missing_array_is_named() -> None:
     for name in sorted(TABLE.keys() - {"weights"}):
         with pytest.raises(KeyError, match=f"{name} is missing"):
-            checked_arrays({key: array for key, array in good().items() if key != name}, TABLE)
+            check_arrays({key: array for key, array in good().items() if key != name}, TABLE)
 
 
 def test_known_sizes_hold() -> None:
-    assert checked_arrays(good(), TABLE, G=4).sizes["G"] == 4
+    assert check_arrays(good(), TABLE, G=4).sizes["G"] == 4
     with pytest.raises(ValueError, match=r"required \(5, 3, D\)"):
-        checked_arrays(good(), TABLE, G=5)
+        check_arrays(good(), TABLE, G=5)
 
 
 def test_the_smallest_numbers_of_half_precision_are_more_than_0() -> None:
     tiny = np.full((4, 3, 2), np.float16(6e-8))
-    assert (checked_arrays(good() | {"variances": tiny}, TABLE)["variances"] > 0).all()
+    assert (check_arrays(good() | {"variances": tiny}, TABLE)["variances"] > 0).all()
 
 
 def test_arrays_that_no_table_has() -> None:

@@ -13,7 +13,7 @@ from threading import Event, Thread
 from typing import Any, NamedTuple
 
 from children import LIMIT_S, LIPMOTION, Child, child
-from lipmotion.pipeline.edits import Step, step_of
+from lipmotion.pipeline.edits import Step, parse_step
 from lipmotion_studio.requests import TOKEN_HEADER
 from study.served import NO_REPLY
 
@@ -129,7 +129,7 @@ class Editor:
             status, reply = server.ask("/api/lines/1/undo", {"revision": state["revision"]})
         else:
             step = random_edit(self._chance, state)
-            self.sent = [*state["steps"], str(step_of(step))]  # as it is written
+            self.sent = [*state["steps"], str(parse_step(step))]  # as it is written
             status, reply = server.ask("/api/lines/1/edits", {"revision": state["revision"], "steps": [step]})
         if status == 200:
             self.steps = reply["steps"]
@@ -208,7 +208,7 @@ def undone_edits(
                 refused += 1
             else:
                 edits, state = edits + 1, after
-                kinds.add(type(step_of(step)))
+                kinds.add(type(parse_step(step)))
         last = _bytes_of(server)
         server.kill()
     with served(project, errors, model, limit_s) as server:

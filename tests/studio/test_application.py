@@ -170,7 +170,7 @@ def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(
     assert studio.ask("/api/lines/1/settle", {"revision": state["revision"] + 1}).status == 409
     state = studio.ask("/api/lines/1/settle", {"revision": state["revision"]}).content
     assert state["settled"]
-    whole = work.recording.session.generated(work.recording.file.edits).motion.values
+    whole = work.recording.session.generate(work.recording.file.edits).motion.values
     found = np.frombuffer(studio.ask("/api/lines/1/motion").body, "<f4").reshape(whole.shape)
     assert found == pytest.approx(whole, abs=1e-6)
 

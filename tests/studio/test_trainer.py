@@ -194,7 +194,7 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypa
     folder, now_s, (pipe, tells) = ProjectFolder(tmp_path), [0.0], Pipe(duplex=False)
     folder.change(lambda project: replace(project, recordings="."))
     process = SimpleNamespace(join=lambda: None, kill=tells.close)
-    monkeypatch.setattr("lipmotion_studio.trainer.begun_apart", lambda *_: (process, pipe))
+    monkeypatch.setattr("lipmotion_studio.trainer.start_process", lambda *_: (process, pipe))
     trainer = Trainer(folder, lambda: now_s[0])
     trainer.begin("voice", "me", [], VoiceOptions())
 

@@ -18,7 +18,7 @@ from lipmotion.motion import (
     learned_motion_to_arrays,
     with_unit_names,
 )
-from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.testing import ENGINE_CHECKS, ContractError, TrainedEngine, check_engine
 from lipmotion.types import Configuration, Generation, Rule, StateTrace, option
 
@@ -43,7 +43,7 @@ class MeanPoses(Engine[Any]):
         overall = np.concatenate([x[e.valid] for e, x in zip(examples, values, strict=True)]).mean(axis=0)
         sums, counts = np.tile(overall, (256, 1)), np.ones(256)
         for one, x in zip(examples, values, strict=True):
-            rows = phones_of(one.speech)
+            rows = label_phones(one.speech)
             np.add.at(sums, rows[one.valid], x[one.valid])
             np.add.at(counts, rows[one.valid], 1)
         return Fit((motion, sums / counts[:, None]), {})
@@ -51,7 +51,7 @@ class MeanPoses(Engine[Any]):
     def generate(self, model: Any, speech: Any, constraints: Any = None) -> Generation:
         motion, poses = model
         means = np.zeros((len(speech.features.values), 3, poses.shape[1]))
-        means[:, 0] = poses[phones_of(speech)]
+        means[:, 0] = poses[label_phones(speech)]
         precisions = np.broadcast_to(np.array([1e3, 1e4, 1e4])[None, :, None], means.shape)
         values, variance = motion.generate(lambda x: (means[x], precisions[x]), len(means), speech.units, constraints)
         trace = StateTrace(("pose",), np.zeros(len(means), int))
@@ -64,11 +64,11 @@ class MeanPoses(Engine[Any]):
         motion = learned_motion_from_arrays(arrays)
         with format_errors("the model"):
             refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, MEANS)
-            means = checked_arrays(arrays, MEANS, N=256, Q=motion.space.dimensions)["means"]
+            means = check_arrays(arrays, MEANS, N=256, Q=motion.space.dimensions)["means"]
         return motion, means
 
 
-def phones_of(speech: Any) -> Any:
+def label_phones(speech: Any) -> Any:
     """Return a number for the phone of every frame."""
     time_s, rows = np.arange(len(speech.features.values)) / 100, np.zeros(len(speech.features.values), int)
     for span in speech.units:

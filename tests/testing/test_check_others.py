@@ -13,7 +13,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.formats.base import MOTION_FORMATS, MotionFormat
 from lipmotion.testing import ContractError, check_exporter
-from lipmotion_faces import Face, face_named
+from lipmotion_faces import Face, make_face
 from lipmotion_faces.testing import check_face
 
 
@@ -41,7 +41,7 @@ def draw(frames: Callable[[list[Any]], list[Any]], *, checked: bool = True) -> F
 
 def test_faces_that_keep_the_contract() -> None:
     check_face(Bars())
-    check_face(face_named("portrait"))
+    check_face(make_face("portrait"))
 
 
 def test_faces_that_break_it() -> None:

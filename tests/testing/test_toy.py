@@ -12,15 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion import Lexicon
 from lipmotion.errors import ExportError, InputError
-from lipmotion.testing.toy import (
-    LIP_LEAD_S,
-    LIPS_TOUCH,
-    WORDS,
-    ToySentence,
-    toy_motion,
-    toy_sentences,
-    toy_utterances,
-)
+from lipmotion.testing.toy import LIP_LEAD_S, LIPS_TOUCH, WORDS, ToySentence, toy_motion, toy_sentences, toy_utterances
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units.phones import SILENCE
 from lipmotion_faces.testing import write_toy_recordings

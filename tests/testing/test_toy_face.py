@@ -10,14 +10,7 @@ from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
 from lipmotion_faces.appearance.lower_face import CORNER, region_map
 from lipmotion_faces.appearance.placing import cut
-from testing.toy_face import (
-    toy_chin_px,
-    toy_face,
-    toy_footage_pictures,
-    toy_frames,
-    toy_lower_faces,
-    toy_places,
-)
+from testing.toy_face import toy_chin_px, toy_face, toy_footage_pictures, toy_frames, toy_lower_faces, toy_places
 
 
 @pytest.fixture(scope="module")

@@ -69,4 +69,4 @@ def script(monkeypatch: pytest.MonkeyPatch, answers: Sequence[NDArray[np.float64
         def boxes(self) -> NoFinder:
             return NoFinder()
 
-    monkeypatch.setattr(follow, "tracker_named", lambda _: Scripted())
+    monkeypatch.setattr(follow, "make_tracker", lambda _: Scripted())

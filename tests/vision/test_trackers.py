@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -9,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from children import run_child
 from lipmotion import prepare
-from lipmotion.errors import InputError
-from lipmotion.extensions import GROUPS
-from lipmotion_faces.tracking.mediapipe import FaceFinder, MediaPipe
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.extensions import GROUPS, install_command
+from lipmotion_faces.tracking.mediapipe import FaceFinder, FaceMesh, MediaPipe, quiet_stderr
+from lipmotion_faces.tracking.packages import import_face_mesh, import_opencv
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, TRACKERS, LandmarkTracker, tracker_named
+from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, TRACKERS, LandmarkTracker, make_tracker
 from vision.scripted import NoFinder
 
 
@@ -54,14 +57,14 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_a_tracker_is_chosen_by_name() -> None:
-    assert isinstance(tracker_named(), MediaPipe)
-    assert isinstance(tracker_named().boxes(), FaceFinder)
-    assert type(tracker_named("brightest")).__name__ == "Brightest"
+    assert isinstance(make_tracker(), MediaPipe)
+    assert isinstance(make_tracker().boxes(), FaceFinder)
+    assert type(make_tracker("brightest")).__name__ == "Brightest"
     assert TRACKERS.group in GROUPS
     with pytest.raises(InputError, match="no tracker 'other'; there are: mediapipe, brightest, wrong"):
-        tracker_named("other")
+        make_tracker("other")
     with pytest.raises(InputError, match="required a class of LandmarkTracker"):
-        tracker_named("wrong")
+        make_tracker("wrong")
 
 
 @pytest.mark.usefixtures("installed")
@@ -80,3 +83,41 @@ def test_a_name_that_is_none_is_refused_before_the_work(write_video, tmp_path: P
     with pytest.raises(InputError, match="no tracker 'other'; there are: mediapipe"):
         prepare(path, tmp_path / "corpus", tracker="other")
     assert not (tmp_path / "corpus").exists()
+
+
+def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
+    for load, package in ((import_opencv, "OpenCV"), (import_face_mesh, "MediaPipe")):
+        with pytest.raises(MissingDependencyError, match=package) as caught:
+            load()
+        assert install_command("video") in str(caught.value)
+        assert "Python < 3.13" in str(caught.value)
+    with pytest.raises(MissingDependencyError, match="MediaPipe"):
+        FaceMesh()
+
+
+def test_versions_need_the_packages(monkeypatch):
+    from importlib import metadata
+
+    def missing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", missing)
+    with pytest.raises(MissingDependencyError, match="mediapipe"):
+        make_tracker().versions()
+
+
+def test_native_messages_are_dropped_only_inside(capfd):
+    with quiet_stderr():
+        os.write(2, b"noise")
+    os.write(2, b"news")
+    assert capfd.readouterr().err == "news"
+
+
+def test_importing_needs_no_video_packages():
+    code = (
+        "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = None; "
+        "import lipmotion_faces.tracking.track, lipmotion.corpora.store, lipmotion_faces.corpus.prepare"
+    )
+    run_child([sys.executable, "-c", code], check=True)

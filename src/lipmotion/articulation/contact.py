@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.motion import interpolate_rows
-from lipmotion.units.phones import mark_closing_phones
+from lipmotion.units import mark_closing_phones
 
 Curve = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -37,6 +37,12 @@ GAP: Final = "lip_gap"
 """The channel of the distance between the inner lips itself, of motion that comes from a rig, in eye distances."""
 
 
+def smooth_step(share: Curve) -> Curve:
+    """Return a step from 0 at 0 to 1 at 1, level at both ends [shape=(T,)]."""
+    inside = np.clip(share, 0, 1)
+    return np.asarray(inside * inside * (3 - 2 * inside))
+
+
 def opening_to_gap(opening: Curve) -> Curve:
     """Return the distance between the inner lips for a measured opening [shape=(T,)]; 0 where they touch.
 
@@ -50,9 +56,8 @@ def opening_to_gap(opening: Curve) -> Curve:
 
 def gap_to_opening(gap: Curve) -> Curve:
     """Return the opening that trackers measure for a distance between the inner lips [shape=(T,)]."""
-    openings = np.concatenate(
-        [np.linspace(CLOSED_OPENING, FULL_DEFICIT_GAP, 24), np.linspace(FULL_DEFICIT_GAP, 1.0, 200)[1:]]
-    )
+    near, far = np.linspace(CLOSED_OPENING, FULL_DEFICIT_GAP, 24), np.linspace(FULL_DEFICIT_GAP, 1.0, 200)
+    openings = np.concatenate([near, far[1:]])
     return np.where(gap > 0, np.interp(gap, opening_to_gap(openings), openings), CLOSED_OPENING - 0.002)
 
 
@@ -78,7 +83,7 @@ def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
     """
     if "opening" not in motion.names:
         return []
-    gap, found = read_gap(motion), dict[int, ClosedPhone]()
+    gap, phones = read_gap(motion), dict[int, ClosedPhone]()
     for span, closing in zip(units, mark_closing_phones(units), strict=True):
         if closing:
             first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
@@ -86,10 +91,10 @@ def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
             if first >= stop:  # a phone between two frames: the nearer one
                 first = min(max(round((span.start_s + span.end_s) / 2 * motion.rate_hz), 0), len(gap) - 1)
                 stop = first + 1
-            least = np.flatnonzero(gap[first:stop] <= gap[first:stop].min() + 1e-9)
-            frame = first + int(least[len(least) // 2])
-            found.setdefault(frame, ClosedPhone(frame, span.start_s, span.end_s))
-    return [found[frame] for frame in sorted(found)]
+            closest = np.flatnonzero(gap[first:stop] <= gap[first:stop].min() + 1e-9)
+            frame = first + int(closest[len(closest) // 2])
+            phones.setdefault(frame, ClosedPhone(frame, span.start_s, span.end_s))
+    return [phones[frame] for frame in sorted(phones)]
 
 
 def close_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
@@ -110,8 +115,7 @@ def close_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
         at_s = float(np.clip((begin_s + end_s) / 2, time_s[frame] - length_s / 2, time_s[frame] + length_s / 2))
         near = slice(*np.searchsorted(time_s, (at_s - 0.2, at_s + 0.2)))
         outside = np.abs(time_s[near] - at_s) - length_s / 2 - 1e-9
-        share = np.clip(outside / FADE_S, 0, 1)
-        open_share[near] = np.minimum(open_share[near], share * share * (3 - 2 * share))
+        open_share[near] = np.minimum(open_share[near], smooth_step(outside / FADE_S))
     gap = gap * open_share
     return np.where(gap < LEAST_GAP / 2, 0.0, np.maximum(gap, LEAST_GAP))
 

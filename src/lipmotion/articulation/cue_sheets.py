@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from statistics import median
@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import find_phrases
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.trellis import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import parse_clock, parse_number
-from lipmotion.units import SILENCE, VISEMES, is_silent, mark_closing_phones
+from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones
 from lipmotion.units.mouth_chart import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape
-from lipmotion.units.word_spans import group_words
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
@@ -69,12 +68,7 @@ class CueSheet:
         return self.cues.spans[-1].end_s
 
 
-def drawn_shapes(optional: str) -> str:
-    """Return the basic shapes and the given optional ones."""
-    return "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
-
-
-def start_s(frame: int, fps: float) -> float:
+def frame_to_seconds(frame: int, fps: float) -> float:
     """Return the first hundredth of a second in which a frame is shown.
 
     Rounded up, so that ``int(fps * start)``, which readers of Rhubarb's and Moho's files compute, is the frame again.
@@ -89,7 +83,7 @@ def cue_frame_count(duration_s: float, fps: float) -> int:
     """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
     end_s = whole_hundredths(duration_s)
     frames = int(np.ceil(end_s * fps))
-    while frames and start_s(frames - 1, fps) >= end_s:
+    while frames and frame_to_seconds(frames - 1, fps) >= end_s:
         frames -= 1
     return frames
 
@@ -101,7 +95,7 @@ def whole_hundredths(duration_s: float) -> float:
 
 def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
     """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
-    starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
+    starts = [frame_to_seconds(frame, fps) for frame, _ in segments] or [0.0]
     shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
     ends = [*starts[1:], whole_hundredths(duration_s)]
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
@@ -178,7 +172,7 @@ UNCLOSED_COST, UNBITTEN_COST = 10_000.0, 100.0
 """Cost where the one frame of a p b m, or f v, does not show its shape: where only one fits, p b m win."""
 LARGEST_OPENING = 1.2
 """Largest relative opening that is distinguished."""
-LEAST_OPENING = 1e-4
+MIN_OPENING = 1e-4
 """Least mean opening, in the unit of the motion, that scales: a mouth that stays closed is not amplified."""
 LINE_PAUSE_S, SHORT_S, NEAR_S = 0.5, 1.5, 1.5
 """A longer pause divides lines; one shorter than the second belongs to another one nearer than the third."""
@@ -206,54 +200,62 @@ def frame_costs(generation: Generation, frames: int, fps: float, intensity: floa
             bounds_s += [start_s, start_s + duration_s]
             sums += [sums[-1], sums[-1] + duration_s * (_phone_values(part, is_silent(span.label.phone)) - silence)]
             start_s += duration_s
-    phone_values = silence + _integrals(np.array(bounds_s), np.array(sums), edges_s)
+    phone_values = silence + _average_between(np.array(bounds_s), np.array(sums), edges_s)
     cost, voiced, nominal = phone_values[:, : len(_NAMES)].copy(), phone_values[:, -3], phone_values[:, -2:]
-    lines = _lines(generation.units, edges_s)
+    lines = _split_lines(generation.units, edges_s)
     if "opening" in generation.motion.names:
-        means = _means(generation.motion, "opening", edges_s)
-        opening = np.concatenate([_relative_opening(means[s], nominal[s, 0], voiced[s]) for s in lines])
-        opening = np.minimum(intensity * opening, LARGEST_OPENING)
+        opening = _average(generation.motion, "opening", edges_s)
+        for line in lines:  # scaled to the nominal openings by least squares; without an offset: closed lips have 0
+            wanted = voiced[line] * nominal[line, 0]
+            floor = MIN_OPENING * max(float(wanted.sum()), 1.0)
+            opening[line] = opening[line] * (wanted @ wanted) / max(float(wanted @ opening[line]), floor)
+        opening = np.minimum(intensity * np.clip(opening, 0.0, LARGEST_OPENING), LARGEST_OPENING)
         cost += OPENING_WEIGHT * voiced[:, None] * (opening[:, None] - _POSES[:, 0]) ** 2
     if "width" in generation.motion.names:
-        means = _means(generation.motion, "width", edges_s)
-        spread = np.concatenate([_relative_spread(means[s], nominal[s, 1], voiced[s]) for s in lines])
-        spread = np.clip(intensity * spread, _POSES[:, 1].min(), _POSES[:, 1].max())
+        spread, limits = _average(generation.motion, "width", edges_s), (_POSES[:, 1].min(), _POSES[:, 1].max())
+        for line in lines:  # predicted from the width by linear regression on the nominal spreads
+            total = max(float(voiced[line].sum()), 1e-9)
+            mean = float(voiced[line] @ nominal[line, 1]) / total
+            centred = spread[line] - float(voiced[line] @ spread[line]) / total
+            weighted = voiced[line] * centred
+            slope = float(weighted @ (nominal[line, 1] - mean)) / max(float(weighted @ centred), 1e-9)
+            spread[line] = np.clip(mean + max(slope, 0.0) * centred, *limits)
+        spread = np.clip(intensity * spread, *limits)
         cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
     cost *= COST_RATE_HZ / fps
-    for frame, shape, penalty in _required_shapes(generation, frames, fps):
-        cost[frame] += penalty
-        cost[frame, _NAMES.index(shape)] -= penalty
+    closing = mark_closing_phones(generation.units)
+    for span, closes in zip(generation.units, closing, strict=True):
+        if closes or span.label.phone in LIP_BITING:
+            shape, penalty = ("A", UNCLOSED_COST) if closes else ("G", UNBITTEN_COST)
+            frame = min(int(_find_least_open_s(span, generation.motion) * fps), frames - 1)
+            cost[frame] += penalty
+            cost[frame, _NAMES.index(shape)] -= penalty
     return cost
 
 
-def _phone_values(part: PhoneShapes, silent: bool) -> Array:
-    """Return, for a part of a phone, the costs of all shapes, whether it is speech, nominal opening and spread.
+def _find_least_open_s(span: Span[Unit], motion: Motion) -> float:
+    """Return the time in a phone at which the mouth is least open; without an opening, the middle of the phone."""
+    first, last = np.ceil(span.start_s * motion.rate_hz - 1e-6), np.floor(span.end_s * motion.rate_hz + 1e-6)
+    first, stop = int(max(first, 0)), int(min(last + 1, len(motion.values)))
+    if "opening" not in motion.names or first >= stop:
+        return max((span.start_s + span.end_s) / 2, 0.0)
+    return float((first + int(motion["opening"][first:stop].argmin())) / motion.rate_hz + 1e-9)
 
-    Result [shape=(12,)]; opening and spread are the means over the best shapes.
-    """
-    cost = [
-        0.0
-        if name in part.best
-        else ALLOWED_COST
-        if name in part.allowed
-        else MISPLACED_COST
-        if name in SPECIAL
-        else OTHER_COST
-        for name in _NAMES
-    ]
+
+def _phone_values(part: PhoneShapes, silent: bool) -> Array:
+    """Return the costs of all shapes in a part of a phone, whether it is speech, opening and spread [shape=(12,)]."""
+    costs = [(part.best, 0.0), (part.allowed, ALLOWED_COST), (SPECIAL, MISPLACED_COST), (_NAMES, OTHER_COST)]
+    cost = [next(value for names, value in costs if name in names) for name in _NAMES]
     pose = _POSES[[_NAMES.index(name) for name in part.best]].mean(axis=0)
     return np.array([*cost, float(not silent), *pose])
 
 
-def _lines(units: Timeline[Unit], edges_s: Array) -> list[slice]:
-    """Return the frames of each line: how far the lips open and spread in one says nothing of another.
-
-    edges_s : of all frames [shape=(frames + 1,)]
-    Pauses of ``LINE_PAUSE_S`` divide lines; a short one belongs to a near one, as a word says little of a voice.
-    """
+def _split_lines(units: Timeline[Unit], edges_s: Array) -> list[slice]:
+    """Return the frames of each line: how far the lips open and spread in one says nothing of another."""
     lines: list[tuple[float, float]] = []
     for start_s, end_s in find_phrases(units, LINE_PAUSE_S):
         before_s, until_s = lines[-1] if lines else (0.0, -np.inf)
+        # a short one belongs to a near one, as a word says little of a voice
         if start_s - until_s < NEAR_S and min(end_s - start_s, until_s - before_s) < SHORT_S:
             lines[-1] = before_s, end_s
         else:
@@ -263,62 +265,23 @@ def _lines(units: Timeline[Unit], edges_s: Array) -> list[slice]:
     return [slice(first, end) for first, end in pairwise(bounds)]
 
 
-def _means(motion: Motion, channel: str, edges_s: Array) -> Array:
+def _average(motion: Motion, channel: str, edges_s: Array) -> Array:
     """Return the mean of a channel over each frame [shape=(frames,)]; beyond its ends it is constant."""
     grid_s = np.concatenate([motion.time_s, edges_s])
     grid_s.sort()
     values = np.interp(grid_s, motion.time_s, motion[channel])
     sums = np.concatenate([[0.0], np.cumsum(np.diff(grid_s) * (values[1:] + values[:-1]) / 2)])
-    return _integrals(grid_s, sums[:, None], edges_s)[:, 0]
+    return _average_between(grid_s, sums[:, None], edges_s)[:, 0]
 
 
-def _integrals(time_s: Array, sums: Array, edges_s: Array) -> Array:
+def _average_between(time_s: Array, sums: Array, edges_s: Array) -> Array:
     """Return means between edges [shape=(len(edges_s) − 1, columns)] from integrals up to the times ``time_s``."""
     at_edges = np.stack([np.interp(edges_s, time_s, column) for column in sums.T], axis=1)
     return np.diff(at_edges, axis=0) / np.diff(edges_s)[:, None]
 
 
-def _relative_opening(opening: Array, nominal: Array, voiced: Array) -> Array:
-    """Return the opening scaled to the nominal openings of the phones by least squares [shape=(frames,)].
-
-    There is no offset, because closed lips have opening 0; so "boo" alone does not count as a mouth wide open.
-    """
-    wanted = voiced * nominal
-    least = LEAST_OPENING * max(float(wanted.sum()), 1.0)
-    return np.clip(opening * (wanted @ wanted) / max(float(wanted @ opening), least), 0.0, LARGEST_OPENING)
-
-
-def _relative_spread(width: Array, nominal: Array, voiced: Array) -> Array:
-    """Return the spread predicted from the width [shape=(frames,)]: linear regression on the nominal spreads."""
-    total = max(float(voiced.sum()), 1e-9)
-    mean = float(voiced @ nominal) / total
-    centred = width - float(voiced @ width) / total
-    weighted = voiced * centred
-    slope = float(weighted @ (nominal - mean)) / max(float(weighted @ centred), 1e-9)
-    return np.asarray(np.clip(mean + max(slope, 0.0) * centred, _POSES[:, 1].min(), _POSES[:, 1].max()))
-
-
-def _required_shapes(generation: Generation, frames: int, fps: float) -> Iterator[tuple[int, str, float]]:
-    """Yield the frame in which each p b m and f v must be shown, its shape, and the cost of other shapes."""
-    units = generation.units
-    for span, closing in zip(units, mark_closing_phones(units), strict=True):
-        if closing:
-            yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "A", UNCLOSED_COST
-        elif span.label.phone in LIP_BITING:
-            yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "G", UNBITTEN_COST
-
-
-def _least_open_s(span: Span[Unit], motion: Motion) -> float:
-    """Return the time in a phone at which the mouth is least open; without an opening, the middle of the phone."""
-    first, last = np.ceil(span.start_s * motion.rate_hz - 1e-6), np.floor(span.end_s * motion.rate_hz + 1e-6)
-    first, stop = int(max(first, 0)), int(min(last + 1, len(motion.values)))
-    if "opening" not in motion.names or first >= stop:
-        return max((span.start_s + span.end_s) / 2, 0.0)
-    return float((first + int(motion["opening"][first:stop].argmin())) / motion.rate_hz + 1e-9)
-
-
 CHANGE_COST = 0.35
-"""Cost of a change of shape, in the unit of ``costs``."""
+"""Cost of a change of shape, in the unit of ``frame_costs``."""
 HOLD_S = 2 / 24
 
 
@@ -340,27 +303,21 @@ def choose_cues(
     hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
     optional    : which of the shapes G, H and X the character has
     intensity   : openings and spread so many times as large, before shapes are chosen
-    The result is exact: of all sequences that keep the hold, the one of least cost (``costs``, ``sequences.segments``).
+    The result is exact: of all sequences that keep the hold, the one of least cost (``best_segments``).
     Cost: about 10 µs a frame.
     """
-    motion, drawn = generation.motion, drawn_shapes(optional)
+    motion = generation.motion
+    drawn = "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
     frames = cue_frame_count(duration_s, fps)
     cost = np.empty((0, len(drawn)))
-    if frames:
-        cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
+    if frames:  # of the drawn shapes: the least cost of those that each one stands for
+        costs = frame_costs(generation, frames, fps, intensity)
+        groups = [[choose_drawn_shape(other, drawn) == name for other in SHAPES] for name in drawn]
+        cost = np.stack([costs[:, group].min(axis=1) for group in groups], axis=1)
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE_COST)
     sheet = lay_out_cues([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
     return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
-
-
-def _costs_of_drawn_shapes(cost: NDArray[np.float64], drawn: str) -> NDArray[np.float64]:
-    """Return the cost of the drawn shapes [shape=(frames, drawn)]: the least cost of those that each one stands for."""
-    names = list(SHAPES)
-    groups = [
-        [column for column, other in enumerate(names) if choose_drawn_shape(other, drawn) == name] for name in drawn
-    ]
-    return np.stack([cost[:, group].min(axis=1) for group in groups], axis=1)
 
 
 _OCULUS = "sil:X PP:A FF:G TH:B DD:B kk:B CH:B SS:B nn:B RR:B aa:D E:C ih:B oh:E ou:F I:B O:E U:F"
@@ -375,18 +332,18 @@ OCULUS = {name.lower(): shape for name, _, shape in (pair.partition(":") for pai
 PREFIX = "viseme_"
 CHARTS = (BLAIR, LETTERS, FLEMING_DOBBS, OCULUS, PHONES)
 LONGEST_S = 86_400.0
-MOST_CUES = 250_000
+MAX_CUES = 250_000
 MILLISECONDS = 20.0
 """Shapes other than rest of which half seem to last so many whole seconds are in milliseconds."""
 
 
 def parse_shape(name: str, names: dict[str, str], place: str) -> str:
     """Return the shape of a name. Raises InputError: it is none, with its place."""
-    found = names.get(name.strip().lower().removeprefix(PREFIX))
-    if found is None:
+    shape = names.get(name.strip().lower().removeprefix(PREFIX))
+    if shape is None:
         known = " ".join(dict.fromkeys(names))
-        raise InputError(f"{place}: no mouth shape is {shortened(name)!r}; the shapes are: {known}")
-    return found
+        raise InputError(f"{place}: no mouth shape is {shorten(name)!r}; the shapes are: {known}")
+    return shape
 
 
 def is_shape(name: str) -> bool:
@@ -400,8 +357,8 @@ def choose_chart(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[st
     The usual one, Preston Blair's, Rhubarb's letters, Fleming and Dobbs', Meta's visemes, or the phones of CMU's
     dictionary, with stress or without.
     """
-    given = {name.strip().lower().removeprefix(PREFIX) for name in names}
-    return next((chart for chart in (usual, *CHARTS) if given <= {*chart}), usual)
+    wanted = {name.strip().lower().removeprefix(PREFIX) for name in names}
+    return next((chart for chart in (usual, *CHARTS) if wanted <= {*chart}), usual)
 
 
 def parse_cue_time(text: str, place: str) -> float:
@@ -433,18 +390,18 @@ def build_cue_sheet(
     if lengths and median(lengths) >= MILLISECONDS and all(float(start_s).is_integer() for start_s, _ in rows):
         LOG.warning("a mouth shape seems to last %g s: the times are taken for milliseconds", median(lengths))
         rows, end_s = [(start_s / 1000, shape) for start_s, shape in rows], end_s / 1000
-    if len(rows) > MOST_CUES or end_s > LONGEST_S:
-        raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MOST_CUES} in {LONGEST_S:g} s")
+    if len(rows) > MAX_CUES or end_s > LONGEST_S:
+        raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MAX_CUES} in {LONGEST_S:g} s")
     late = next((place for place, (row, after) in enumerate(pairwise(rows), 1) if after[0] < row[0]), None)
     if late is not None:
         raise InputError(
             f"mouth shape {late + 1} begins at {rows[late][0]:.6g} s, before the one ahead of it at "
             f"{rows[late - 1][0]:.6g} s, required in order of time; export the cues again"
         )
-    whole = [(0.0, REST), *rows] if rows[0][0] > 0 else list(rows)
-    ends = [*(start_s for start_s, _ in whole[1:]), end_s]
-    spans = (Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(whole, ends, strict=True))
-    kept = Timeline(tuple(span for span in spans if span.end_s != span.start_s))
-    if not len(kept):
+    all_rows = [(0.0, REST), *rows] if rows[0][0] > 0 else list(rows)
+    ends = [*(start_s for start_s, _ in all_rows[1:]), end_s]
+    spans = (Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(all_rows, ends, strict=True))
+    cues = Timeline(tuple(span for span in spans if span.end_s != span.start_s))
+    if not len(cues):
         raise InputError("its mouth shapes last no time; export the cues again")
-    return CueSheet(kept, fps, "".join(SHAPES), words or Timeline(()))
+    return CueSheet(cues, fps, "".join(SHAPES), words or Timeline(()))

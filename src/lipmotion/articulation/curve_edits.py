@@ -34,13 +34,12 @@ def apply_curve_edits(motion: Motion, units: Timeline[Unit], edits: Sequence[Cur
     units : phones in time, whose silences show the rest pose
     Raises InputError: a pin outside the motion, or a weight that is to be less than 0 or more than 1.
     """
-    ours = [edit for edit in edits if edit.channel in motion.names]
-    edited = {edit.channel for edit in ours}
-    if not ours:
+    edits = [edit for edit in edits if edit.channel in motion.names]
+    if not edits:
         return motion
-    values, rest = motion.values.astype(np.float64), find_rest_frames(motion, units)
+    time_s, values, rest = motion.time_s, motion.values.astype(np.float64), find_rest_frames(motion, units)
     pins = []
-    for edit in ours:
+    for edit in edits:
         column = motion.column(edit.channel)
         is_weight = motion.channels[column].unit == WEIGHT
         if isinstance(edit, Pin):
@@ -48,16 +47,24 @@ def apply_curve_edits(motion: Motion, units: Timeline[Unit], edits: Sequence[Cur
             continue
         if isinstance(edit, DrawnCurve):
             check_drawn(edit, is_weight=is_weight)
-            values[:, column] += _drawn_change(values[:, column], edit, motion)
+            inside = np.flatnonzero((time_s >= edit.start_s - 1e-9) & (time_s <= edit.end_s + 1e-9))
+            if len(inside):  # the curve goes over into what is drawn smoothly
+                from scipy.interpolate import PchipInterpolator
+
+                drawn = PchipInterpolator(np.linspace(edit.start_s, edit.end_s, len(edit.values)), edit.values)
+                lacking = drawn(time_s[inside]) - values[inside, column]
+                nearest = np.clip(np.arange(len(values)), inside[0], inside[-1]) - inside[0]
+                share = span_weight(time_s, time_s[inside[0]], time_s[inside[-1]], PIN_REACH_S)
+                values[:, column] += lacking[nearest] * share
             continue
         still = 0.0 if is_weight else float(np.median(values[rest, column]))
-        factor = 1 + (edit.factor - 1) * span_weight(motion.time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
+        factor = 1 + (edit.factor - 1) * span_weight(time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
         values[:, column] = still + factor * (values[:, column] - still)
         if edit.channel == OPENING:  # closed lips are closer than at rest
             values[:, column] = np.maximum(values[:, column], 0)
     bend_through_pins(values, pins, max(round(PIN_REACH_S * motion.rate_hz), 1))
-    channels = zip(motion.channels, range(len(motion.channels)), strict=True)
-    weights = [column for channel, column in channels if channel.unit == WEIGHT and channel.name in edited]
+    edited = {edit.channel for edit in edits}
+    weights = [each.unit == WEIGHT and each.name in edited for each in motion.channels]
     values[:, weights] = np.clip(values[:, weights], 0, 1)
     return replace(motion, values=values)
 
@@ -65,24 +72,8 @@ def apply_curve_edits(motion: Motion, units: Timeline[Unit], edits: Sequence[Cur
 def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
     """Raise InputError if values that are drawn are not possible; ``is_weight``: whether the curve is 0 to 1."""
     if is_weight and not 0 <= min(edit.values) <= max(edit.values) <= 1:
-        raise InputError(
-            f"{edit.channel} is drawn between {min(edit.values):g} and {max(edit.values):g}, required 0 to 1"
-        )
-
-
-def _drawn_change(curve: Curve, edit: DrawnCurve, motion: Motion) -> Curve:
-    """Return what is to be added to a curve so that it is as drawn, and goes over into that smoothly [shape=(T,)]."""
-    from scipy.interpolate import PchipInterpolator
-
-    time_s = motion.time_s
-    inside = np.flatnonzero((time_s >= edit.start_s - 1e-9) & (time_s <= edit.end_s + 1e-9))
-    if not len(inside):
-        return np.zeros(len(curve))
-    drawn_s = np.linspace(edit.start_s, edit.end_s, len(edit.values))
-    lacking = PchipInterpolator(drawn_s, edit.values)(time_s[inside]) - curve[inside]
-    nearest = np.clip(np.arange(len(curve)), inside[0], inside[-1]) - inside[0]
-    change: Curve = lacking[nearest] * span_weight(time_s, time_s[inside[0]], time_s[inside[-1]], PIN_REACH_S)
-    return change
+        drawn = f"{min(edit.values):g} and {max(edit.values):g}"
+        raise InputError(f"{edit.channel} is drawn between {drawn}, required 0 to 1")
 
 
 def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], reach: int) -> None:
@@ -118,10 +109,8 @@ def find_pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
 
 def apply_gain(generation: Generation, gain: Gain) -> Generation:
     """Return a generation whose mouth moves more, or less, for a time; what is closed stays so (``intensify``)."""
-    motion = generation.motion
-    weight = span_weight(motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
-    larger = intensify(generation, gain.factor)
-    return apply_stretch(generation, _stretch(larger, weight))
+    weight = span_weight(generation.motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
+    return apply_stretch(generation, _cut_stretch(intensify(generation, gain.factor), weight))
 
 
 def hold_mouth(generation: Generation, hold: Hold) -> Generation:
@@ -130,7 +119,7 @@ def hold_mouth(generation: Generation, hold: Hold) -> Generation:
     frame = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1)
     still = replace(motion, values=np.broadcast_to(motion.values[frame], motion.values.shape))
     weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S)
-    return apply_stretch(generation, _stretch(replace(generation, motion=still), weight))
+    return apply_stretch(generation, _cut_stretch(replace(generation, motion=still), weight))
 
 
 class MotionStretch(NamedTuple):
@@ -150,10 +139,10 @@ class MotionStretch(NamedTuple):
 
 def cut_locked_stretch(generation: Generation, start_s: float, end_s: float) -> MotionStretch:
     """Return what a lock keeps of motion from ``start_s`` to ``end_s``, and beside this span."""
-    return _stretch(generation, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
+    return _cut_stretch(generation, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
 
 
-def _stretch(generation: Generation, weight: Curve) -> MotionStretch:
+def _cut_stretch(generation: Generation, weight: Curve) -> MotionStretch:
     """Return the motion where a weight [shape=(T,)] is not 0, which is in one span."""
     inside = np.flatnonzero(weight)
     frames = slice(inside[0], inside[-1] + 1) if len(inside) else slice(0)

@@ -5,13 +5,13 @@ Each function returns a new generation; the values are those of the engine until
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import CLOSED_OPENING, find_closures
+from lipmotion.articulation.contact import CLOSED_OPENING, find_closures, smooth_step
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
@@ -40,8 +40,10 @@ def choose_holds(rows: NDArray[np.float64], hold: int, fixed: Sequence[int] = ()
     centred = rows - rows.mean(axis=0)
     marked = np.zeros(frames)
     marked[list(fixed)] = 1
-    sums, squares = _sums(centred), _sums((centred**2).sum(axis=1))
-    counts, marked_sums = _sums(marked), _sums(centred * marked[:, None])
+    sums, squares, counts, marked_sums = (  # of the first n rows
+        np.concatenate([np.zeros((1, *each.shape[1:])), np.cumsum(each, axis=0)])
+        for each in (centred, (centred**2).sum(axis=1), marked, centred * marked[:, None])
+    )
     best = np.full(frames + 1, np.inf)
     best[0] = 0.0
     before = np.zeros(frames + 1, np.intp)
@@ -59,11 +61,6 @@ def choose_holds(rows: NDArray[np.float64], hold: int, fixed: Sequence[int] = ()
     while borders[-1] > 0:
         borders.append(int(before[borders[-1]]))
     return borders[::-1]
-
-
-def _sums(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the sums of the first n rows, for n from 0 to all of them [shape=(T + 1, ...)]."""
-    return np.concatenate([np.zeros((1, *rows.shape[1:])), np.cumsum(rows, axis=0)])
 
 
 Curve = NDArray[np.float64]
@@ -103,6 +100,12 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
+    edits: list[CurveEdit] = []
+    for edit in generation.curve_edits:  # without pins that are then outside
+        if not isinstance(edit, Pin):
+            edits.append(replace(edit, start_s=edit.start_s + by_s, end_s=edit.end_s + by_s))
+        elif 0 <= edit.time_s + by_s <= duration_s:
+            edits.append(replace(edit, time_s=edit.time_s + by_s))
     return replace(
         generation,
         motion=Motion(values, rate_hz, motion.channels),
@@ -111,17 +114,8 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
             generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
         ),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
-        curve_edits=tuple(_moved_edits(generation.curve_edits, by_s, duration_s)),
+        curve_edits=tuple(edits),
     )
-
-
-def _moved_edits(edits: Sequence[CurveEdit], by_s: float, end_s: float) -> Iterator[CurveEdit]:
-    """Yield edits of curves so many seconds later; pins that are then outside 0 to ``end_s`` are left out."""
-    for edit in edits:
-        if not isinstance(edit, Pin):
-            yield replace(edit, start_s=edit.start_s + by_s, end_s=edit.end_s + by_s)
-        elif 0 <= edit.time_s + by_s <= end_s:
-            yield replace(edit, time_s=edit.time_s + by_s)
 
 
 def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Unit]:
@@ -156,7 +150,12 @@ def intensify(generation: Generation, intensity: float, opening: Curve | None = 
     factor = np.full(len(motion.values), float(intensity))
     if opening is not None:
         closed = float(np.median(opening[rest]))
-        factor = _factors(opening - closed, max(CLOSED_OPENING - closed, 0.0), intensity)
+        further, touching = opening - closed, max(CLOSED_OPENING - closed, 0.0)
+        widest = max(float(further.max()), 1e-9)
+        wanted = np.maximum(intensity * further, 0)
+        limited = np.where(wanted > widest, widest + widest * np.tanh((wanted - widest) / widest), wanted)
+        change = np.divide(limited, further, out=np.ones_like(further), where=further > 0) - 1
+        factor = 1 + smooth_step((further - touching) / UNSCALED_GAP) * change
     values = motion.values.astype(np.float64)
     still = np.median(values[rest], axis=0)
     larger = still + factor[:, None] * (values - still)
@@ -188,7 +187,14 @@ def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = 
     if frames < 2 or not count:
         return generation
     closed = np.unique([min(round(time_s * motion.rate_hz), count - 1) for time_s in closed_s]).astype(int)
-    borders = choose_holds(_deciding(motion), frames, closed.tolist())
+    deciding = [name for name in DECIDING if name in motion.names]
+    others = [channel.name for channel in motion.channels if channel.unit != EYE_DISTANCE or not deciding]
+    names = [*deciding, *(name for name in others if name not in deciding)]
+    rows = np.stack([motion[name].astype(np.float64) for name in names], axis=1)
+    kinds = np.array([motion.channels[motion.column(name)].unit for name in names])
+    for kind in set(kinds.tolist()):  # each unit scaled to a standard deviation of 1
+        rows[:, kinds == kind] /= max(float(rows[:, kinds == kind].std(axis=0).max()), 1e-12)
+    borders = choose_holds(rows, frames, closed.tolist())
     starts, lengths = np.array(borders[:-1]), np.diff(borders)
     values = np.add.reduceat(motion.values.astype(np.float64), starts, axis=0) / lengths[:, None]
     poses = np.searchsorted(starts, closed, side="right") - 1
@@ -220,33 +226,6 @@ def close_on_frame_grid(generation: Generation, rate_hz: float) -> Generation:
 def find_closed_times(generation: Generation) -> list[float]:
     """Return the time in seconds at which each p, b and m closes the lips; none where no opening is known."""
     return [each.frame / generation.motion.rate_hz for each in find_closures(generation.motion, generation.units)]
-
-
-def _factors(further: Curve, touching: float, intensity: float) -> Curve:
-    """Return the factor of every frame, by how much further than at rest the lips are apart [shape=(T,)].
-
-    touching : lips that are no further apart than this, more than at rest, still touch
-    """
-    most = max(float(further.max()), 1e-9)
-    wanted = np.maximum(intensity * further, 0)
-    beyond = np.maximum(wanted - most, 0)
-    limited = np.where(beyond > 0, most + most * np.tanh(beyond / most), wanted)
-    share = np.clip((further - touching) / UNSCALED_GAP, 0, 1)
-    weight = share * share * (3 - 2 * share)
-    factor = np.divide(limited, further, out=np.ones_like(further), where=further > 0)
-    return 1 + weight * (factor - 1)
-
-
-def _deciding(motion: Motion) -> Curve:
-    """Return the curves that decide where poses begin, each unit scaled to a standard deviation of 1 [shape=(T, D)]."""
-    chosen = [name for name in DECIDING if name in motion.names]
-    others = [channel.name for channel in motion.channels if channel.unit != EYE_DISTANCE or not chosen]
-    names = [*chosen, *(name for name in others if name not in chosen)]
-    rows = np.stack([motion[name].astype(np.float64) for name in names], axis=1)
-    kinds = np.array([motion.channels[motion.column(name)].unit for name in names])
-    for kind in set(kinds.tolist()):
-        rows[:, kinds == kind] /= max(float(rows[:, kinds == kind].std(axis=0).max()), 1e-12)
-    return rows
 
 
 def delay_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:

@@ -23,6 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion.types.moods import MOODS, MoodKey
 
@@ -102,24 +103,17 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
     keys = [key for key in keys if not key.is_manner]
     if not keys:
         return motion
-    kept = [number for number, name in enumerate(motion.names) if not is_mood(name)]
-    curves = _curves(keys, motion.time_s)
-    added = [curve[:, None].astype(motion.values.dtype) for curve in curves.values()]
-    values = np.concatenate([motion.values[:, kept], *added], axis=1)
-    channels = (*(motion.channels[number] for number in kept), *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
-    return Motion(values, motion.rate_hz, channels)
-
-
-def _curves(keys: Sequence[MoodKey], time_s: Curve) -> dict[str, Curve]:
-    """Return the strength of each mood of the keys but of the neutral one [each shape=(T,)]."""
+    time_s, others = motion.time_s, [number for number, name in enumerate(motion.names) if not is_mood(name)]
     curves = {key.mood: np.zeros(len(time_s)) for key in keys if key.mood in MOODS}
     for key in keys:
         begin_s = key.time_s - CHANGE_S[0]
-        share = np.clip((time_s - begin_s) / sum(CHANGE_S), 0, 1) if key.time_s > 0 else np.ones(len(time_s))
-        share = share * share * (3 - 2 * share)
+        share = smooth_step((time_s - begin_s) / sum(CHANGE_S)) if key.time_s > 0 else np.ones(len(time_s))
         wanted = dict.fromkeys(curves, 0.0) | {key.mood: key.strength}
         curves = {mood: curve + share * (wanted[mood] - curve) for mood, curve in curves.items()}
-    return curves
+    added = [curve[:, None].astype(motion.values.dtype) for curve in curves.values()]
+    values = np.concatenate([motion.values[:, others], *added], axis=1)
+    channels = (*(motion.channels[number] for number in others), *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
+    return Motion(values, motion.rate_hz, channels)
 
 
 def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
@@ -127,15 +121,15 @@ def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve
 
     time_s : in seconds; None: the frames of the motion
     """
-    found: dict[int, Curve] = {}
+    units: dict[int, Curve] = {}
     for name in motion.names:
         if is_mood(name) and motion[name].any():
             strength = np.clip(motion[name].astype(np.float64), 0, 1)
             if time_s is not None:
                 strength = np.interp(time_s, motion.time_s, strength)
             for unit, intensity in mood_table()[name[len(PREFIX) :]].items():
-                found[unit] = found.get(unit, 0.0) + intensity * strength
-    return {unit: np.clip(curve, 0, 1) for unit, curve in found.items()}
+                units[unit] = units.get(unit, 0.0) + intensity * strength
+    return {unit: np.clip(curve, 0, 1) for unit, curve in units.items()}
 
 
 def read_moods(motion: Motion) -> dict[str, Curve]:

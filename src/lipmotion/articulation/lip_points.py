@@ -1,4 +1,4 @@
-"""The lip and jaw points of a mouth at rest: where to look for them on a mesh, and which of them are mirrored.
+"""The lip and jaw points of a mouth at rest: where to look for them on a mesh, which are mirrored; symmetrical motion.
 
 The table is the rest pose of the shipped model, made symmetrical: eye distances, in the head frame of motion (origin
 between the eyes, x to the speaker's left, y up, z out of the face). Points have the numbers of MediaPipe's face mesh,
@@ -14,6 +14,8 @@ from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lipmotion.types import Motion
 
 UPPER_MIDDLE, LOWER_MIDDLE = 13, 14
 """The middles of the inner lips; the channel ``opening`` is their distance."""
@@ -87,3 +89,26 @@ def mouth_template() -> MouthTemplate:
         mirrored=np.array([points.index(int(row["mirrored"])) for row in rows]),
         **kinds,
     )
+
+
+BLOCK_FRAMES = 10_000
+"""Frames that are computed at a time, so that hours of motion take little memory beside their copy."""
+
+
+def make_symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
+    """Return motion whose lip and jaw points move alike on both sides; distances and weights stay as they are.
+
+    asymmetry : 0 to 1: the share that is left of the difference between the sides of the speaker's own mouth
+    Points are in the head frame: x to the speaker's left, 0 between the eyes.
+    """
+    template, names = mouth_template(), {*motion.names}
+    if asymmetry >= 1 or not names.issuperset(f"{axis}_{point}" for point in template.points for axis in "xyz"):
+        return motion
+    values = motion.values.copy()
+    for axis, sign in (("x", -1.0), ("y", 1.0), ("z", 1.0)):
+        columns = [motion.column(f"{axis}_{point}") for point in template.points]
+        for start in range(0, len(values), BLOCK_FRAMES):
+            places = values[start : start + BLOCK_FRAMES, columns]
+            mean = (places + sign * places[:, template.mirrored]) / 2
+            values[start : start + BLOCK_FRAMES, columns] = mean + asymmetry * (places - mean)
+    return Motion(values, motion.rate_hz, motion.channels)

@@ -21,13 +21,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.expression import action_units
 from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
 from lipmotion.units import is_silent
 
 Curve = NDArray[np.float64]
 
-BLINK_S, MEAN_BLINK_S, LEAST_BLINK_S = 0.24, 3.3, 1.1
+BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 3.3, 1.1
 """Duration of a blink; mean and least time between two."""
 PHRASE_PAUSE_S = 0.15
 """A pause of at least this duration ends a phrase."""
@@ -145,75 +146,59 @@ def compute_liveliness(  # noqa: PLR0913
     """
     still, end_s = np.zeros(len(time_s)), float(time_s[-1]) if len(time_s) else 0.0
     spoken = find_phrases(units)
-    accent = _accents(motion, prosody)
+    accent = _find_accents(motion, prosody)
     if len(units):
-        accent = accent * _talking(spoken, np.arange(len(accent)) / FRAME_RATE_HZ)
+        accent = accent * _find_talking(spoken, np.arange(len(accent)) / FRAME_RATE_HZ)
     turn = np.zeros((len(time_s), 3))
     if head:
-        turn = _turn(time_s, accent, _talking(spoken, time_s), spoken, _generator(seed, 1))
+        turn = _turn_head(time_s, accent, _find_talking(spoken, time_s), spoken, _generator(seed, 1))
     lids = lid_closure(time_s, blink_times(end_s, spoken, _generator(seed, 2))) if blinks else still
-    aim = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
-    raised = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
-    mood = action_units(motion, time_s)
-    if mood and brows:
-        lively = _mood_strength(time_s, accent, _generator(seed, 5))
-        mood = {
-            unit: np.clip(curve * lively, 0, 1) if unit in UPPER_FACE_UNITS.values() else curve
-            for unit, curve in mood.items()
-        }
-    return _in_mood(Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn), mood, head=head)
-
-
-def _mood_strength(time_s: Curve, accent: Curve, rng: np.random.Generator) -> Curve:
-    """Return how strong a mood is in the upper face, about 1: it comes and goes, and grows with accents."""
-    slow = np.tanh(_sway(time_s, rng, 0.06, 0.3))
-    return 1 + MOOD_WANDER * slow + MOOD_ACCENT * (_at(_smoothed(accent, 0.2), time_s + BROW_LEAD_S) - 0.4)
-
-
-def _in_mood(moved: Liveliness, mood: Mapping[int, Curve], *, head: bool) -> Liveliness:
-    """Return movements with those of a mood; the eyes hold their target while the head is turned by it."""
-    if not mood:
-        return moved
-    turn, gaze, lids = moved.turn, moved.gaze.copy(), moved.lids
+    aim = _aim_eyes(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
+    raised = _raise_brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
+    mood, eyes = action_units(motion, time_s), aim - GAZE_COUNTER_SHARE * turn[:, :2]
+    if mood and brows:  # it comes and goes in the upper face, and grows with accents
+        slow = np.tanh(_sway(time_s, _generator(seed, 5), 0.06, 0.3))
+        accented = _at(_smooth(accent, 0.2), time_s + BROW_LEAD_S) - 0.4
+        lively = 1 + MOOD_WANDER * slow + MOOD_ACCENT * accented
+        mood |= {unit: np.clip(mood[unit] * lively, 0, 1) for unit in UPPER_FACE_UNITS.values() if unit in mood}
     for unit, angles in MOOD_TURNS.items():
         if head and unit in mood:
-            turned = mood[unit][:, None] * np.array(angles, float)
-            turn, gaze = turn + turned, gaze - GAZE_COUNTER_SHARE * turned[:, :2]
+            turned = mood[unit][:, None] * np.array(angles, float)  # the eyes hold their target
+            turn, eyes = turn + turned, eyes - GAZE_COUNTER_SHARE * turned[:, :2]
     if 64 in mood:
-        gaze[:, 1] -= MOOD_GAZE_RAD * mood[64]
+        eyes[:, 1] -= MOOD_GAZE_RAD * mood[64]
     if 43 in mood:
         lids = np.maximum(lids, DROOPING_LIDS * mood[43])
-    return Liveliness(
-        lids, moved.brows, gaze, turn, {unit: mood[unit] for unit in UPPER_FACE_UNITS.values() if unit in mood}
-    )
+    units_shown = {unit: mood[unit] for unit in UPPER_FACE_UNITS.values() if unit in mood}
+    return Liveliness(lids, raised, eyes, turn, units_shown)
 
 
 def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of every stretch of speech without a pause of ``pause_s``."""
-    found: list[tuple[float, float]] = []
+    phrases: list[tuple[float, float]] = []
     for span in units:
         if not is_silent(span.label.phone):
-            if found and span.start_s - found[-1][1] < pause_s:
-                found[-1] = found[-1][0], span.end_s
+            if phrases and span.start_s - phrases[-1][1] < pause_s:
+                phrases[-1] = phrases[-1][0], span.end_s
             else:
-                found.append((span.start_s, span.end_s))
-    return found
+                phrases.append((span.start_s, span.end_s))
+    return phrases
 
 
 def blink_times(end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> list[float]:
     """Return when blinks begin, in seconds: at random, but rather at the end of a phrase where one is near."""
     ends = np.array([end for _, end in spoken] or [-np.inf])
-    found: list[float] = []
+    begins: list[float] = []
     at = float(rng.uniform(0.6, 2.2))
     while at < end_s:
         near = ends[np.abs(ends - at) < 0.7]
         chosen = float(near[0]) - 0.05 if len(near) and rng.random() < 0.7 else at
-        if not found or chosen > found[-1] + LEAST_BLINK_S:
-            found.append(max(chosen, 0.0))
+        if not begins or chosen > begins[-1] + MIN_BLINK_S:
+            begins.append(max(chosen, 0.0))
             if rng.random() < 0.1:  # a double blink
-                found.append(found[-1] + 0.34)
-        at += LEAST_BLINK_S + float(rng.gamma(2.0, (MEAN_BLINK_S - LEAST_BLINK_S) / 2))
-    return found
+                begins.append(begins[-1] + 0.34)
+        at += MIN_BLINK_S + float(rng.gamma(2.0, (MEAN_BLINK_S - MIN_BLINK_S) / 2))
+    return begins
 
 
 def lid_closure(time_s: Curve, blink_s: list[float]) -> Curve:
@@ -231,28 +216,28 @@ def _generator(seed: int, part: int) -> np.random.Generator:
     return np.random.default_rng([seed, part])
 
 
-def _smoothed(curve: Curve, deviation_s: float) -> Curve:
+def _smooth(curve: Curve, deviation_s: float) -> Curve:
     """Return a curve at 100 Hz smoothed by a Gaussian; the ends are repeated."""
     reach = max(1, int(4 * deviation_s * FRAME_RATE_HZ))
     weights = np.exp(-np.square(np.arange(-reach, reach + 1) / (deviation_s * FRAME_RATE_HZ)) / 2)
     return np.convolve(np.pad(curve, reach, mode="edge"), weights / weights.sum(), mode="valid")
 
 
-def _accents(motion: Motion, prosody: Prosody | None) -> Curve:
+def _find_accents(motion: Motion, prosody: Prosody | None) -> Curve:
     """Return how strongly the voice is accented at 100 Hz, about 0 to 1 [shape=(T,)]."""
     if prosody is None or len(prosody.level_db) < 2:
         opening = motion.resampled(FRAME_RATE_HZ)["opening"].astype(float)
-        loud = _smoothed(opening, 0.07) / max(float(np.percentile(opening, 95)), 0.05)
+        loud = _smooth(opening, 0.07) / max(float(np.percentile(opening, 95)), 0.05)
         return np.clip(loud - 0.45, 0, 1) * 1.2
-    level = _smoothed(np.maximum(prosody.level_db, prosody.level_db.max() - 40), 0.05)
+    level = _smooth(np.maximum(prosody.level_db, prosody.level_db.max() - 40), 0.05)
     loud = np.clip((level - (level.max() - 18)) / 18, 0, 1)
     voiced = np.isfinite(prosody.log_f0)
     if voiced.sum() < 10:
         return 0.7 * np.clip(loud - 0.4, 0, 1)
     pitch = np.where(voiced, prosody.log_f0, 0.0).astype(float)
     centre, spread = float(np.median(pitch[voiced])), max(float(pitch[voiced].std()), 0.05)
-    weight = _smoothed(voiced.astype(float), 0.06)
-    high = _smoothed(np.where(voiced, (pitch - centre) / spread, 0), 0.06) / np.maximum(weight, 0.2)
+    weight = _smooth(voiced.astype(float), 0.06)
+    high = _smooth(np.where(voiced, (pitch - centre) / spread, 0), 0.06) / np.maximum(weight, 0.2)
     return np.clip(0.35 * np.clip(high, -1, 2.5) + 0.8 * loud - 0.45, 0, 1.2)
 
 
@@ -260,14 +245,14 @@ def _at(curve: Curve, time_s: Curve) -> Curve:
     return np.interp(time_s, np.arange(len(curve)) / FRAME_RATE_HZ, curve)
 
 
-def _talking(spoken: list[tuple[float, float]], time_s: Curve) -> Curve:
+def _find_talking(spoken: list[tuple[float, float]], time_s: Curve) -> Curve:
     """Return 1 in phrases and 0 away from them, with soft edges [shape=(N,)]."""
     level = np.zeros(len(time_s))
     for begin, end in spoken:
         first, last = np.searchsorted(time_s, (begin - 0.6, end + 0.9))
         near = time_s[first:last]
         rise = np.clip((near - begin + 0.6) / 0.6, 0, 1) * np.clip((end + 0.9 - near) / 0.9, 0, 1)
-        level[first:last] = np.maximum(level[first:last], rise * rise * (3 - 2 * rise))
+        level[first:last] = np.maximum(level[first:last], smooth_step(rise))
     return level
 
 
@@ -280,27 +265,26 @@ def _sway(time_s: Curve, rng: np.random.Generator, slowest_hz: float, fastest_hz
     return np.asarray(strengths @ waves / np.sqrt(np.sum(strengths**2) / 2))
 
 
-def _turn(
+def _turn_head(
     time_s: Curve, accent: Curve, talking: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
 ) -> Curve:
     lively = STILL_SHARE + (1 - STILL_SHARE) * talking
     yaw, pitch, roll = (size * _sway(time_s, rng, 0.08, 0.45) for size in SWAY)
-    nod = _at(_smoothed(accent, 0.11), time_s + 0.04)
+    nod = _at(_smooth(accent, 0.11), time_s + 0.04)
     tilt = np.zeros(len(time_s))
     for begin, end in spoken:  # every phrase has its own pose, and ends a little lower
         side, about = rng.normal(0, 1, 2).clip(-1.6, 1.6)
         first, last = np.searchsorted(time_s, (begin - 0.5, end + 0.8))
         near = time_s[first:last]
-        rise = np.clip((near - begin + 0.5) / 0.7, 0, 1) * np.clip((end + 0.8 - near) / 0.8, 0, 1)
-        rise = rise * rise * (3 - 2 * rise)
+        rise = smooth_step(np.clip((near - begin + 0.5) / 0.7, 0, 1) * np.clip((end + 0.8 - near) / 0.8, 0, 1))
         roll[first:last] += 0.9 * SWAY[2] * side * rise
         yaw[first:last] += 0.9 * SWAY[0] * about * rise
         tilt[first:last] += rise * (np.clip((near - begin) / max(end - begin, 0.1), 0, 1) - 0.5)
     return np.stack([lively * yaw, lively * pitch - NOD_RAD * nod - PHRASE_FALL_RAD * tilt, lively * roll], axis=1)
 
 
-def _brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
-    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + BROW_LEAD_S)
+def _raise_brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+    raised = BROW_RAISE * _at(_smooth(accent, 0.1), time_s + BROW_LEAD_S)
     raised += 0.003 * (1 + np.tanh(_sway(time_s, rng, 0.05, 0.3)))
     for begin, _ in spoken:  # some phrases begin with raised brows
         strength = float(rng.uniform(-0.6, 1.0))
@@ -311,7 +295,7 @@ def _brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng:
     return raised
 
 
-def _gaze(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+def _aim_eyes(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
     """Return where the eyes look, to the left and upwards in radians [shape=(F, 2)]: steps between fixations."""
     moments, targets = [0.0], [(0.0, 0.0)]
     begins = np.array([begin for begin, _ in spoken] or [np.inf])
@@ -320,10 +304,8 @@ def _gaze(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: n
         near_begin = np.abs(begins - at).min() < 0.8
         if abs(targets[-1][0]) < 0.04 and rng.random() < (0.5 if near_begin else 0.14):
             side = float(rng.choice([-1.0, 1.0]))
-            target = (
-                side * LARGEST_GLANCE[0] * float(rng.uniform(0.45, 1)),
-                LARGEST_GLANCE[1] * float(rng.uniform(-0.6, 1)),
-            )
+            far, high = float(rng.uniform(0.45, 1)), float(rng.uniform(-0.6, 1))
+            target = (side * LARGEST_GLANCE[0] * far, LARGEST_GLANCE[1] * high)
             stay = float(rng.uniform(0.35, 0.9))
         else:
             target = (float(rng.normal(0, 0.018)), float(rng.normal(0, 0.012)))
@@ -333,5 +315,5 @@ def _gaze(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: n
         at += stay
     steps, begun_s = np.array(targets), np.array(moments)
     last = np.maximum(np.searchsorted(begun_s, time_s, "right") - 1, 0)  # every fixation is longer than a movement
-    before, share = steps[np.maximum(last - 1, 0)], np.clip((time_s - begun_s[last]) / SACCADE_S, 0, 1)
-    return np.asarray(before + (share * share * (3 - 2 * share))[:, None] * (steps[last] - before))
+    before, share = steps[np.maximum(last - 1, 0)], smooth_step((time_s - begun_s[last]) / SACCADE_S)
+    return np.asarray(before + share[:, None] * (steps[last] - before))

@@ -163,7 +163,7 @@ class MouthAtRest(NamedTuple):
 def measure_mouth_at_rest(motion: Motion, units: Timeline[Unit]) -> MouthAtRest:
     """Return the sizes of the rest pose of a motion. Raises InputError: as ``spoken_mouth``."""
     check_spoken(motion, motion.rate_hz)
-    rest, across, thickness = find_rest_frames(motion, units), _across(motion), _thickness(motion)
+    rest, across, thickness = find_rest_frames(motion, units), _width(motion), _thickness(motion)
     name = "width" if "width" in motion.names else "distance of the lip corners"
     return MouthAtRest(
         None if across is None else measure_at_rest(name, across, rest),
@@ -172,7 +172,7 @@ def measure_mouth_at_rest(motion: Motion, units: Timeline[Unit]) -> MouthAtRest:
     )
 
 
-def _across(motion: Motion) -> Curve | None:
+def _width(motion: Motion) -> Curve | None:
     """Return the distance of the lip corners, in any unit [shape=(T,)]; None: the motion does not say it."""
     if "width" in motion.names:
         return motion["width"].astype(np.float64)
@@ -206,33 +206,37 @@ def spoken_mouth(
     width or thickness at rest.
     """
     check_spoken(motion, motion.rate_hz if fps is None else fps)
-    time_s, rest = motion.time_s, at_rest or measure_mouth_at_rest(motion, units)
-    said = gesture_curves(units, time_s, [name for name in (*GESTURES, OVAL) if name not in motion.names])
-    said |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*GESTURES} & {*motion.names}}
+    rest, opening = at_rest or measure_mouth_at_rest(motion, units), motion["opening"].astype(np.float64)
+    weights = gesture_curves(units, motion.time_s, [name for name in (*GESTURES, OVAL) if name not in motion.names])
+    weights |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*GESTURES} & {*motion.names}}
     # w has half the press of p, with protruded lips: a hole that is almost closed
-    said["pursed"] = np.clip(said["lip_press"] / (0.8 * PURSED_PRESS), 0, 1) * said["protrusion"]
-    said["pursed"] *= np.clip((0.75 - said["lip_press"]) / 0.15, 0, 1)
-    mood = action_units(motion)
-    gap = _parted(read_gap(motion), said, mood)
+    weights["pursed"] = np.clip(weights["lip_press"] / (0.8 * PURSED_PRESS), 0, 1) * weights["protrusion"]
+    weights["pursed"] *= np.clip((0.75 - weights["lip_press"]) / 0.15, 0, 1)
+    mood, gap = action_units(motion), read_gap(motion)
+    parting = ((25, PARTED_GAP), (26, DROPPED_GAP), (10, RAISED_GAP))
+    if any(unit in mood for unit, _ in parting):  # where the lips are free, hardly where they are far apart
+        wanted = sum(length * mood[unit] for unit, length in parting if unit in mood)
+        free = np.clip(1 - 2 * weights["lip_press"], 0, 1) * (1 - PARTED_ROUND_SHARE * weights["protrusion"])
+        gap = gap + free * wanted * np.clip(1 - gap / (2 * DROPPED_GAP), 0, 1)
     if GAP not in motion.names:
-        gap = _articulated(gap, said, time_s)
+        gap = _articulate(gap, weights, motion.time_s)
     gap = close_lips(gap, motion, units)
-    expressed = _expressed(mood, said)
-    oval = said[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
+    expressed = _express(mood, weights)
+    weights[OVAL] = weights[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
+    thickness, fullness = _thickness(motion), 1 - 0.4 * np.clip(opening, 0, 0.4)
+    if thickness is not None and rest.thickness is not None:
+        fullness = np.clip(thickness / rest.thickness, 0.75, 1.25)
+    jaw = usual = jaw_drop(gap)
+    if rest.chin is not None:  # as tracked (point 152, y upwards), within limits that suit the gap
+        drop = rest.chin - motion["y_152"].astype(np.float64)
+        jaw = np.clip(drop, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
     mouth = SpokenMouth(
         motion.rate_hz,
         gap,
-        _width(motion, rest, said | expressed, oval),
-        _fullness(motion, rest) * (1 - TIGHT_FULLNESS * expressed["tight"]),
-        _jaw(motion, rest, gap) * (1 - TUCKED_CHIN_SHARE * said["lip_tuck"]),
-        said["tongue"],
-        said["lip_tuck"],
-        said["protrusion"],
-        said["spread"],
-        said["lip_press"],
-        said["teeth"],
-        said["pursed"],
-        oval,
+        _widen(motion, rest, weights | expressed),
+        fullness * (1 - TIGHT_FULLNESS * expressed["tight"]),
+        jaw * (1 - TUCKED_CHIN_SHARE * weights["lip_tuck"]),
+        *(weights[name] for name in (*GESTURES, "pursed", OVAL)),
         **{name: expressed[name] for name in EXPRESSED},
     )
     return mouth if fps is None else mouth.at(fps)
@@ -267,25 +271,11 @@ def jaw_drop(gap: Any) -> Any:
     return JAW_SHARE * (np.asarray(gap) - upper_share(gap))
 
 
-def _parted(gap: Curve, said: dict[str, Curve], mood: dict[int, Curve]) -> Curve:
-    """Return a gap that is parted by a mood where the lips are free, hardly where they are far apart [shape=(T,)]."""
-    wanted = sum(
-        length * mood[unit] for unit, length in ((25, PARTED_GAP), (26, DROPPED_GAP), (10, RAISED_GAP)) if unit in mood
-    )
-    if isinstance(wanted, int):
-        return gap
-    free = np.clip(1 - 2 * said["lip_press"], 0, 1) * (1 - PARTED_ROUND_SHARE * said["protrusion"])
-    return gap + free * wanted * np.clip(1 - gap / (2 * DROPPED_GAP), 0, 1)
-
-
-def _expressed(mood: dict[int, Curve], said: dict[str, Curve]) -> dict[str, Curve]:
-    """Return what a mood does to the mouth, as far as protruded and tucked lips leave it free [each shape=(T,)].
-
-    Rounding, and teeth on the lip, are seen in any mood.
-    """
-    none = np.zeros(len(said["protrusion"]))
-    free = 1 - (1 - ROUND_SHARE) * np.clip(said["protrusion"], 0, 1)
-    lifted = free * (1 - 0.5 * said["lip_tuck"])
+def _express(mood: dict[int, Curve], weights: dict[str, Curve]) -> dict[str, Curve]:
+    """Return what a mood does to the mouth, as far as protruded and tucked lips leave it free [each shape=(T,)]."""
+    none = np.zeros(len(weights["protrusion"]))
+    free = 1 - (1 - ROUND_SHARE) * np.clip(weights["protrusion"], 0, 1)
+    lifted = free * (1 - 0.5 * weights["lip_tuck"])
     return {
         "smile": mood.get(12, none) * free,
         "frown": mood.get(15, none) * free,
@@ -297,57 +287,33 @@ def _expressed(mood: dict[int, Curve], said: dict[str, Curve]) -> dict[str, Curv
     }
 
 
-def _articulated(gap: Curve, said: dict[str, Curve], time_s: Curve) -> Curve:
-    """Return a gap that suits what is said beside p, b and m: teeth on the lip, tongue between the teeth, a round hole.
-
-    said : the articulatory channels, with ``pursed`` [each shape=(T,)]
-    """
-    press, tuck, pursed = said["lip_press"], said["lip_tuck"], said["pursed"]
+def _articulate(gap: Curve, weights: dict[str, Curve], time_s: Curve) -> Curve:
+    """Return a gap that suits what is said beside p, b and m: teeth on the lip, the tongue out, a round hole."""
+    press, tuck, pursed = weights["lip_press"], weights["lip_tuck"], weights["pursed"]
     free = (1 - press) * np.clip(gap / 0.03, 0, 1)
-    shown = np.maximum(2 * said["teeth"] - 1, 0)
-    for weight, least in ((shown, TEETH_GAP), (said["protrusion"] ** 2 * (1 - pursed), ROUND_GAP)):
-        gap = gap + free * weight * (np.maximum(gap, least) - gap)
-    between = np.clip((said["tongue"] - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
+    shown = np.maximum(2 * weights["teeth"] - 1, 0)
+    for weight, low in ((shown, TEETH_GAP), (weights["protrusion"] ** 2 * (1 - pursed), ROUND_GAP)):
+        gap = gap + free * weight * (np.maximum(gap, low) - gap)
+    between = np.clip((weights["tongue"] - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
     apart = np.clip((0.75 - press) / 0.15, 0, 1)  # also where they were tracked as closed
-    for weight, (least, most) in ((pursed, PURSED_GAP), (between * apart, TONGUE_GAP), (tuck * apart, TUCKED_GAP)):
-        gap = gap + weight * (np.clip(gap, least, most) - gap)
-    return np.minimum(gap, _most_beside_tucks(gap, tuck, time_s))
-
-
-def _most_beside_tucks(gap: Curve, tuck: Curve, time_s: Curve) -> Curve:
-    """Return the largest gap from which the lip can reach every tucked frame at ``LIP_SPEED`` [shape=(T,)]."""
-    at_tucks = np.where(tuck > 0.5, gap, np.inf)
+    for weight, (low, high) in ((pursed, PURSED_GAP), (between * apart, TONGUE_GAP), (tuck * apart, TUCKED_GAP)):
+        gap = gap + weight * (np.clip(gap, low, high) - gap)
+    at_tucks = np.where(tuck > 0.5, gap, np.inf)  # the lip can reach every tucked frame at ``LIP_SPEED``
     after = np.minimum.accumulate(at_tucks - LIP_SPEED * time_s) + LIP_SPEED * time_s
     before = np.minimum.accumulate((at_tucks + LIP_SPEED * time_s)[::-1])[::-1] - LIP_SPEED * time_s
-    return np.minimum(after, before)
+    return np.minimum(gap, np.minimum(after, before))
 
 
-def _width(motion: Motion, rest: MouthAtRest, said: dict[str, Curve], oval: Curve) -> Curve:
-    across = _across(motion)
+def _widen(motion: Motion, rest: MouthAtRest, weights: dict[str, Curve]) -> Curve:
+    across = _width(motion)
     if across is None or rest.width is None:
         change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
     else:
         change = across / rest.width - 1
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
     for name, wider in (("smile", SMILE_WIDTH), ("stretched", STRETCH_WIDTH), ("dropped", DROPPED_WIDTH)):
-        width = width + wider * said[name]
-    for weight, most in ((said["protrusion"], ROUND_WIDTH), (said["pursed"], PURSED_WIDTH), (oval, OVAL_WIDTH)):
-        width = width + weight * (np.minimum(width, most) - width)
-    spread = said["spread"] * (1 - said["protrusion"])
+        width = width + wider * weights[name]
+    for name, limit in (("protrusion", ROUND_WIDTH), ("pursed", PURSED_WIDTH), (OVAL, OVAL_WIDTH)):
+        width = width + weights[name] * (np.minimum(width, limit) - width)
+    spread = weights["spread"] * (1 - weights["protrusion"])
     return np.asarray(width + spread * (np.maximum(width, SPREAD_WIDTH) - width))
-
-
-def _fullness(motion: Motion, rest: MouthAtRest) -> Curve:
-    thickness = _thickness(motion)
-    if thickness is None or rest.thickness is None:
-        return 1 - 0.4 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
-    return np.clip(thickness / rest.thickness, 0.75, 1.25)
-
-
-def _jaw(motion: Motion, rest: MouthAtRest, gap: Curve) -> Curve:
-    """Return how far the chin drops: as tracked (point 152, y upwards), within limits that suit the gap."""
-    usual = jaw_drop(gap)
-    if rest.chin is None:
-        return np.asarray(usual)
-    chin = motion["y_152"].astype(np.float64)
-    return np.clip(rest.chin - chin, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)

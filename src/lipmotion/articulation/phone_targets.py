@@ -14,7 +14,8 @@ targets are ours, set by eye, and those of diphthongs change within the phone.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -132,8 +133,24 @@ def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] 
     """
     closing = mark_closing_phones(units)
     phones = [LIP_CLOSING[0] if closes else span.label.phone for span, closes in zip(units, closing, strict=True)]
-    edges_s = np.array([(span.start_s, span.end_s) for span in units]).reshape(-1, 2).T
-    return {name: _curve(name, phones, edges_s, time_s) for name in names}
+    start_s, end_s = np.array([(span.start_s, span.end_s) for span in units]).reshape(-1, 2).T
+    curves = {}
+    for name in names:
+        default, targets = _TARGETS[name]
+        chosen = [targets.get(phone, default) for phone in phones]
+        begin, end, strength, width_s = np.array(chosen).reshape(-1, 4).T
+        edges_s = (start_s - REACH * width_s, end_s + REACH * width_s)
+        first, stop = (np.searchsorted(time_s, edge_s) for edge_s in edges_s)
+        of = np.repeat(np.arange(len(chosen)), stop - first)
+        frames = np.arange(len(of)) - np.repeat(np.cumsum(stop - first) - stop, stop - first)
+        time = time_s[frames]
+        outside = np.maximum(np.maximum(start_s[of] - time, time - end_s[of]), 0) / width_s[of]
+        dominance = strength[of] * np.exp(-outside * outside)
+        share = np.clip((time - start_s[of]) / np.maximum(end_s - start_s, 1e-9)[of], 0, 1)
+        pull = np.bincount(frames, dominance * (begin[of] + share * (end - begin)[of]), len(time_s))
+        total = 1e-6 + np.bincount(frames, dominance, len(time_s))
+        curves[name] = np.clip((1e-6 * default.begin + pull) / total, 0, 1)
+    return curves
 
 
 def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] = GESTURES) -> Motion:
@@ -146,19 +163,45 @@ def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] 
     return Motion(values, motion.rate_hz, (*motion.channels, *(Channel(name, WEIGHT) for name in curves)))
 
 
-def _curve(name: str, phones: Sequence[str], edges_s: Curve, time_s: Curve) -> Curve:
-    """Return a channel; ``edges_s``: begin and end of the phones [shape=(2, N)]."""
-    default, targets = _TARGETS[name]
-    found = [targets.get(phone, default) for phone in phones]
-    begin, end, strength, width_s = np.array([(t.begin, t.end, t.dominance, t.width_s) for t in found]).reshape(-1, 4).T
-    start_s, end_s = edges_s
-    first, stop = (np.searchsorted(time_s, edge_s) for edge_s in (start_s - REACH * width_s, end_s + REACH * width_s))
-    of = np.repeat(np.arange(len(found)), stop - first)
-    frames = np.arange(len(of)) - np.repeat(np.cumsum(stop - first) - stop, stop - first)
-    time = time_s[frames]
-    outside = np.maximum(np.maximum(start_s[of] - time, time - end_s[of]), 0) / width_s[of]
-    dominance = strength[of] * np.exp(-outside * outside)
-    share = np.clip((time - start_s[of]) / np.maximum(end_s - start_s, 1e-9)[of], 0, 1)
-    asked = dominance * (begin[of] + share * (end - begin)[of])
-    weighted = 1e-6 * default.begin + np.bincount(frames, asked, len(time_s))
-    return np.clip(weighted / (1e-6 + np.bincount(frames, dominance, len(time_s))), 0, 1)
+FADE_S = 0.06
+"""Longest half of a cross-fade between two phones, in seconds; of short phones, half of the phone."""
+MIN_FADE_S = 0.025
+"""Shortest half of a cross-fade: no curve jumps, and a phone under 50 ms is not wholly said."""
+
+
+def crossfade_phones(units: Timeline[Unit], time_s: Curve, kind: Callable[[str], str]) -> dict[str, Curve]:
+    """Return how far each kind of phone is being said, 0 to 1 [each shape=(T,)]; at every time they add up to 1.
+
+    kind : the kind of each phone; before the first and after the last unit, and in gaps, it is that of an empty phone
+    Neighbours are cross-faded by half a cosine around the border between them. The middle of a phone of 50 ms or
+    more is wholly its own.
+    """
+    names, starts, ends = [kind("")], [float("-inf")], [float("inf")]
+    for span in units:
+        if span.duration_s <= 0:
+            continue
+        if span.start_s > starts[-1] and ends[-1] > span.start_s:
+            ends[-1] = span.start_s
+        if ends[-1] < span.start_s:
+            names.append(kind(""))
+            starts.append(ends[-1])
+            ends.append(span.start_s)
+        names.append(kind(span.label.phone))
+        starts.append(span.start_s)
+        ends.append(span.end_s)
+    if len(names) > 1:
+        names.append(kind(""))
+        starts.append(ends[-1])
+        ends.append(float("inf"))
+    lengths = [end - start for start, end in zip(starts, ends, strict=True)]
+    halves = [max(min(FADE_S, left / 2, right / 2), MIN_FADE_S) for left, right in pairwise(lengths)]
+    rising = [np.ones(len(time_s))]
+    for border, half in zip(starts[1:], halves, strict=True):
+        rising.append((1 + np.sin(np.pi / 2 * np.clip((time_s - border) / half, -1, 1))) / 2)
+    weights: dict[str, Curve] = {name: np.zeros(len(time_s)) for name in names}
+    reached = rising[0]
+    for name, following in zip(names, [*rising[1:], np.zeros(len(time_s))], strict=True):
+        after = np.minimum(following, reached)
+        weights[name] += reached - after
+        reached = after
+    return weights

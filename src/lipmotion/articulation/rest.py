@@ -1,22 +1,26 @@
-"""The rest pose of a mouth: the frames that show it, and sizes in it."""
+"""Rest: the frames that show the rest pose of a mouth, and motion that rests in pauses between phrases."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import CLOSED_OPENING, smooth_step
 from lipmotion.errors import InputError
-from lipmotion.types import Motion, Span, Timeline, Unit
-from lipmotion.units import SILENCE, is_silent
+from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
+from lipmotion.types.voice_event import BREATH, LAUGHTER
+from lipmotion.units import SILENCE, is_silent, mark_closing_phones
 
-Array = NDArray[np.float64]
+Curve = NDArray[np.float64]
 LARGEST_REST = 0.06
 """A rest pose more open than this, in eye distances, is speech: the recording has hardly any silence."""
 
 
-def find_rest_frames(motion: Motion, units: Timeline[Unit], opening: Array | None = None) -> NDArray[np.bool_]:
+def find_rest_frames(motion: Motion, units: Timeline[Unit], opening: Curve | None = None) -> NDArray[np.bool_]:
     """Return the frames of the rest pose [shape=(T,), bool]: silence, or else the most closed tenth of the frames.
 
     units   : phones in time. Silence whose median opening is more than ``LARGEST_REST`` does not count
@@ -49,17 +53,17 @@ def add_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Moti
     still = np.median(motion.values[rest], axis=0)
     count = int(np.count_nonzero(rest[frames])) + len(values) // 5 + 1
     start_s, long_s, silent_s = (number / rate_hz for number in (frames.start, len(values), count))
-    said = units.between(start_s, start_s + long_s)
+    phones = units.between(start_s, start_s + long_s)
     silence, label = np.tile(still, (count, 1)), Unit(SILENCE)
     if frames.start == 0:
-        spans = (*said, Span(long_s, long_s + silent_s, label))
+        spans = (*phones, Span(long_s, long_s + silent_s, label))
         return replace(motion, values=np.concatenate([values, silence])), Timeline(spans), slice(0, len(values))
-    spans = (Span(0.0, silent_s, label), *said.shifted(silent_s))
+    spans = (Span(0.0, silent_s, label), *phones.shifted(silent_s))
     together = np.concatenate([silence, values])
     return replace(motion, values=together), Timeline(spans), slice(count, len(together))
 
 
-def measure_at_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> float:
+def measure_at_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> float:
     """Return the median of a curve at rest.
 
     name : of the curve, for the message
@@ -70,3 +74,145 @@ def measure_at_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> float:
     if not value > 0:
         raise InputError(f"the {name} is {value:g} at rest, required more than 0")
     return value
+
+
+REST, NATURAL = "rest", "natural"
+"""Lips close softly in pauses; or they do in pauses what the model learned, as people who breathe and hold a sound."""
+MIN_PAUSE_S: Final = 0.25
+"""In shorter pauses the mouth goes on; silence at both ends of a line counts at any length."""
+CLOSING_S, OPENING_S = 0.2, 0.12
+"""Lips take so long to close after a phrase, and begin to part so long before the next one; less in short pauses."""
+BREATH_GAP, BREATH_S = 0.03, 0.04
+"""The lips are parted by this, in eye distances, for a breath, so long before a phrase that begins with open lips."""
+MIN_BREATH_S: Final = 0.4
+"""Pauses in which a breath is taken last at least so long."""
+INHALING_GAP = 0.05
+"""The lips are parted by this for a breath that is detected, as GRID speaker 1 does (docs/expression.md)."""
+LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
+"""In laughter the lips are parted by the first length in the loudest call, by this share of it between calls."""
+CALL_S, EVENT_EDGE_S = 0.05, 0.08
+"""How long a call of laughter opens the mouth (a standard deviation); laughter and breaths part the lips so long before
+and let them close so long after."""
+PINNED_S: Final = 0.15
+"""Within this time of a pin the motion stays as it is."""
+
+
+def find_pauses(units: Timeline[Unit]) -> list[tuple[float, float, bool, bool]]:
+    """Return the pauses in which the mouth rests: start and end in seconds, and whether speech is before and after."""
+    runs: list[list[float]] = []
+    for span in units:
+        if is_silent(span.label.phone):
+            if runs and abs(runs[-1][1] - span.start_s) < 1e-6:
+                runs[-1][1] = span.end_s
+            else:
+                runs.append([span.start_s, span.end_s])
+    first = min((span.start_s for span in units if not is_silent(span.label.phone)), default=np.inf)
+    last = max((span.end_s for span in units if not is_silent(span.label.phone)), default=-np.inf)
+    pauses = [(start_s, end_s, first < end_s - 1e-9, last > start_s + 1e-9) for start_s, end_s in runs]
+    return [each for each in pauses if each[1] - each[0] >= MIN_PAUSE_S - 1e-9 or not (each[2] and each[3])]
+
+
+def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
+    """Return how far the mouth rests at each time, 0 to 1 [shape=(T,)]: 0 in speech and in short pauses.
+
+    It leaves 0 where a phrase ends and is 0 again where the next one begins.
+    """
+    weight = np.zeros(len(time_s))
+    for start_s, end_s, after_speech, before_speech in find_pauses(units):
+        needed_s = CLOSING_S + OPENING_S if after_speech and before_speech else CLOSING_S
+        share = min((end_s - start_s) / needed_s, 1.0)
+        inside = slice(*np.searchsorted(time_s, (start_s - 1e-9, end_s + 1e-9)))
+        closed = np.ones(len(time_s[inside]))
+        if after_speech:
+            closed = smooth_step((time_s[inside] - start_s) / max(share * CLOSING_S, 1e-9))
+        if before_speech:
+            closed = np.minimum(closed, smooth_step((end_s - time_s[inside]) / max(share * OPENING_S, 1e-9)))
+        weight[inside] = np.maximum(weight[inside], closed)
+    return weight
+
+
+def share_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
+    """Return phones in time in which each pause that the mouth does not rest in is shared by the phones beside it."""
+    starts_s, ends_s = np.array([(start_s, end_s) for start_s, end_s, *_ in find_pauses(units)]).reshape(-1, 2).T
+    spans: list[Span[Unit]] = []
+    short_s = 0.0
+    for span in units:
+        last = int(np.searchsorted(starts_s, span.start_s + 1e-6)) - 1  # the last pause that begins before it
+        if is_silent(span.label.phone) and not (last >= 0 and span.end_s <= ends_s[last] + 1e-6):
+            short_s += span.duration_s
+        else:
+            if short_s and spans:
+                spans[-1] = replace(spans[-1], end_s=span.start_s - short_s / 2)
+            spans.append(replace(span, start_s=span.start_s - short_s / 2) if short_s and spans else span)
+            short_s = 0.0
+    return Timeline(tuple(spans))
+
+
+def rest_in_pauses(
+    generation: Generation, style: str, pinned_s: Sequence[float] = (), events: Sequence[VoiceEvent] = ()
+) -> Generation:
+    """Return generated motion whose mouth is in its rest pose in pauses, with closed lips.
+
+    style    : ``rest``; or ``natural``, which leaves the motion as it is
+    pinned_s : times of pins, around which the motion stays as it is
+    events   : breaths and laughter that are detected: the mouth opens for them, where it rests else
+    Before phrases after a longer pause the lips part for a breath. The motion may have any channels; without phones it
+    stays as it is.
+    """
+    motion, units = generation.motion, generation.units
+    if style == NATURAL or not find_pauses(units) or not len(motion.values):
+        return generation
+    time_s = motion.time_s
+    weight = pause_weight(units, time_s)
+    for pin_s in pinned_s:
+        weight *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
+    values, resting = motion.values.copy(), np.flatnonzero(weight)
+    pose = np.median(values[find_rest_frames(motion, units)].astype(np.float64), axis=0)
+    if "opening" in motion.names:
+        pose[motion.column("opening")] = min(pose[motion.column("opening")], 0.5 * CLOSED_OPENING)
+    values[resting] += weight[resting, None] * (pose - values[resting])
+    if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
+        column = motion.column("opening")
+        values[:, column] = np.maximum(values[:, column], _open_for_breaths(units, time_s) * (weight < 1))
+        if events:
+            lacking = np.maximum(_open_for_events(events, time_s) * weight - values[:, column], 0)
+            # by how much each channel changes with the opening, on average; motion that hardly opens the mouth says
+            # nothing of that: the opening changes alone, and with it the outer lips
+            centred = motion.values.astype(np.float64) - motion.values.astype(np.float64).mean(axis=0)
+            opening = centred[:, column]
+            follow = np.array([float(name in ("opening", "outer")) for name in motion.names])
+            if float(opening.std()) >= 0.2 * BREATH_GAP:
+                follow = opening @ centred / (opening @ opening)
+            values += lacking[:, None] * follow
+    return replace(generation, motion=Motion(values, motion.rate_hz, motion.channels))
+
+
+def _open_for_breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
+    """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]."""
+    gap = np.zeros(len(time_s))
+    phones = zip(units, mark_closing_phones(units), strict=True)
+    spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
+    begins_s = np.array([span.start_s for span, _ in spoken])
+    for start_s, end_s, _, before_speech in find_pauses(units):
+        following = int(np.searchsorted(begins_s, end_s - 1e-6))
+        if before_speech and end_s - start_s >= MIN_BREATH_S and following < len(spoken) and not spoken[following][1]:
+            near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
+            share = 1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S)
+            gap[near] = np.maximum(gap[near], BREATH_GAP * smooth_step(share))
+    return gap
+
+
+def _open_for_events(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:
+    """Return the least opening for what is detected in pauses, in eye distances [shape=(T,)]."""
+    opening = np.zeros(len(time_s))
+    for event in events:
+        if event.kind not in (BREATH, LAUGHTER):
+            continue
+        near = slice(*np.searchsorted(time_s, (event.start_s - EVENT_EDGE_S, event.end_s + EVENT_EDGE_S)))
+        inside = np.minimum(time_s[near] - event.start_s, event.end_s - time_s[near]) + EVENT_EDGE_S
+        gap = smooth_step(inside / (2 * EVENT_EDGE_S)) * (INHALING_GAP if event.kind == BREATH else LAUGH_GAP)
+        if event.kind == LAUGHTER:
+            calls = [loud * np.exp(-np.square((time_s[near] - call_s) / CALL_S) / 2) for call_s, loud in event.calls]
+            gap *= LAUGH_SHARE + (1 - LAUGH_SHARE) * np.max(calls, axis=0, initial=0)
+        opening[near] = np.maximum(opening[near], gap)
+    return opening

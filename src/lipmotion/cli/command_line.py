@@ -52,7 +52,7 @@ MEANT = {
     **dict.fromkeys(("emotion", "expression"), ("mood",)),
 }
 """Options of other programs, and what may be meant here: the first that the verb has."""
-LEAST_LIKENESS = 0.7
+MIN_LIKENESS = 0.7
 """So alike must an option be to one that does not exist to be suggested: ``--force`` is not meant by ``--voice``."""
 NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 """A negative number, which is no option."""
@@ -68,14 +68,16 @@ def run(words: Sequence[str], stopper: Stopper, events: Events) -> None:
     """
     if sys.stdout is None:
         raise ExportError("standard output is closed; open it, or send it to a file or to /dev/null")
-    _log_warnings_as_lines()
-    show_before, warnings.showwarning = warnings.showwarning, _log_warning
+    handler, python_warnings = logging.StreamHandler(), logging.getLogger("py.warnings")
+    handler.setFormatter(_WarningFormatter())
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
+    show_before = warnings.showwarning
+    # of Python or of another package, so that it is printed as one printable line
+    warnings.showwarning = lambda message, *_, **__: python_warnings.warning("%s", message)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know every letter of a file's name
     try:
-        options = _parsed(
-            parser(), words or ["--help"], argparse.Namespace(stopper=stopper, events=events, words=words)
-        )
+        options = parse_words(words or ["--help"], argparse.Namespace(stopper=stopper, events=events, words=words))
         events.start(options)
         check_paths(options)
         options.run(options)
@@ -85,36 +87,46 @@ def run(words: Sequence[str], stopper: Stopper, events: Events) -> None:
         flush_output()
 
 
+def parse_words(words: Sequence[str], options: argparse.Namespace) -> argparse.Namespace:
+    """Return the options, over those of a job file and a level.
+
+    If the first word is no verb, the error names the verb that is meant, by other tools' words, too.
+    """
+    program = parser()
+    verbs, verb = _verbs(program), next((word for word in words if not word.startswith("-")), None)
+    if verb is not None and verb not in verbs:
+        near = get_close_matches(verb, verbs, n=1)
+        usual = "animate SPEECH -o OUT" if Path(verb).suffix else ""
+        meant = OF_OTHER_TOOLS.get(verb.lower(), near[0] if near else usual)
+        hint = f"did you mean: {program.prog} {meant}" if meant else f"the verbs are: {', '.join(verbs)}"
+        program.error(f"no verb {verb!r}; {hint}")
+    words = _in_order(program, words)
+    empty = argparse.Namespace(**vars(options))
+    options, unknown = program.parse_known_args(words, options)
+    if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
+        options, unknown = program.parse_known_args(words, empty)
+    if unknown:
+        verbs[options.verb].error(f"unrecognized arguments: {' '.join(unknown)}")
+    return options
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the parser with all verbs."""
-    whole = _Parser(
+    program = _Parser(
         prog="lipmotion",
         description="Speech in, lip motion out, with models trained from your own recordings.",
         epilog=EXIT_CODES,
     )
-    whole.add_argument("--version", action=Version, nargs=0, help="print the version")
-    verbs = whole.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
+    program.add_argument("--version", action=Version, nargs=0, help="print the version")
+    verbs = program.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
     for name in VERBS.names:
         VERBS.load(name)(verbs)
-    return whole
+    return program
 
 
-def _parsed(whole: argparse.ArgumentParser, words: Sequence[str], options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options, over those of a job file and a level."""
-    _check_verb(whole, words)
-    words = _in_order(whole, words)
-    empty = argparse.Namespace(**vars(options))
-    options, unknown = whole.parse_known_args(words, options)
-    if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
-        options, unknown = whole.parse_known_args(words, empty)
-    if unknown:
-        _verbs(whole)[options.verb].error(f"unrecognized arguments: {' '.join(unknown)}")
-    return options
-
-
-def _verbs(whole: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
     """Return the parsers of the verbs of a parser, by name; none where it has none."""
-    actions = (action for action in whole._actions if isinstance(action, argparse._SubParsersAction))
+    actions = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
     return dict(next((action.choices for action in actions), {}))
 
 
@@ -134,7 +146,7 @@ def _in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str
         part for word in words for part in (word.split(maxsplit=1) if word.partition(" ")[0] in known else (word,))
     ]
     while at < len(words) and words[at] != "--":
-        option, at = _option_of(parser, words[at]), at + 1
+        option, at = _find_option(parser, words[at]), at + 1
         if option is None:
             free += 1
         elif option.nargs == "+" and "=" not in words[at - 1]:
@@ -159,7 +171,7 @@ def _is_option(word: str) -> bool:
     return word.startswith("-") and word != "-" and " " not in word and not NUMBER.fullmatch(word)
 
 
-def _option_of(parser: argparse.ArgumentParser, word: str) -> argparse.Action | None:
+def _find_option(parser: argparse.ArgumentParser, word: str) -> argparse.Action | None:
     """Return what an option means; None: the word is none. Raises WrongCommandLineError: the parser has none so."""
     if not _is_option(word):
         return None
@@ -171,21 +183,8 @@ def _option_of(parser: argparse.ArgumentParser, word: str) -> argparse.Action | 
         return known[longer[0]]
     stems = {option.lstrip("-"): option for option in known if option.startswith("--")}
     meant = next((each for each in MEANT.get(name.lstrip("-"), ()) if each in stems), None)
-    near = [meant] if meant else get_close_matches(name.lstrip("-"), stems, n=1, cutoff=LEAST_LIKENESS)
+    near = [meant] if meant else get_close_matches(name.lstrip("-"), stems, n=1, cutoff=MIN_LIKENESS)
     return parser.error(f"unrecognized arguments: {word}" + (f"; did you mean {stems[near[0]]}?" if near else ""))
-
-
-def _check_verb(whole: argparse.ArgumentParser, words: Sequence[str]) -> None:
-    """End with an error if the first word is no verb; it names the verb that is meant, by other tools' words, too."""
-    word = next((word for word in words if not word.startswith("-")), None)
-    verbs = _verbs(whole)
-    if word is None or word in verbs:
-        return
-    near = get_close_matches(word, verbs, n=1)
-    usual = "animate SPEECH -o OUT" if Path(word).suffix else ""
-    meant = OF_OTHER_TOOLS.get(word.lower(), near[0] if near else usual)
-    hint = f"did you mean: {whole.prog} {meant}" if meant else f"the verbs are: {', '.join(verbs)}"
-    whole.error(f"no verb {word!r}; {hint}")
 
 
 class WrongCommandLineError(LipMotionError):
@@ -213,15 +212,3 @@ class _Parser(argparse.ArgumentParser):
 class _WarningFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         return with_program_name(f"warning: {record.getMessage()}")
-
-
-def _log_warning(message: object, *_: object, **__: object) -> None:
-    """Log a warning of Python or of another package, so that it is printed as one printable line."""
-    logging.getLogger("py.warnings").warning("%s", message)
-
-
-def _log_warnings_as_lines() -> None:
-    """Print each logged warning as one line on standard error."""
-    handler = logging.StreamHandler()
-    handler.setFormatter(_WarningFormatter())
-    logging.basicConfig(handlers=[handler], level=logging.WARNING)

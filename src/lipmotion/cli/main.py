@@ -6,7 +6,7 @@ import gc
 import os
 import sys
 
-from lipmotion.cli.terminal.events import Events, events_of
+from lipmotion.cli.terminal.events import Events, create_events
 from lipmotion.cli.terminal.stop import MESSAGE, Stopper
 
 NEW_OBJECTS = 50_000
@@ -22,12 +22,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : words of the command line; None: those of the process, which is then expected to end with this call
     """
     if arguments is None:
-        _occupy_closed_streams()
+        for number in range(3):  # else a file of ours would take the number of a standard stream that is closed
+            try:
+                os.fstat(number)
+            except OSError:
+                os.open(os.devnull, os.O_RDWR)
         gc.set_threshold(NEW_OBJECTS)
     words = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None and sys.argv[0].replace("\\", "/").rpartition("/")[2].lower() in {"rhubarb", "rhubarb.exe"}:
         words = ["cues", "--datFrameRate", "24", *words]  # under this name programs that start Rhubarb find it
-    stopper, events = Stopper(), events_of(words)
+    stopper, events = Stopper(), create_events(words)
     try:
         try:
             stopper.listen()
@@ -36,15 +40,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _report_failure(events, stopper.code or 130, MESSAGE)
     finally:
         stopper.stop_listening(process_ends=arguments is None)
-
-
-def _occupy_closed_streams() -> None:
-    """Open nothing in the place of a standard stream that is closed: else a file of ours would take its number."""
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)
 
 
 def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
@@ -57,26 +52,20 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
 
         stopper.settle()
         discard_pending_output()
-    except Exception as error:
-        stopper.check()  # interrupted work may fail in any way
+    except (Exception, SystemExit) as error:  # of argparse: help, version, a wrong command line; or of an extension
+        is_exit = isinstance(error, SystemExit)
+        if not is_exit:
+            stopper.check()  # interrupted work may fail in any way
         from lipmotion.cli.terminal.status import outcome
 
         known = outcome(error)
         stopper.settle()
-        if known is None:
+        if known is not None:
+            return _report_failure(events, known[0], f"error: {known[1]}")
+        if not is_exit:
             events.fail(f"{type(error).__name__}: {error}", 1)
             raise
-        code, reason = known
-        return _report_failure(events, code, f"error: {reason}")
-    except SystemExit as end:  # argparse: help, version, a wrong command line; or an extension
-        from lipmotion.cli.terminal.status import outcome
-
-        known = outcome(end)
-        stopper.settle()
-        if known is not None:
-            code, reason = known
-            return _report_failure(events, code, f"error: {reason}")
-        code = int(end.code or 0)
+        code = int(error.code or 0) if isinstance(error, SystemExit) else 0
         if code:
             events.fail("wrong command line", code)
         return code

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import zlib
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import check_regular, portable_name, read_text_file, whole_folder
+from lipmotion.storage.files import atomic_folder, check_regular, portable_name, read_text_file
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.schema import ArraySpec, checked_sizes
+from lipmotion.storage.schema import ArraySpec, check_sizes
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Audio,
@@ -40,8 +39,6 @@ KEYS = frozenset(
 )
 """The keys of every description. ``speaker`` and ``phones`` came with version 2 of the corpus; without them both are
 unknown. ``checksums`` came later; without them, only impossible arrays are noticed."""
-UNCHECKED = "crops"
-"""The array that is read only where it is used, and has no checksum."""
 LARGEST_FEATURE = 1e3
 """No feature has a larger magnitude; features are standardised."""
 UTTERANCE_ARRAYS = {
@@ -83,11 +80,39 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
         raise InputError(
             f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder, on Windows, too"
         )
-    check_curves(utterance.track.motion)
-    with whole_folder(folder) as unfinished:
-        for name, array in _arrays(utterance).items():
+    motion, seen = utterance.track.motion, utterance.track.seen
+    crops, phones = utterance.track.crops, utterance.phones
+    check_curves(motion)
+    arrays: dict[str, NDArray[Any]] = {
+        "audio": to_sixteen_bits(utterance.audio.samples),
+        "features": utterance.features.values.astype(np.float32),
+        "motion": motion.values.astype(np.float32),
+        "seen": seen.astype(np.bool_),
+    }
+    description = {
+        "name": utterance.name,
+        "words": utterance.words,
+        "split": utterance.split,
+        "speaker": utterance.speaker,
+        "phones": None if phones is None else [[s.start_s, s.end_s, s.label.phone] for s in phones],
+        "audio_rate_hz": utterance.audio.rate_hz,
+        "duration_s": utterance.audio.duration_s,
+        "rate_hz": motion.rate_hz,
+        "frames": len(seen),
+        "unseen_frames": int((~seen).sum()),
+        "channels": [asdict(channel) for channel in motion.channels],
+        "crops": crops is not None,
+        "notes": utterance.track.notes,
+        "source": utterance.source,
+        "settings": settings,
+        "checksums": {name: _checksum(array) for name, array in arrays.items()},
+    }
+    if crops is not None:  # read only where they are used, without a checksum
+        arrays["crops"] = crops.astype(np.uint8)
+    with atomic_folder(folder) as unfinished:
+        for name, array in arrays.items():
             np.save(unfinished / f"{name}.npy", array)
-        text = as_json(_description(utterance, settings), indent=1, sort_keys=True, ensure_ascii=False)
+        text = as_json(description, indent=1, sort_keys=True, ensure_ascii=False)
         (unfinished / ENTRY).write_text(text + "\n", encoding="utf-8")
         if folder.exists():
             shutil.rmtree(folder)
@@ -127,14 +152,19 @@ def read_utterance(folder: Path) -> Utterance:
     try:
         channels = tuple(Channel(**channel) for channel in entry["channels"])
         arrays = {name: _load(folder, name) for name in UTTERANCE_ARRAYS if name != "crops" or entry["crops"]}
-        sizes = checked_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
+        sizes = check_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
         audio = Audio(from_sixteen_bits(arrays["audio"]), entry["audio_rate_hz"])
         expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
         if sizes["T"] != expected:
             raise ValueError(f"{sizes['T']} frames of features, required {expected} for {audio.duration_s:.2f} s")
         motion = Motion(arrays["motion"].astype(np.float64), entry["rate_hz"], channels)
         check_curves(motion)
-        _check_sums(arrays, entry.get("checksums", {}))
+        for name, checksum in entry.get("checksums", {}).items():
+            if name in arrays and _checksum(arrays[name]) != checksum:
+                raise ValueError(f"{name} holds other bytes than were written")
+        phones = entry.get("phones")
+        if phones is not None:
+            phones = [Span(_COUNT(start_s), _COUNT(end_s), Unit(_TEXT(phone))) for start_s, end_s, phone in phones]
         return Utterance(
             name=entry["name"],
             audio=audio,
@@ -144,62 +174,14 @@ def read_utterance(folder: Path) -> Utterance:
             split=entry["split"],
             source=entry["source"],
             speaker=entry.get("speaker", ""),
-            phones=_timeline(entry.get("phones")),
+            phones=None if phones is None else Timeline(tuple(phones)),
         )
     except (OSError, EOFError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise _damaged(folder, error) from error
 
 
-def _arrays(utterance: Utterance) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {
-        "audio": to_sixteen_bits(utterance.audio.samples),
-        "features": utterance.features.values.astype(np.float32),
-        "motion": utterance.track.motion.values.astype(np.float32),
-        "seen": utterance.track.seen.astype(np.bool_),
-    }
-    if utterance.track.crops is not None:
-        arrays["crops"] = utterance.track.crops.astype(np.uint8)
-    return arrays
-
-
-def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, Any]:
-    motion, seen = utterance.track.motion, utterance.track.seen
-    return {
-        "name": utterance.name,
-        "words": utterance.words,
-        "split": utterance.split,
-        "speaker": utterance.speaker,
-        "phones": None if utterance.phones is None else [[s.start_s, s.end_s, s.label.phone] for s in utterance.phones],
-        "audio_rate_hz": utterance.audio.rate_hz,
-        "duration_s": utterance.audio.duration_s,
-        "rate_hz": motion.rate_hz,
-        "frames": len(seen),
-        "unseen_frames": int((~seen).sum()),
-        "channels": [asdict(channel) for channel in motion.channels],
-        "crops": utterance.track.crops is not None,
-        "notes": utterance.track.notes,
-        "source": utterance.source,
-        "settings": settings,
-        "checksums": {name: _checksum(array) for name, array in _arrays(utterance).items() if name != UNCHECKED},
-    }
-
-
 def _checksum(array: NDArray[Any]) -> int:
     return zlib.crc32(array.tobytes())
-
-
-def _check_sums(arrays: Mapping[str, NDArray[Any]], checksums: Mapping[str, int]) -> None:
-    """Raise ValueError if an array does not have the bytes that were written."""
-    for name, checksum in checksums.items():
-        if name in arrays and _checksum(arrays[name]) != checksum:
-            raise ValueError(f"{name} holds other bytes than were written")
-
-
-def _timeline(rows: Any) -> Timeline[Unit] | None:
-    """Return phones in time. Raises ValueError: not rows of start, end and phone, in order."""
-    if rows is None:
-        return None
-    return Timeline(tuple(Span(_COUNT(start_s), _COUNT(end_s), Unit(_TEXT(phone))) for start_s, end_s, phone in rows))
 
 
 def _load(folder: Path, name: str) -> NDArray[Any]:

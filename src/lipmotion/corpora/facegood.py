@@ -7,14 +7,21 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, MotionFile, RecordingFolder, SourceRecording
-from lipmotion.corpora.splits import LISTS, assign_splits
+from lipmotion.corpora.source_recordings import (
+    AUDIO_SUFFIXES,
+    LISTS,
+    MotionFile,
+    RecordingFolder,
+    SourceRecording,
+    assign_splits,
+)
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.storage.archive import array_in
@@ -43,7 +50,12 @@ def read_facegood(directory: Path) -> RecordingFolder | None:
     for path in directory.iterdir():
         if path.suffix.lower() in AUDIO_SUFFIXES:
             sounds.setdefault(path.stem, []).append(path)
-    ignored, rights = frozenset(directory / name for name in LISTS), _rights(directory)
+    ignored, rights, licence = frozenset(directory / name for name in LISTS), dict[str, str](), directory / "LICENSE"
+    if licence.is_file():
+        with licence.open(encoding="utf-8", errors="replace") as file:
+            lines = [line.strip() for line in file.read(LICENCE_CHARACTERS).splitlines() if line.strip()]
+        owners = [line for line in lines if line.lower().startswith("copyright")]
+        rights = dict(zip(("licence", "attribution"), (*lines[:1], *owners[:1]), strict=False))
     recordings, problems = [], {}
     for path in arrays:
         name = path.stem.removeprefix(VALUES)
@@ -52,12 +64,8 @@ def read_facegood(directory: Path) -> RecordingFolder | None:
             if len(same_name) != 1:
                 raise InputError(f"{path}: {len(same_name)} sounds named {name}, required one: {name}.wav")
             labels = find_labels(same_name[0], ignored=ignored)
-            motion_file = MotionFile(path, RATE_HZ, channels)
-            recordings.append(
-                SourceRecording(
-                    name, same_name[0], labels.words, rights=rights, phones=labels.phones, motion_file=motion_file
-                )
-            )
+            recording = SourceRecording(name, same_name[0], labels.words, rights=rights, phones=labels.phones)
+            recordings.append(replace(recording, motion_file=MotionFile(path, RATE_HZ, channels)))
         except InputError as error:
             problems[name] = str(error)
     return assign_splits(RecordingFolder(KIND, tuple(recordings), problems), directory)
@@ -67,9 +75,8 @@ def read_channels(path: Path) -> tuple[Channel, ...]:
     """Return the channels of a file of names. Raises InputError: not a row of different texts."""
     names = _load(path)
     if names.dtype.kind != "U" or names.ndim != 1 or len(set(names.tolist())) != len(names):
-        raise InputError(
-            f"{path}: an array of {names.dtype} of shape {names.shape}, required one row of different texts"
-        )
+        what = f"an array of {names.dtype} of shape {names.shape}"
+        raise InputError(f"{path}: {what}, required one row of different texts")
     return tuple(Channel(str(name), WEIGHT) for name in names)
 
 
@@ -98,15 +105,3 @@ def _load(path: Path) -> NDArray[Any]:
             return array_in(path.read_bytes())
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: not an array of numbers or texts ({error}); save it with numpy.save") from error
-
-
-def _rights(directory: Path) -> dict[str, str]:
-    """Return the licence and attribution of a LICENSE file: its first line, and its line of the copyright."""
-    path = directory / "LICENSE"
-    if not path.is_file():
-        return {}
-    with path.open(encoding="utf-8", errors="replace") as file:
-        text = file.read(LICENCE_CHARACTERS)
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    owners = [line for line in lines if line.lower().startswith("copyright")]
-    return {"licence": lines[0]} | ({"attribution": owners[0]} if owners else {}) if lines else {}

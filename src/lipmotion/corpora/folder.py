@@ -1,6 +1,7 @@
-"""Reader of folders with videos, or with sounds and motion files; labels beside both where there are any.
+"""Finding the recordings in a folder: all readers by kind, and that of any folder of videos, or sounds with motion.
 
-A video with a table of Live Link Face beside it is not tracked: the table is its motion.
+Labels lie beside both where there are any. A video with a table of Live Link Face beside it is not tracked: the table
+is its motion.
 """
 
 from __future__ import annotations
@@ -11,15 +12,19 @@ from pathlib import Path
 from lipmotion.corpora.separate_sounds import is_of_recorder
 from lipmotion.corpora.source_recordings import (
     AUDIO_SUFFIXES,
+    LISTS,
+    VIDEO_SUFFIXES,
     MotionFile,
     RecordingFolder,
     SourceRecording,
+    assign_splits,
     filter_videos,
 )
-from lipmotion.corpora.splits import LISTS, assign_splits
-from lipmotion.errors import InputError
-from lipmotion.formats.label_files import RecordingLabels, find_labels
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.extensions import Registry
+from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.tables import is_live_link_file
+from lipmotion.storage.files import check_listable
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
 VIDEO_KINDS = (VIDEOS, BOTH)
@@ -37,14 +42,26 @@ def read_folder(directory: Path) -> RecordingFolder:
     in a sub-folder ``anna`` have the speaker ``anna``, and names as ``anna-take1``.
     """
     by_name: dict[str, list[Path]] = {}
+    kinds = set()
     for path in list_files(directory):
-        if _has_motion(path) or filter_videos([path]):
-            name = "-".join(path.relative_to(directory).with_suffix("").parts)
-            by_name.setdefault(name, []).append(path)
+        has_motion = _is_sound(path) and not is_of_recorder(path) and path.is_file() and find_motion_files(path)
+        if has_motion or filter_videos([path]):
+            by_name.setdefault("-".join(path.relative_to(directory).with_suffix("").parts), []).append(path)
+            kinds.add(SOUNDS if has_motion else VIDEOS)
     lists = frozenset(directory / name for name in LISTS)
-    return gather_recordings(
-        _kind(by_name), by_name, lambda name, path: _recording(name, path, directory, lists), directory
-    )
+
+    def read_recording(name: str, path: Path) -> SourceRecording:
+        labels = find_labels(path, ignored=lists)
+        siblings = find_motion_files(path) if _is_sound(path) else find_captures(path)
+        if len(siblings) > 1:
+            files = ", ".join(map(str, siblings))
+            raise InputError(f"{path}: {len(siblings)} motion files beside it: {files}; keep one")
+        motion_file = MotionFile(siblings[0]) if siblings else None
+        speaker = (*path.relative_to(directory).parts[:-1], "")[0]
+        return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, motion_file=motion_file)
+
+    kind = BOTH if len(kinds) > 1 else next(iter(kinds), VIDEOS)
+    return gather_recordings(kind, by_name, read_recording, directory)
 
 
 def list_files(directory: Path) -> list[Path]:
@@ -56,33 +73,25 @@ def list_files(directory: Path) -> list[Path]:
 def gather_recordings(
     kind: str,
     by_name: Mapping[str, list[Path]],
-    recording_of: Callable[[str, Path], SourceRecording],
+    read_recording: Callable[[str, Path], SourceRecording],
     directory: Path,
 ) -> RecordingFolder:
     """Return the recordings of the files with each name; where it has several, or cannot be read, it is a problem.
 
-    recording_of : returns a recording of its name and its file, or raises InputError
-    directory    : where the lists of the splits may lie
+    read_recording : returns a recording of its name and its file, or raises InputError
+    directory : where the lists of the splits may lie
     """
     recordings, problems = [], {}
     for name, paths in by_name.items():
         try:
-            recordings.append(recording_of(name, _only(paths)))
+            if len(paths) > 1:
+                files = ", ".join(map(str, paths))
+                raise InputError(f"{len(paths)} recordings share this name: {files}; rename all but one")
+            recordings.append(read_recording(name, paths[0]))
         except InputError as error:
             problems[name] = str(error)
     recordings.sort(key=lambda recording: recording.name)
     return assign_splits(RecordingFolder(kind, tuple(recordings), problems), directory)
-
-
-def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> SourceRecording:
-    labels: RecordingLabels = find_labels(path, ignored=lists)
-    beside = find_motion_files(path) if _is_sound(path) else find_captures(path)
-    if len(beside) > 1:
-        raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
-    motion_file = MotionFile(beside[0]) if beside else None
-    folders = path.relative_to(directory).parts[:-1]
-    speaker = folders[0] if folders else ""
-    return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, motion_file=motion_file)
 
 
 def find_motion_files(sound: Path) -> list[Path]:
@@ -100,20 +109,39 @@ def _is_sound(path: Path) -> bool:
     return path.suffix.lower() in AUDIO_SUFFIXES
 
 
-def _has_motion(path: Path) -> bool:
-    return _is_sound(path) and not is_of_recorder(path) and path.is_file() and bool(find_motion_files(path))
+CorpusReader = Callable[[Path], RecordingFolder | None]
+"""Returns the recordings in a folder; None where the folder is not of the reader's kind."""
+READERS: Registry[CorpusReader] = Registry(
+    "corpus reader",
+    "lipmotion.corpus_readers",
+    {
+        "grid": "lipmotion.corpora.layouts:read_grid",
+        "facegood": "lipmotion.corpora.facegood:read_facegood",
+        "vocaset": "lipmotion.corpora.vocaset:read_vocaset",
+        "layouts": "lipmotion.corpora.layouts:read_layouts",
+        "folder": "lipmotion.corpora.folder:read_folder",
+    },
+)
 
 
-def _only(paths: list[Path]) -> Path:
-    """Return the only path. Raises InputError: there are several."""
-    if len(paths) > 1:
-        raise InputError(f"{len(paths)} recordings share this name: {', '.join(map(str, paths))}; rename all but one")
-    return paths[0]
+def discover(directory: Path) -> RecordingFolder:
+    """Return the recordings in a folder, from the first reader that recognises its kind.
 
+    GRID of one speaker, FACEGOOD, VOCASET, the table of known corpora (``layouts``), then what installed packages add
+    in alphabetical order, then any folder of videos or sounds.
 
-def _kind(by_name: dict[str, list[Path]]) -> str:
-    """Return the kind of folder, in words."""
-    sounds = {_is_sound(path) for paths in by_name.values() for path in paths}
-    if len(sounds) > 1:
-        return BOTH
-    return SOUNDS if True in sounds else VIDEOS
+    Raises InputError: no such folder. Raises CorpusError: no recordings in it, or its lists contradict each other.
+    """
+    if directory.is_file():
+        raise InputError(f"{directory}: is a file; give the folder of recordings that it is in")
+    if not directory.is_dir():
+        raise InputError(f"{directory}: no such folder; give a folder of recordings")
+    check_listable(directory)
+    readers = sorted(READERS.names, key=lambda name: name == "folder")  # the one that reads any folder is the last
+    folder = next(filter(None, (READERS.load(name)(directory) for name in readers)))
+    if not folder.recordings and not folder.problems:
+        raise CorpusError(
+            f"{directory}: no videos in it, and no sounds with motion beside them; required: files ending in one of "
+            f"{' '.join(sorted(VIDEO_SUFFIXES))}, or a sound and a file of the same name in {' '.join(MOTION_SUFFIXES)}"
+        )
+    return folder

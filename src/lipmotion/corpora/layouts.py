@@ -11,19 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lipmotion.corpora.folder import gather_recordings, list_files
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, filter_videos
-from lipmotion.corpora.splits import LISTS, assign_splits
-from lipmotion.errors import InputError, shortened
+from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits, filter_videos
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.storage.files import read_text_file
 from lipmotion.units import split_words
 
 KIND = "GRID corpus"
-RIGHTS = {
-    "licence": "CC BY 4.0",
-    "attribution": "GRID corpus (Cooke, Barker, Cunningham, Shao 2006), CC BY 4.0",
-}
-
+RIGHTS = {"licence": "CC BY 4.0", "attribution": "GRID corpus (Cooke, Barker, Cunningham, Shao 2006), CC BY 4.0"}
 SILENCES = frozenset({"sil", "sp"})
 """Labels of a word-time file that are not words."""
 WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
@@ -48,19 +43,15 @@ def read_grid(directory: Path) -> RecordingFolder | None:
     files = filter_videos((clips if clips.is_dir() else directory).iterdir())
     if 2 * sum(spell_name(path.stem) is not None for path in files) <= len(files):
         return None
-    recordings, problems, speaker = [], {}, speaker_of_folder(directory.resolve().name)
+    named = re.search(r"(?:^|[^a-z0-9])(s[1-9]\d?)$", directory.resolve().name.lower())  # ``s1``, ``grid-s1``
+    recordings, problems, speaker = [], {}, named[1] if named else ""
     for path in files:
         try:
-            recordings.append(SourceRecording(path.stem, path, _words(directory, path), rights=RIGHTS, speaker=speaker))
+            words = _find_words(path, (directory / "align", path.parent))
+            recordings.append(SourceRecording(path.stem, path, words, rights=RIGHTS, speaker=speaker))
         except InputError as error:
             problems[path.stem] = str(error)
     return assign_splits(RecordingFolder(KIND, tuple(recordings), problems), directory)
-
-
-def speaker_of_folder(folder: str) -> str:
-    """Return the speaker that a folder is named after (``s1``, ``grid-s1``), or an empty text."""
-    found = re.search(r"(?:^|[^a-z0-9])(s[1-9]\d?)$", folder.lower())
-    return found[1] if found else ""
 
 
 def spell_name(name: str) -> tuple[str, ...] | None:
@@ -68,24 +59,14 @@ def spell_name(name: str) -> tuple[str, ...] | None:
     if not NAME.fullmatch(name):
         return None
     command, colour, preposition, letter, digit, adverb = tuple(name)
-    return (
-        *(COMMANDS[command], COLOURS[colour], PREPOSITIONS[preposition]),
-        *(letter, DIGITS[digit], ADVERBS[adverb]),
-    )
+    first_words = (COMMANDS[command], COLOURS[colour], PREPOSITIONS[preposition])
+    return (*first_words, letter, DIGITS[digit], ADVERBS[adverb])
 
 
-def _words(directory: Path, video: Path) -> tuple[str, ...] | None:
-    """Return the words of a video: from its word-time file, else from its name; None if neither gives them."""
-    return aligned_words(video, (directory / "align", video.parent)) or spell_name(video.stem)
-
-
-def aligned_words(video: Path, folders: Iterable[Path]) -> tuple[str, ...] | None:
-    """Return the words of a video from the first of some folders with its word-time file, or None.
-
-    Raises InputError: as ``read_aligned_words``.
-    """
+def _find_words(video: Path, folders: Iterable[Path]) -> tuple[str, ...] | None:
+    """Return the words of a video from the first of some folders with its word-time file, else from its name."""
     files = (folder / f"{video.stem}.align" for folder in folders)
-    return next((read_aligned_words(path) for path in files if path.is_file()), None)
+    return next((read_aligned_words(path) for path in files if path.is_file()), None) or spell_name(video.stem)
 
 
 def read_aligned_words(path: Path) -> tuple[str, ...]:
@@ -95,15 +76,14 @@ def read_aligned_words(path: Path) -> tuple[str, ...]:
     """
     size = path.stat().st_size
     if size > LARGEST_ALIGNMENT_BYTES:
-        raise InputError(
-            f"{path}: {size} bytes, required at most {LARGEST_ALIGNMENT_BYTES}: are they the words of one sentence?"
-        )
+        most = f"required at most {LARGEST_ALIGNMENT_BYTES}"
+        raise InputError(f"{path}: {size} bytes, {most}: are they the words of one sentence?")
     rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
     for number, row in enumerate(rows, 1):
         if len(row) != 3 or not re.fullmatch(r"[0-9]+ [0-9]+", " ".join(row[:2])):
-            raise InputError(f"{path}: line {number} is {shortened(' '.join(row))!r}; required: start end word")
+            raise InputError(f"{path}: line {number} is {shorten(' '.join(row))!r}; required: start end word")
         if not WORD.fullmatch(row[2]):
-            raise InputError(f"{path}: line {number} has {shortened(row[2])!r} where its word should be")
+            raise InputError(f"{path}: line {number} has {shorten(row[2])!r} where its word should be")
     words = tuple(row[2].lower() for row in rows if row[2].lower() not in SILENCES)
     if not words:
         raise InputError(f"{path}: holds no word; remove the file if the words are not known")
@@ -157,51 +137,42 @@ class Layout:
 def read_layouts(directory: Path) -> RecordingFolder | None:
     """Return the recordings in a folder whose videos mostly lie as one of ``LAYOUTS`` says, or None."""
     videos, root = filter_videos(list_files(directory)), directory.resolve().name
+    paths = {path: f"{root}/{path.relative_to(directory).with_suffix('').as_posix()}" for path in videos}
     for layout in LAYOUTS:
-        found = {
-            path: said
-            for path in videos
-            if (said := layout.path.fullmatch(f"{root}/{path.relative_to(directory).with_suffix('').as_posix()}"))
-        }
-        if 2 * len(found) > len(videos):
-            return _read(layout, directory, {path: said.groupdict(default="") for path, said in found.items()})
-    return None
-
-
-def _read(layout: Layout, directory: Path, groups: Mapping[Path, Mapping[str, str]]) -> RecordingFolder:
-    """Return the recordings of a layout; ``groups``: of the path of each video."""
+        matches = {path: match for path, text in paths.items() if (match := layout.path.fullmatch(text))}
+        if 2 * len(matches) > len(videos):
+            break
+    else:
+        return None
+    groups = {path: match.groupdict(default="") for path, match in matches.items()}
     lists = frozenset(directory / name for name in LISTS)
     by_name: dict[str, list[Path]] = {}
-    for path, said in groups.items():
-        if all(said[group] == wanted for group, wanted in layout.only.items()):
-            by_name.setdefault(layout.name.format_map(said).lstrip("-"), []).append(path)
+    for path, named in groups.items():
+        if all(named[group] == wanted for group, wanted in layout.only.items()):
+            by_name.setdefault(layout.name.format_map(named).lstrip("-"), []).append(path)
 
-    def recording_of(name: str, video: Path) -> SourceRecording:
-        said = groups[video]
-        beside = find_labels(video, ignored=lists) if layout.words is None else None
+    def read_recording(name: str, video: Path) -> SourceRecording:
+        named = groups[video]
+        labels = find_labels(video, ignored=lists) if layout.words is None else None
         return SourceRecording(
             name,
             video,
-            beside.words if beside else layout.words(directory, video, said) if layout.words else None,
-            split=said.get("split") or "train",
+            labels.words if labels else layout.words(directory, video, named) if layout.words else None,
+            split=named.get("split") or "train",
             rights=dict(layout.rights),
-            speaker=said["speaker"],
-            phones=beside.phones if beside else None,
+            speaker=named["speaker"],
+            phones=labels.phones if labels else None,
         )
 
-    return gather_recordings(layout.kind, by_name, recording_of, directory)
+    return gather_recordings(layout.kind, by_name, read_recording, directory)
 
 
-def _grid_words(directory: Path, video: Path, said: Mapping[str, str]) -> Words | None:
+def _grid_words(directory: Path, video: Path, groups: Mapping[str, str]) -> Words | None:
     """Return the words of a word-time file, of the speaker or of all, or else of the video's name."""
     above = [folder for folder in video.parents if folder == directory or directory in folder.parents]
     folders = [video.parent, *(folder / "align" for folder in above)]
-    folders += [folder / inner / said["speaker"] for folder in above for inner in ("align", "alignments")]
-    return aligned_words(video, folders) or spell_name(video.stem)
-
-
-def _crema_words(_directory: Path, _video: Path, said: Mapping[str, str]) -> Words | None:
-    return split_words(CREMA_SENTENCES[said["sentence"]])
+    folders += [folder / inner / groups["speaker"] for folder in above for inner in ("align", "alignments")]
+    return _find_words(video, folders)
 
 
 def _tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words | None:
@@ -234,7 +205,7 @@ LAYOUTS = (
         "CREMA-D",
         re.compile(rf".*/(?P<stem>(?P<speaker>1\d{{3}})_(?P<sentence>{'|'.join(CREMA_SENTENCES)})_[A-Z]{{3}}_[A-Z]+)"),
         "{stem}",
-        _crema_words,
+        lambda _directory, _video, groups: split_words(CREMA_SENTENCES[groups["sentence"]]),
         rights={"licence": "ODbL 1.0", "attribution": "CREMA-D (Cao, Cooper, Keutmann, Gur, Nenkova, Verma 2014)"},
     ),
     Layout(

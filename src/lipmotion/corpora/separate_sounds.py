@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, RecordingFolder, SourceRecording
-from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, RecordingFolder
+from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.text_table import read_table
 
@@ -34,26 +33,19 @@ def add_separate_sounds(
     table = read_offsets(directory / OFFSETS) if (directory / OFFSETS).is_file() else {}
     recordings, problems = [], dict(folder.problems)
     for recording in folder.recordings:
-        try:
-            sound = recorder_of(recording)
-        except InputError as error:
-            problems[recording.name] = str(error)
+        stem = recording.file.with_suffix(RECORDER)
+        sounds = [path for suffix in sorted(AUDIO_SUFFIXES) if (path := stem.with_name(stem.name + suffix)).is_file()]
+        if len(sounds) > 1:
+            what = f"{len(sounds)} recorders' sounds beside it: {', '.join(path.name for path in sounds)}"
+            problems[recording.name] = f"{recording.file}: {what}; keep one"
             continue
+        sound = sounds[0] if sounds else None
         recordings.append(replace(recording, recorder=sound, offset_s=table.get(recording.name, offset_s)))
     known = {recording.name for recording in folder.recordings} | problems.keys()
     problems |= {
         name: f"in {OFFSETS}, but there is no such recording" for name in table if is_whole and name not in known
     }
     return RecordingFolder(folder.kind, tuple(recordings), problems)
-
-
-def recorder_of(recording: SourceRecording) -> Path | None:
-    """Return the sound that a recorder made of a recording, or None. Raises InputError: there are several."""
-    stem = recording.file.with_suffix(RECORDER)
-    found = [path for suffix in sorted(AUDIO_SUFFIXES) if (path := stem.with_name(stem.name + suffix)).is_file()]
-    if len(found) > 1:
-        raise InputError(f"{recording.file}: {len(found)} recorders' sounds beside it: {_listed(found)}; keep one")
-    return found[0] if found else None
 
 
 def is_of_recorder(path: Path) -> bool:
@@ -69,32 +61,25 @@ def read_offsets(path: Path) -> dict[str, float]:
     try:
         table = read_table(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES), newline=""))
         if table.plain_names != COLUMNS:
-            raise InputError(f"{path}: the columns are {shortened(','.join(table.names))!r}, required name,offset_ms")
-        found: dict[str, float] = {}
+            raise InputError(f"{path}: the columns are {shorten(','.join(table.names))!r}, required name,offset_ms")
+        offsets: dict[str, float] = {}
         for number, row in table.rows:
-            name, offset_s = row[0].strip().replace("/", "-"), _offset_s(row, f"{path}: line {number}")
-            if found.setdefault(name, offset_s) != offset_s:
-                raise InputError(f"{path}: line {number}: {shortened(name)!r} has another offset above; keep one")
+            name = row[0].strip().replace("/", "-")
+            try:
+                if len(row) != len(COLUMNS):
+                    raise ValueError(f"{len(row)} fields")
+                offset_s = float(row[1].replace(",", ".")) / 1000
+            except ValueError as error:
+                what = f"{path}: line {number}: {shorten(str(error))}"
+                raise InputError(f"{what}, required a name and milliseconds") from error
+            _check(offset_s)
+            if offsets.setdefault(name, offset_s) != offset_s:
+                raise InputError(f"{path}: line {number}: {shorten(name)!r} has another offset above; keep one")
     except ValueError as error:
         raise CorpusError(str(error)) from error
-    return found
-
-
-def _offset_s(row: list[str], where: str) -> float:
-    try:
-        if len(row) != len(COLUMNS):
-            raise ValueError(f"{len(row)} fields")
-        offset_s = float(row[1].replace(",", ".")) / 1000
-    except ValueError as error:
-        raise InputError(f"{where}: {shortened(str(error))}, required a name and milliseconds") from error
-    _check(offset_s)
-    return offset_s
+    return offsets
 
 
 def _check(offset_s: float) -> None:
     if not abs(offset_s) <= LARGEST_OFFSET_S:
         raise InputError(f"the offset is {offset_s * 1000:g} ms, required within ±{LARGEST_OFFSET_S * 1000:.0f}")
-
-
-def _listed(paths: Iterable[Path]) -> str:
-    return ", ".join(path.name for path in paths)

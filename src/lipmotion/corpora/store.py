@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.corpora.entry import LARGEST_NUMBER, is_utterance_name, read_entry, read_utterance, write_utterance
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import TEMPORARY, confined, make_folder, read_text_file, remove_unfinished, whole_file
+from lipmotion.storage.files import TEMPORARY, atomic_file, confine, make_folder, read_text_file, remove_unfinished
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Utterance
 from lipmotion.types.values import any_members, members, number, one_of, text
@@ -72,7 +72,29 @@ class Corpus:
             raise CorpusError(f"{path}: cannot be read: {error.strerror}; ask its owner, or copy it") from error
         if not is_there:
             raise CorpusError(f"{path}: no such corpus; make one: lipmotion corpus prepare RECORDINGS -o {path}")
-        return cls(path, _read_manifest(path / MANIFEST))
+        try:
+            content = from_json(read_text_file(path / MANIFEST, "manifest"))
+            format_name, version = content["format"], content["version"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise CorpusError(f"{path}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
+        file = path / MANIFEST
+        if format_name != FORMAT:
+            raise CorpusError(f"{file}: format is {format_name!r}, required {FORMAT!r}; give a prepared corpus")
+        if version not in READ_VERSIONS:
+            raise CorpusError(
+                f"{file}: corpus version {version}, this lipmotion reads versions up to {VERSION}; "
+                "upgrade lipmotion, or prepare the recordings again into a new folder"
+            )
+        try:
+            index: dict[str, dict[str, Any]] = content["utterances"]
+            _INDEX(index)
+        except (KeyError, InputError) as error:
+            what = f"the list of utterances is damaged ({error})"
+            raise CorpusError(f"{file}: {what}; prepare the corpus again") from error
+        for name in index:
+            if not is_utterance_name(name):
+                raise CorpusError(f"{file}: the utterance {name!r} is not listed as one; prepare the corpus again")
+        return cls(path, index)
 
     @classmethod
     def create(cls, path: Path) -> Corpus:
@@ -81,11 +103,12 @@ class Corpus:
         Raises CorpusError: the folder holds something else. Raises ExportError: it cannot be created.
         """
         if not (path / MANIFEST).is_file():
-            _check_new(path)
+            if path.exists() and (not path.is_dir() or any(not x.name.startswith(TEMPORARY) for x in path.iterdir())):
+                raise CorpusError(f"{path}: exists and is not a corpus; give a new or an empty folder")
             make_folder(path)
             cls(path, {})._write_manifest()
         corpus = cls.open(path)
-        with confined(path):
+        with confine(path):
             make_folder(path / UTTERANCES)
         remove_unfinished(path)
         remove_unfinished(path / UTTERANCES)
@@ -138,10 +161,10 @@ class Corpus:
             raise CorpusError(f"{self.path}: no speaker {unknown[0]!r} (there are: {known})")
         names = self.names(split, speakers)
         if not names:
-            found = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
+            counts = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
             who = f" by {', '.join(speakers)}" if speakers else ""
             raise CorpusError(
-                f"{self.path}: no utterances of split {split!r}{who} (there are {found}); choose another split, or "
+                f"{self.path}: no utterances of split {split!r}{who} (there are {counts}); choose another split, or "
                 "name recordings in a list beside them, test.txt for instance, and prepare them again (docs/corpora.md)"
             )
         return names
@@ -160,6 +183,15 @@ class Corpus:
         frames = sum(int(entry["frames"]) for entry in self._index.values())
         unseen = sum(int(entry["unseen_frames"]) for entry in self._index.values())
         sources = [read_entry(self.folder(name)) for name in self.names()]
+        speakers = []
+        for speaker, (count, spoken_s) in self.speakers.items():
+            length = f"{spoken_s / 60:.1f} minutes" if spoken_s >= 60 else f"{spoken_s:.1f} seconds"
+            speakers.append(f"{speaker or 'unknown'} ({count}, {length})")
+        motions = set()
+        for entry in sources:
+            names = [channel["name"] for channel in entry["channels"]]
+            some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+            motions.add(f"{len(names)} channels ({some}) at {entry['rate_hz']:g} Hz")
         rights = sorted({entry["source"]["attribution"] for entry in sources if "attribution" in entry["source"]})
         return {
             "corpus": str(self.path),
@@ -167,12 +199,9 @@ class Corpus:
             "transcribed": str(sum(entry["words"] is not None for entry in sources)),
             "labelled": f"{sum(entry.get('phones') is not None for entry in sources)} with phones in time",
             "minutes": f"{seconds / 60:.1f}",
-            "speakers": ", ".join(
-                f"{speaker or 'unknown'} ({count}, {_length(spoken_s)})"
-                for speaker, (count, spoken_s) in self.speakers.items()
-            ),
+            "speakers": ", ".join(speakers),
             "frames": f"{frames}, {unseen} without a face",
-            "motion": "; ".join(sorted({_motion(entry) for entry in sources})),
+            "motion": "; ".join(sorted(motions)),
             "attribution": "; ".join(rights) or "none stated",
         }
 
@@ -197,7 +226,7 @@ class Corpus:
         Raises InputError: its name cannot be a folder's. Raises ExportError: it cannot be written.
         """
         folder = self.folder(utterance.name)
-        with confined(self.path):
+        with confine(self.path):
             write_utterance(folder, utterance, settings or {})
         self._index[utterance.name] = _summary(read_entry(folder))
         self._write_manifest()
@@ -205,60 +234,19 @@ class Corpus:
     def refresh(self) -> None:
         """Write the manifest anew from the utterances on disk: several processes may have written them."""
         folders = sorted(path for path in (self.path / UTTERANCES).iterdir() if path.is_dir())
-        whole = [path for path in folders if not path.name.startswith(".")]
-        self._index = {path.name: _summary(read_entry(path)) for path in whole}
+        self._index = {path.name: _summary(read_entry(path)) for path in folders if not path.name.startswith(".")}
         self._write_manifest()
 
     def _write_manifest(self) -> None:
         content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
-        with confined(self.path), whole_file(self.path / MANIFEST) as unfinished:
+        with confine(self.path), atomic_file(self.path / MANIFEST) as unfinished:
             text = as_json(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
 
 
-def _check_new(path: Path) -> None:
-    if path.exists() and (not path.is_dir() or any(not inner.name.startswith(TEMPORARY) for inner in path.iterdir())):
-        raise CorpusError(f"{path}: exists and is not a corpus; give a new or an empty folder")
-
-
 def _summary(entry: dict[str, Any]) -> dict[str, Any]:
-    kept = {key: entry[key] for key in ("split", "duration_s", "frames", "unseen_frames")}
-    return kept | {"speaker": entry.get("speaker", "")}
-
-
-def _length(seconds: float) -> str:
-    """Return a length for users: in minutes, or in seconds if it is shorter than one minute."""
-    return f"{seconds / 60:.1f} minutes" if seconds >= 60 else f"{seconds:.1f} seconds"
-
-
-def _motion(entry: dict[str, Any]) -> str:
-    names = [channel["name"] for channel in entry["channels"]]
-    some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
-    return f"{len(names)} channels ({some}) at {entry['rate_hz']:g} Hz"
-
-
-def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
-    try:
-        content = from_json(read_text_file(path, "manifest"))
-        format_name, version = content["format"], content["version"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
-    if format_name != FORMAT:
-        raise CorpusError(f"{path}: format is {format_name!r}, required {FORMAT!r}; give a prepared corpus")
-    if version not in READ_VERSIONS:
-        raise CorpusError(
-            f"{path}: corpus version {version}, this lipmotion reads versions up to {VERSION}; "
-            "upgrade lipmotion, or prepare the recordings again into a new folder"
-        )
-    try:
-        index: dict[str, dict[str, Any]] = content["utterances"]
-        _INDEX(index)
-        damaged = next((name for name in index if not is_utterance_name(name)), None)
-    except (KeyError, InputError) as error:
-        raise CorpusError(f"{path}: the list of utterances is damaged ({error}); prepare the corpus again") from error
-    if damaged is not None:
-        raise CorpusError(f"{path}: the utterance {damaged!r} is not listed as one; prepare the corpus again")
-    return index
+    listed = {key: entry[key] for key in ("split", "duration_s", "frames", "unseen_frames")}
+    return listed | {"speaker": entry.get("speaker", "")}
 
 
 _COUNTS = ("duration_s", "frames", "unseen_frames")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import gather_recordings
 from lipmotion.corpora.source_recordings import MotionFile, RecordingFolder, SourceRecording
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.markers import measure_markers, to_head_frame
 from lipmotion.types import Motion
@@ -34,7 +34,7 @@ Found by looking at a mesh of a face at rest: where the lips meet, the edges of 
 METRES = "m"
 LARGEST_HEADER_BYTES = 1 << 14
 LARGEST_MESH_BYTES = 1 << 26
-MOST_MESHES = 1 << 20
+MAX_MESHES = 1 << 20
 """Meshes of four hours."""
 NUMBER = re.compile(r"(\d+)$")
 TYPES = {
@@ -55,7 +55,7 @@ def read_vocaset(directory: Path) -> RecordingFolder | None:
     if not (meshes.is_dir() and sounds.is_dir()):
         return None
 
-    def recording_of(name: str, sound: Path) -> SourceRecording:
+    def read_recording(name: str, sound: Path) -> SourceRecording:
         speaker, sentence = sound.parent.name, meshes / sound.parent.name / sound.stem
         first = min(sentence.glob(f"*{MESH}"), default=None)
         if first is None:
@@ -72,7 +72,7 @@ def read_vocaset(directory: Path) -> RecordingFolder | None:
         )
 
     by_name = {f"{sound.parent.name}-{sound.stem}": [sound] for sound in sorted(sounds.glob("*/*.wav"))}
-    return gather_recordings(KIND, by_name, recording_of, directory)
+    return gather_recordings(KIND, by_name, read_recording, directory)
 
 
 def mesh_files(first: Path) -> list[Path]:
@@ -89,11 +89,10 @@ def read_mesh_motion(first: Path, rate_hz: float) -> Motion:
     Raises InputError: a file that is no mesh with the vertices of FLAME, in metres.
     """
     files = mesh_files(first)
-    numbers = [int(found[1]) if (found := NUMBER.search(path.stem)) else 1 for path in files]
-    if not files or max(numbers) > MOST_MESHES:
-        raise InputError(
-            f"{first}: {len(files)} meshes up to number {max(numbers, default=0)}, required 1 to {MOST_MESHES}"
-        )
+    numbers = [int(match[1]) if (match := NUMBER.search(path.stem)) else 1 for path in files]
+    if not files or max(numbers) > MAX_MESHES:
+        what = f"{len(files)} meshes up to number {max(numbers, default=0)}"
+        raise InputError(f"{first}: {what}, required 1 to {MAX_MESHES}")
     vertices = list(FLAME_MARKERS.values())
     places = np.stack([read_vertices(path, vertices) for path in files])
     frames = np.arange(1, max(numbers) + 1)
@@ -118,36 +117,28 @@ def read_vertices(path: Path, chosen: Sequence[int]) -> NDArray[np.float64]:
     head, mark, body = path.read_bytes().partition(b"end_header")
     lines = [line.split() for line in head[:LARGEST_HEADER_BYTES].decode("ascii", "replace").splitlines()]
     try:
-        order, columns = _vertex_columns(lines)
+        if lines[:1] != [["ply"]]:
+            raise ValueError("its first line is not 'ply'")
+        (order,) = (ORDERS[words[1]] for words in lines if words[:1] == ["format"])  # empty: as text
+        first, *others = [number for number, words in enumerate(lines) if words[:1] == ["element"]]
+        _, element, count = lines[first]
+        if element != "vertex" or int(count) != FLAME_VERTICES:
+            wanted = f"{FLAME_VERTICES} vertices: of others, no lip points are known"
+            raise ValueError(f"it begins with {count} of {element!r}, required {wanted}")
+        properties = [words for words in lines[first + 1 : others[0] if others else None] if words[:1] == ["property"]]
+        columns = [(name, TYPES[kind]) for _, kind, name in properties]
         if not mark:
             raise ValueError("its header has no end")
         body = body[body.index(b"\n") + 1 :]
         if order:
             rows = np.frombuffer(body, np.dtype([(name, order + kind) for name, kind in columns]), FLAME_VERTICES)
-            found = np.stack([rows[axis][list(chosen)] for axis in "xyz"], axis=1).astype(np.float64)
+            places = np.stack([rows[axis][list(chosen)] for axis in "xyz"], axis=1).astype(np.float64)
         else:
             lines_of_text, names = body.split(b"\n", FLAME_VERTICES), [name for name, _ in columns]
             texts = [lines_of_text[vertex].split() for vertex in chosen]
-            found = np.array([[float(row[names.index(axis)]) for axis in "xyz"] for row in texts])
+            places = np.array([[float(row[names.index(axis)]) for axis in "xyz"] for row in texts])
     except (ValueError, KeyError, IndexError, TypeError) as error:
-        raise InputError(f"{path}: not a mesh of FLAME in .ply ({shortened(str(error))}); export it again") from error
-    if not np.isfinite(found).all():
+        raise InputError(f"{path}: not a mesh of FLAME in .ply ({shorten(str(error))}); export it again") from error
+    if not np.isfinite(places).all():
         raise InputError(f"{path}: has vertices that are not finite; export it again")
-    return found
-
-
-def _vertex_columns(lines: Sequence[Sequence[str]]) -> tuple[str, list[tuple[str, str]]]:
-    """Return the order of bytes (empty: as text), and name and type of each number of a vertex, from a header.
-
-    Raises ValueError, KeyError, IndexError: not such a header.
-    """
-    if not lines or list(lines[0]) != ["ply"]:
-        raise ValueError("its first line is not 'ply'")
-    (order,) = (ORDERS[words[1]] for words in lines if words[:1] == ["format"])
-    first, *others = [number for number, words in enumerate(lines) if words[:1] == ["element"]]
-    _, element, count = lines[first]
-    if element != "vertex" or int(count) != FLAME_VERTICES:
-        wanted = f"{FLAME_VERTICES} vertices: of others, no lip points are known"
-        raise ValueError(f"it begins with {count} of {element!r}, required {wanted}")
-    properties = [words for words in lines[first + 1 : others[0] if others else None] if words[:1] == ["property"]]
-    return order, [(name, TYPES[kind]) for _, kind, name in properties]
+    return places

@@ -51,6 +51,7 @@ class Inputs:
                    them spectra (``Speech.spectrum``); 0: neither
     prior        : what another model makes of the speech, ``Speech.prior``: its models can stand on other ones
     posteriors   : those of a phone recogniser, ``Speech.posteriors``, where one is installed
+    encoding     : that of the speech encoder, ``Speech.encoding``
     speech_alone : examples without any valid frame: of other speakers, for instance
     """
 
@@ -58,6 +59,7 @@ class Inputs:
     conditions: int = 0
     prior: bool = False
     posteriors: bool = False
+    encoding: bool = False
     speech_alone: bool = False
 
 

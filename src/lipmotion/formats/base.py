@@ -10,7 +10,7 @@ import logging
 import re
 from array import array
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.storage.files import check_regular, whole_file
+from lipmotion.storage.files import atomic_file, check_regular
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.sources import check_kind
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
@@ -139,8 +139,11 @@ def motion_suffixes() -> tuple[str, ...]:
 
 def readable_suffixes() -> tuple[str, ...]:
     """Return the suffixes of all files that ``read_motion`` reads, with the dot."""
-    formats = tuple(suffix for suffix in motion_suffixes() if _can_be_read(suffix))
-    return formats + tuple(f".{name}" for name in MOTION_READERS.names)
+    suffixes = []
+    for suffix in motion_suffixes():
+        with suppress(InputError):  # of what a package adds
+            suffixes += [suffix] if _format_of(Path(f"a{suffix}")).read is not None else []
+    return (*suffixes, *(f".{name}" for name in MOTION_READERS.names))
 
 
 def motion_suffix(path: Path) -> str:
@@ -179,7 +182,7 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
     Raises ExportError: unknown suffix, values that are not finite, or the file cannot be written.
     """
     check_motion(path, generation.motion)
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         _format_of(path).write(temporary, generation, source, model)
 
 
@@ -207,40 +210,38 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     """
     path = Path(path)
     check_kind(path, "motion file")
-    read = _reader_of(path)
+    named = _name_by_content(path)
+    other = _longest(named, [f".{name}" for name in MOTION_READERS.names])
+    if motion_suffix(named):
+        read = _format_of(named).read
+    else:
+        read = MOTION_READERS.load(other.removeprefix(".")) if other else None
     if read is None:
-        raise InputError(
-            f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(readable_suffixes())}"
-        )
+        known = ", ".join(readable_suffixes())
+        raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")
     check_regular(path, "motion file")
     with _errors_name(path):
         size = path.stat().st_size
         if size > LARGEST_MOTION_BYTES:
             raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
         motion, units = read(path)
-        _check_values(path, motion)
-    return motion, units
-
-
-def _check_values(path: Path, motion: Motion) -> None:
-    """Raise InputError for values that are not finite, or weights in percent; warn of weights beyond 0 to 1."""
-    if not (finite := np.isfinite(motion.values)).all():
-        frame, column = np.argwhere(~finite)[0].tolist()
-        first = f"the first is {motion.names[column]!r} in frame {frame}"
-        raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
-    beyond = []
-    for channel, curve in zip(motion.channels, motion.values.T, strict=True):
-        if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
-            low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
-            if high > LARGEST_WEIGHT:
-                raise InputError(
-                    f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
-                )
-            if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
-                beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
+        if not (finite := np.isfinite(motion.values)).all():
+            frame, column = np.argwhere(~finite)[0].tolist()
+            first = f"the first is {motion.names[column]!r} in frame {frame}"
+            raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
+        beyond = []
+        for channel, curve in zip(motion.channels, motion.values.T, strict=True):
+            if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
+                low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
+                if high > LARGEST_WEIGHT:
+                    wrong = f"the weight {channel.name} goes up to {high:g}"
+                    raise InputError(f"{wrong}, required 0 to 1; divide percent by 100")
+                if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
+                    beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
     if beyond:
         what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
         LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
+    return motion, units
 
 
 @contextmanager
@@ -269,16 +270,7 @@ def read_units(path: Path) -> Timeline[Unit]:
     return read_motion(path)[1]
 
 
-def _reader_of(path: Path) -> Callable[[Path], tuple[Motion, Timeline[Unit]]] | None:
-    """Return what reads a file, by its name and, of ``.json``, its beginning; None: nothing does."""
-    named = _named_by_content(path)
-    if motion_suffix(named):
-        return _format_of(named).read
-    other = _longest(named, [f".{name}" for name in MOTION_READERS.names])
-    return MOTION_READERS.load(other.removeprefix(".")) if other else None
-
-
-def _named_by_content(path: Path) -> Path:
+def _name_by_content(path: Path) -> Path:
     """Return a path, or for ``.json`` of another program, and cues, the name that such a file would have otherwise."""
     if motion_suffix(path) not in (".json", ".csv") or not path.is_file():
         return path
@@ -302,13 +294,6 @@ def _format_of(path: Path) -> MotionFormat:
     if not isinstance(chosen, MotionFormat):
         raise InputError(f"what an installed package adds as {_suffix(path)} is {chosen!r}, required a MotionFormat")
     return chosen
-
-
-def _can_be_read(suffix: str) -> bool:
-    try:
-        return _format_of(Path(f"a{suffix}")).read is not None
-    except InputError:
-        return False
 
 
 def _suffix(path: Path) -> str:
@@ -382,9 +367,9 @@ def key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: bool)
     return Thinning(tolerance).choose(time_s, values[:, None]).tolist()
 
 
-MOST_ITEMS = 1 << 20
+MAX_ITEMS = 1 << 20
 """Most items of a list that has not one item a frame."""
-MOST_ROWS = 1 << 22
+MAX_ROWS = 1 << 22
 """Most rows of numbers: eleven hours of frames of 10 ms."""
 _BLANK = re.compile(r"\s*")
 _DECODER = json.JSONDecoder()
@@ -402,63 +387,61 @@ def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any
 
     def take_member(at: int) -> int:
         name, at = _DECODER.raw_decode(text, at)
-        at = next_at(text, _passed(text, next_at(text, at), ":"))
+        at = next_at(text, _pass(text, next_at(text, at), ":"))
         if text[at : at + 1] != "[":
             members[name], at = _DECODER.raw_decode(text, at)
-        elif name == rows_of:
-            members[name], at = _rows(text, at)
-        else:
-            members[name] = []
-            most = MOST_ROWS if name == numbers_of else MOST_ITEMS
-            at = _each(text, at, "[]", lambda place: _take_item(text, place, members[name], most))
-        return at
+            return at
+        if name == rows_of:
+            members[name], at = _read_rows(text, at)
+            return at
+        items: list[Any] = []
+        members[name], limit = items, MAX_ROWS if name == numbers_of else MAX_ITEMS
 
-    end = next_at(text, _each(text, next_at(text, 0), "{}", take_member))
+        def take_item(at: int) -> int:
+            value, at = _DECODER.raw_decode(text, at)
+            items.append(value)
+            if len(items) > limit:
+                raise ValueError(f"a list of more than {limit} items")
+            return at
+
+        return _read_each(text, at, "[]", take_item)
+
+    end = next_at(text, _read_each(text, next_at(text, 0), "{}", take_member))
     if end < len(text):
         raise json.JSONDecodeError("Extra data", text, end)
     return members
 
 
-def _take_item(text: str, at: int, items: list[Any], most: int) -> int:
-    value, at = _DECODER.raw_decode(text, at)
-    items.append(value)
-    if len(items) > most:
-        raise ValueError(f"a list of more than {most} items")
-    return at
-
-
-def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
+def _read_rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
     """Return the rows of a list of lists of numbers [shape=(T, P)], and the position of its end."""
-    numbers = array("d")
-    widths = array("q")
+    numbers, widths = array("d"), array("q")
 
-    def row(at: int) -> int:
+    def take_row(at: int) -> int:
         values, at = _DECODER.raw_decode(text, at)
         if not values or not isinstance(values, list) or len(values) != (widths[0] if widths else len(values)):
-            raise ValueError(
-                f"row {len(widths) + 1} of the values is not a list of as many numbers as the first: no shape"
-            )
+            row = f"row {len(widths) + 1} of the values"
+            raise ValueError(f"{row} is not a list of as many numbers as the first: no shape")
         numbers.extend(values)
         widths.append(len(values))
-        if len(widths) > MOST_ROWS:
-            raise ValueError(f"more than {MOST_ROWS} rows of values")
+        if len(widths) > MAX_ROWS:
+            raise ValueError(f"more than {MAX_ROWS} rows of values")
         return at
 
-    end = _each(text, at, "[]", row)
+    end = _read_each(text, at, "[]", take_row)
     table = np.array(numbers, np.float64)
     return table.reshape(len(widths), widths[0] if widths else 0), end
 
 
-def _each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
+def _read_each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
     """Let ``take`` read each item between brackets; return the position after the closing bracket."""
-    at = next_at(text, _passed(text, at, brackets[0]))
+    at = next_at(text, _pass(text, at, brackets[0]))
     if text[at : at + 1] == brackets[1]:
         return at + 1
     while True:
         at = next_at(text, take(at))
         if text[at : at + 1] == brackets[1]:
             return at + 1
-        at = next_at(text, _passed(text, at, ","))
+        at = next_at(text, _pass(text, at, ","))
 
 
 def next_at(text: str, at: int) -> int:
@@ -467,7 +450,7 @@ def next_at(text: str, at: int) -> int:
     return match.end() if match else at
 
 
-def _passed(text: str, at: int, character: str) -> int:
+def _pass(text: str, at: int, character: str) -> int:
     """Return the position after a required character. Raises JSONDecodeError: another character is there."""
     if text[at : at + 1] != character:
         raise json.JSONDecodeError(f"Expecting {character!r}", text, at)

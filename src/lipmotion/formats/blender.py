@@ -17,7 +17,7 @@ from pathlib import Path
 from lipmotion.errors import ExportError
 from lipmotion.extensions import installed_version
 from lipmotion.formats.base import MotionFormat
-from lipmotion.storage.files import check_target, whole_file
+from lipmotion.storage.files import atomic_file, check_target
 from lipmotion.types import Generation
 
 SCRIPT_MODULES = ("takes.py", "curves.py", "keying.py", "script.py")
@@ -98,6 +98,6 @@ def write_addon(program: str, path: str | Path) -> None:
     texts = {name: source.joinpath(name).read_text(encoding="utf-8") for name in MODULES}
     version = re.match(r"\d+\.\d+\.\d+", installed_version())
     texts["blender_manifest.toml"] = MANIFEST.format(version=version[0] if version else NO_VERSION)
-    with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
+    with atomic_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
             archive.writestr(zipfile.ZipInfo(f"{FOLDER}/{name}", OLDEST), text.encode(), zipfile.ZIP_DEFLATED)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, mouth_template
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.markers import MARKER, MILLIMETRES, measure_markers, to_head_frame
 from lipmotion.meshes.files.steady_rate import exact_rate
@@ -36,18 +36,18 @@ BLOCK = 512
 MARK = 0x50
 INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
 """The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
-MOST_FRAMES, OVERFLOW = 65_535, 65_536
+MAX_FRAMES, OVERFLOW = 65_535, 65_536
 """Most frames that the header can number, and after how many it may begin at 0 again."""
 LARGEST_FILE_BYTES = 1 << 28
 """Most bytes of a file that is read."""
-MOST_POINTS, MOST_ANALOG_CHANNELS = 2_000, 5_000
+MAX_POINTS, MAX_ANALOG_CHANNELS = 2_000, 5_000
 LONGEST_LABEL_CHARACTERS = 64
 LOG = logging.getLogger("lipmotion")
 SOFTWARE = "lipmotion"
 EYES = (("EYE_L", 0.5), ("EYE_R", -0.5))
-LEAST_SEEN_SHARE = 0.5
+MIN_SEEN_SHARE = 0.5
 """Markers that are seen in a smaller share of the frames are left out; shorter gaps are bridged by straight lines."""
-MOST_CURVES = 255
+MAX_CURVES = 255
 _POINT = re.compile(r"[xyz]_(\d{1,3})$")
 _UNLABELLED = re.compile(r"\*|[uc]_?\d+$|unlabel|point\d+$", re.IGNORECASE)
 
@@ -94,46 +94,57 @@ def read_c3d(path: Path) -> C3dFile:
     if size > LARGEST_FILE_BYTES:
         raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the capture into takes")
     try:
-        return _parsed(path.read_bytes())
+        return _parse(path.read_bytes())
     except InputError:
         raise
     except (struct.error, IndexError, ValueError, OverflowError) as error:
         raise InputError(f"not a C3D file ({error}); export the capture again") from error
 
 
-def _parsed(content: bytes) -> C3dFile:
+def _parse(content: bytes) -> C3dFile:
     if len(content) < 2 * BLOCK or content[1] != MARK:
         raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
     start = (content[0] - 1) * BLOCK
     processor = content[start + 3]
     if processor not in {INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR}:
         raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
-    found = _parameters(content, start + 4, processor)
+    parameters = _read_parameters(content, start + 4, processor)
     words: list[int] = _numbers(content, "u2", 10, 0, processor).astype(int).tolist()
     _, points, analog, first, last, _, _, _, block, samples = words
-    rate_hz = _number(found, "POINT.RATE", _numbers(content, "f4", 1, 20, processor)[0])
-    scale = _number(found, "POINT.SCALE", _numbers(content, "f4", 1, 12, processor)[0])
-    if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0):
+    rate_hz = _number(parameters, "POINT.RATE", _numbers(content, "f4", 1, 20, processor)[0])
+    scale = _number(parameters, "POINT.SCALE", _numbers(content, "f4", 1, 12, processor)[0])
+    if not (0 <= points <= MAX_POINTS and 0 <= analog <= MAX_ANALOG_CHANNELS and points + analog > 0):
         raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
     if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
         raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
     kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
     data = content[(block - 1) * BLOCK :] if block > 1 else b""
     held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
-    frames = _frames(found, last - first + 1, held, spare)
+    frames = _count_frames(parameters, last - first + 1, held, spare)
     rows = _numbers(data, kind, frames * width, 0, processor).reshape(frames, width)
-    return _content(found, rows, points, scale, rate_hz, samples)
+    placed = rows[:, : points * 4].reshape(len(rows), points, 4)
+    places = placed[..., :3] * (1.0 if scale < 0 else scale)
+    unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
+    places[unseen] = np.nan
+    labels = [
+        label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(parameters, name)
+    ]
+    labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
+    curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
+    names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][: curves.shape[1]]
+    units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
+    unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
+    exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
+    return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
 
 
-def _frames(found: dict[str, Values], numbered: int, held: int, spare: int) -> int:
+def _count_frames(parameters: dict[str, Values], numbered: int, held: int, spare: int) -> int:
     """Return how many frames there are: the largest number that is stated and held.
 
-    numbered : by the header, which cannot count on from 65,535, as whole parameters cannot
-    held     : as many would fit into the data;  spare : so many of them may be what fills its last block
-    Raises InputError: the data hold less than any number that is stated.
+    numbered : by the header, which cannot count on from 65,535;  spare : of those held, what may fill the last block
     """
-    start, end = _number(found, "TRIAL.ACTUAL_START_FIELD", 1), _number(found, "TRIAL.ACTUAL_END_FIELD", 0)
-    counted, long = _number(found, "POINT.FRAMES", 0), _number(found, "POINT.LONG_FRAMES", 0)
+    start, end = _number(parameters, "TRIAL.ACTUAL_START_FIELD", 1), _number(parameters, "TRIAL.ACTUAL_END_FIELD", 0)
+    counted, long = _number(parameters, "POINT.FRAMES", 0), _number(parameters, "POINT.LONG_FRAMES", 0)
     stated = sorted({int(each) for each in (numbered, counted % (1 << 31), long, end - start + 1) if each >= 1})
     fitting = [count for count in stated if count <= held]
     if not fitting:
@@ -142,45 +153,29 @@ def _frames(found: dict[str, Values], numbered: int, held: int, spare: int) -> i
     for over in range(frames + OVERFLOW, held + 1, OVERFLOW):
         if held < over + spare:  # a number that began at 0 again
             frames = over
-    if frames == MOST_FRAMES and held > frames + spare:  # the end of what can be counted, and nothing beside it
+    if frames == MAX_FRAMES and held > frames + spare:  # the end of what can be counted, and nothing beside it
         frames = held
     if frames != stated[-1]:
         LOG.warning("it states %s frames and holds %d: %d are read", " or ".join(map(str, stated)), held, frames)
     return frames
 
 
-def _content(found: dict[str, Values], rows: Array, points: int, scale: float, rate_hz: float, samples: int) -> C3dFile:
-    """Return the content from rows of numbers, one a frame [shape=(T, 4 · points + analog values)]."""
-    placed = rows[:, : points * 4].reshape(len(rows), points, 4)
-    places = placed[..., :3] * (1.0 if scale < 0 else scale)
-    unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
-    places[unseen] = np.nan
-    labels = [label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(found, name)]
-    labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
-    curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
-    names = [*_texts(found, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][: curves.shape[1]]
-    units = [*_texts(found, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
-    unit, software = (next(iter(_texts(found, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
-    exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
-    return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
-
-
-def _texts(found: dict[str, Values], name: str) -> list[str]:
-    values = found.get(name, [])
+def _texts(parameters: dict[str, Values], name: str) -> list[str]:
+    values = parameters.get(name, [])
     return values if isinstance(values, list) else []
 
 
-def _number(found: dict[str, Values], name: str, otherwise: float) -> float:
+def _number(parameters: dict[str, Values], name: str, otherwise: float) -> float:
     """Return a parameter; of two whole numbers the first is the lower half."""
-    values = found.get(name)
+    values = parameters.get(name)
     if not isinstance(values, np.ndarray) or not len(values):
         return float(otherwise)
     return float(values[0] + (1 << 16) * values[1] if len(values) == 2 else values[0])
 
 
-def _parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
+def _read_parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
     groups: dict[int, str] = {}
-    found: list[tuple[int, str, Values]] = []
+    stored: list[tuple[int, str, Values]] = []
     while at + 2 <= len(content) and content[at]:
         length, group = abs(struct.unpack_from("b", content, at)[0]), struct.unpack_from("b", content, at + 1)[0]
         name = content[at + 2 : at + 2 + length].decode("ascii").strip().upper()
@@ -189,16 +184,16 @@ def _parameters(content: bytes, at: int, processor: int) -> dict[str, Values]:
         if group < 0:
             groups[-group] = name
         else:
-            found.append((group, name, _values(content, body + 2, processor)))
+            stored.append((group, name, _read_values(content, body + 2, processor)))
         if step == 0:
             break
         if step < 0:
-            raise InputError(f"the parameter {shortened(name)!r} is before its own place; export the capture again")
+            raise InputError(f"the parameter {shorten(name)!r} is before its own place; export the capture again")
         at = body + step
-    return {f"{groups.get(group, '')}.{name}": values for group, name, values in found}
+    return {f"{groups.get(group, '')}.{name}": values for group, name, values in stored}
 
 
-def _values(content: bytes, at: int, processor: int) -> Values:
+def _read_values(content: bytes, at: int, processor: int) -> Values:
     """Return the values of a parameter whose type stands at a place."""
     kind, dimensions = struct.unpack_from("bB", content, at)
     sizes = list(content[at + 2 : at + 2 + dimensions])
@@ -219,7 +214,7 @@ def write_c3d(path: Path, content: C3dFile) -> None:
     More frames than the header can number stand in ``TRIAL`` as two whole numbers each, and in ``POINT:LONG_FRAMES``.
     """
     frames, points = content.points.shape[:2]
-    numbered = min(frames, MOST_FRAMES)
+    numbered = min(frames, MAX_FRAMES)
     curves = len(content.analog_labels)
     groups: dict[str, dict[str, int | float | Values]] = {
         "POINT": {
@@ -258,21 +253,17 @@ def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
     for number, (group, parameters) in enumerate(groups.items(), 1):
         parts.append(struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0))
         for name, value in parameters.items():
-            body = _stored_parameter(value) + b"\0"
+            if isinstance(value, list):
+                texts = [text.encode("ascii", "replace") for text in value]
+                width = max(map(len, texts), default=0)
+                body = struct.pack("<bBBB", -1, 2, width, len(value)) + b"".join(text.ljust(width) for text in texts)
+            else:
+                numbers = np.asarray(value)
+                size, kind = (2, "<u2") if numbers.dtype.kind == "i" else (4, "<f4")
+                body = bytes([size, numbers.ndim, *numbers.shape]) + numbers.astype(kind).tobytes()
             head = struct.pack("<bb", len(name), number) + name.encode()
-            parts.append(head + struct.pack("<h", 2 + len(body)) + body)
+            parts.append(head + struct.pack("<h", 3 + len(body)) + body + b"\0")
     return b"".join(parts) + b"\0\0"
-
-
-def _stored_parameter(value: int | float | Values) -> bytes:
-    if isinstance(value, list):
-        width = max((len(text.encode("ascii", "replace")) for text in value), default=0)
-        texts = b"".join(text.encode("ascii", "replace").ljust(width) for text in value)
-        return struct.pack("<bBBB", -1, 2, width, len(value)) + texts
-    numbers = np.asarray(value)
-    kind = "<u2" if numbers.dtype.kind == "i" else "<f4"
-    sizes = bytes([numbers.ndim, *numbers.shape])
-    return struct.pack("<b", 2 if kind == "<u2" else 4) + sizes + numbers.astype(kind).tobytes()
 
 
 def check(motion: Motion) -> None:
@@ -282,16 +273,15 @@ def check(motion: Motion) -> None:
     if "" in motion.names:
         raise ExportError("a channel has no name, required one in .c3d; write .json or .npz")
     for text in [text for channel in motion.channels for text in (channel.name, channel.unit)]:
-        if not (
-            text.isascii() and text.isprintable() and text == text.strip() and len(text) <= LONGEST_LABEL_CHARACTERS
-        ):
+        plain = text.isascii() and text.isprintable() and text == text.strip()
+        if not plain or len(text) > LONGEST_LABEL_CHARACTERS:
             raise ExportError(
                 f"the name or unit {text[:60]!r} of a channel does not fit into .c3d, required up to 64 ASCII "
                 "characters, without blanks at its ends"
             )
     points = len(_points(motion))
-    if max(len(motion.names) - 3 * points, points + len(EYES)) > MOST_CURVES:
-        raise ExportError(f"more than {MOST_CURVES} points, or other channels, which .c3d cannot name; write .npz")
+    if max(len(motion.names) - 3 * points, points + len(EYES)) > MAX_CURVES:
+        raise ExportError(f"more than {MAX_CURVES} points, or other channels, which .c3d cannot name; write .npz")
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -300,10 +290,12 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     frames = len(motion.values)
     places = [np.stack([motion[f"{axis}_{point}"] for axis in "xyz"], axis=1) for point in points]
     places += [np.broadcast_to([x, 0.0, 0.0], (frames, 3)) for _, x in EYES]
-    held = {f"{axis}_{point}" for point in points for axis in "xyz"}
-    others = [column for column, name in enumerate(motion.names) if name not in held]
+    placed = {f"{axis}_{point}" for point in points for axis in "xyz"}
+    others = [column for column, name in enumerate(motion.names) if name not in placed]
+    template = mouth_template()
+    jaw = {CHIN, *np.array(template.points)[template.jaw].tolist()}
     content = C3dFile(
-        labels=(*map(_label, points), *(name for name, _ in EYES)),
+        labels=(*(f"{'JAW' if point in jaw else 'LIP'}_{point}" for point in points), *(name for name, _ in EYES)),
         points=np.stack(places, axis=1) * MILLIMETRES,
         rate_hz=motion.rate_hz,
         software=SOFTWARE,
@@ -325,7 +317,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     if content.software == SOFTWARE:
         eyes = {name for name, _ in EYES}
         numbers = {column: MARKER.match(label) for column, label in enumerate(content.labels) if label not in eyes}
-        points = {column: found[1] for column, found in numbers.items() if found}
+        points = {column: match[1] for column, match in numbers.items() if match}
         curves = zip(content.analog_labels, content.analog_units, strict=True)
         channels = [Channel(name, unit or EYE_DISTANCE) for name, unit in curves]
         channels += [Channel(f"{axis}_{point}") for point in points.values() for axis in "xyz"]
@@ -334,12 +326,14 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         values = np.concatenate([analog, places], axis=1) if len(analog) else places
         return Motion(values, content.rate_hz, tuple(channels)), Timeline(())
     named = {label.split(":")[-1].strip(): column for column, label in enumerate(content.labels)}
-    markers = {
-        name: bridged
-        for name, column in named.items()
-        if name and not _UNLABELLED.match(name) and (bridged := _bridged(content.points[:, column])) is not None
-    }
-    lost = [name for name in named if name and not _UNLABELLED.match(name) and name not in markers]
+    named = {name: column for name, column in named.items() if name and not _UNLABELLED.match(name)}
+    markers, frames = dict[str, Array](), np.arange(len(content.points))
+    for name, column in named.items():
+        places = content.points[:, column]
+        seen = np.isfinite(places).all(axis=1)
+        if seen.any() and seen.mean() >= MIN_SEEN_SHARE:
+            markers[name] = np.stack([np.interp(frames, frames[seen], axis[seen]) for axis in places.T], axis=1)
+    lost = [name for name in named if name not in markers]
     if not markers:
         some = ", ".join(content.labels[:6])
         raise InputError(f"no marker with a name is seen in half of the frames; the labels: {some or 'none'}")
@@ -351,23 +345,9 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 def _points(motion: Motion) -> list[int]:
     """Return the numbers of the points that have all three channels, in order."""
-    numbers = [int(found[1]) for name in motion.names if (found := _POINT.match(name)) and name.startswith("x")]
+    numbers = [int(match[1]) for name in motion.names if (match := _POINT.match(name)) and name.startswith("x")]
     eyes = {Channel(f"{axis}_{point}") for point in numbers for axis in "xyz"} & set(motion.channels)
     return [point for point in numbers if all(Channel(f"{axis}_{point}") in eyes for axis in "xyz")]
-
-
-def _label(point: int) -> str:
-    template = mouth_template()
-    return f"JAW_{point}" if point == CHIN or point in np.array(template.points)[template.jaw] else f"LIP_{point}"
-
-
-def _bridged(places: Array) -> Array | None:
-    """Return the places of a marker [shape=(T, 3)] without gaps, or None where it is hardly ever seen."""
-    seen = np.isfinite(places).all(axis=1)
-    if seen.mean() < LEAST_SEEN_SHARE or not seen.any():
-        return None
-    frames = np.arange(len(places))
-    return np.stack([np.interp(frames, frames[seen], axis[seen]) for axis in places.T], axis=1)
 
 
 MOTION_FORMAT = MotionFormat(write, read, check)

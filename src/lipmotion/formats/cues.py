@@ -1,7 +1,11 @@
-"""Cue files by format, and cues as motion: phones in time, and curves that faces draw.
+"""Cue files by format, cues as motion (phones in time, and curves that faces draw), and cues for Spine.
 
 Every shape becomes one phone with its mouth, and an opening and a width, which the lips reach and leave as those of
-phones (``articulation.crossfade``). So p, b and m stay closed, and lips and tongue follow from the phones.
+phones (``articulation.phone_targets``). So p, b and m stay closed, and lips and tongue follow from the phones.
+
+``spine.json``: a skeleton of Spine 4 with one slot, ``mouth``, whose attachments, one a shape, an animation changes.
+Source: Esoteric Software, "JSON export format" (Spine 4.2). The slot, its attachments and the animation ``speech`` can
+be taken into a skeleton of one's own; the pictures are ``A.png`` to ``X.png`` beside the file.
 """
 
 from __future__ import annotations
@@ -9,21 +13,44 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lipmotion.articulation.contact import gap_to_opening
-from lipmotion.articulation.crossfade import crossfade_phones
 from lipmotion.articulation.cue_sheets import CueSheet
 from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.phone_targets import crossfade_phones
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import papagayo, rhubarb, spine
+from lipmotion.formats import papagayo, rhubarb
 from lipmotion.printable import is_line
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.files import atomic_file, read_text_file
+from lipmotion.storage.json_text import as_json
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE
 from lipmotion.units.mouth_chart import REST, SHAPES
+
+VERSION, SLOT, ANIMATION = "4.2.0", "mouth", "speech"
+PIXELS = 256
+"""Width and height of a mouth until Spine has its picture."""
+
+
+def skeleton_text(sheet: CueSheet, sound_file: str) -> str:
+    """Return the content of the file, in ASCII; the last key is the end, with the shape at rest."""
+    shapes = {shape: {"width": PIXELS, "height": PIXELS} for shape in sheet.drawn}
+    moved: dict[str, Any] = {
+        "slots": {SLOT: {"attachment": [{"time": round(time_s, 2), "name": shape} for time_s, shape in sheet.rows]}}
+    }
+    document: dict[str, Any] = {
+        "skeleton": {"spine": VERSION, "images": "./"},
+        "bones": [{"name": "root"}],
+        "slots": [{"name": SLOT, "bone": "root", "attachment": sheet.rest}],
+        "skins": [{"name": "default", "attachments": {SLOT: shapes}}],
+    }
+    if sound_file:
+        document["events"] = {ANIMATION: {"audio": sound_file}}
+        moved["events"] = [{"time": 0, "name": ANIMATION}]
+    return as_json({**document, "animations": {ANIMATION: moved}}, indent=1) + "\n"
 
 
 class CueFormat(NamedTuple):
@@ -43,7 +70,7 @@ CUE_FORMATS = {
     "json": CueFormat(rhubarb.json_text, rhubarb.parse_json),
     "dat": CueFormat(rhubarb.dat_text, rhubarb.parse_dat),
     "pgo": CueFormat(papagayo.project_text, papagayo.parse_project),
-    "spine.json": CueFormat(spine.skeleton_text),
+    "spine.json": CueFormat(skeleton_text),
 }
 """Formats by name; the end of a file's name is that of its format, of several the longest."""
 PHONE_OF = {"A": "p", "B": "s", "C": "eh", "D": "aa", "E": "ao", "F": "uw", "G": "f", "H": "l", "X": SILENCE}
@@ -69,7 +96,7 @@ def format_of(path: Path) -> str:
 
 def write_cue_file(path: Path, sheet: CueSheet, sound_file: str, form: str) -> None:
     """Write cues to a file; after a failure there is no partial file. Raises ExportError: it cannot be written."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text(CUE_FORMATS[form].text(sheet, sound_file), encoding="utf-8", newline="\n")
 
 
@@ -110,9 +137,9 @@ def cue_motion(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:
         spans.append(Span(cue.start_s, cue.end_s, Unit(phone, word=words[place].label if inside else "")))
     units = Timeline(tuple(spans))
     time_s = np.arange(int(sheet.duration_s * RATE_HZ + 1e-6) + 1) / RATE_HZ
-    said = crossfade_phones(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
-    gap = np.sum([SHAPES[name].opening * weight for name, weight in said.items()], axis=0) * WIDEST_GAP
-    spread = np.sum([SHAPES[name].spread * weight for name, weight in said.items()], axis=0)
+    weights = crossfade_phones(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
+    gap = np.sum([SHAPES[name].opening * weight for name, weight in weights.items()], axis=0) * WIDEST_GAP
+    spread = np.sum([SHAPES[name].spread * weight for name, weight in weights.items()], axis=0)
     width = mouth_template().width * (1 + WIDENING * spread)
     values = np.stack([gap_to_opening(np.where(gap < 1e-6, 0.0, gap)), width], axis=1)
     return Motion(values, RATE_HZ, (Channel("opening"), Channel("width"))), units

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.meshes.files.steady_rate import exact_rate
 from lipmotion.meshes.fitting.point_motion import move_points
@@ -63,14 +63,14 @@ MANY_VALUES = {1: 4, 2: 6}
 NAMES = {number: f"fap{number}_{name}" for number, name, *_ in PARAMETERS}
 LARGEST_VALUE = 1_000_000
 LONGEST_LINE = 1 << 14
-MOST_FRAMES = 10_000_000
+MAX_FRAMES = 10_000_000
 
 
 def check(motion: Motion) -> None:
     """Raise ExportError if motion holds anything but these parameters."""
     others = [name for name in motion.names if _number(name) is None]
     if others or not motion.names:
-        raise ExportError(f"no parameters of MPEG-4 but {shortened(', '.join(others[:4])) or 'nothing'}; write .json")
+        raise ExportError(f"no parameters of MPEG-4 but {shorten(', '.join(others[:4])) or 'nothing'}; write .json")
     if len({_number(name) for name in motion.names}) < len(motion.names):
         raise ExportError("two channels are the same parameter of MPEG-4, required each once; write .json")
 
@@ -98,9 +98,9 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())
             head = next(lines, "").split()
             if len(head) < 4 or not head[0].startswith("2."):
-                raise ValueError(f"it begins with {shortened(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
+                raise ValueError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
             rate, frames = head[-2:]
-            held, used = _frames(lines, int(frames))
+            held, used = _read_frames(lines, int(frames))
     except ValueError as error:
         raise InputError(f"not a file of facial animation parameters ({error}); export it again") from error
     numbers = np.flatnonzero(used) + 1
@@ -108,27 +108,27 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     return Motion(held[:, numbers - 1].astype(np.float64), exact_rate(float(rate)), channels), Timeline(())
 
 
-def _frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+def _read_frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """Return the values of all parameters [shape=(T, 68)], and which of them are given in any frame [shape=(68,)]."""
     rows: list[NDArray[np.int32]] = []
     current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
-    if not 0 < count <= MOST_FRAMES:
-        raise ValueError(f"{count} frames, required 1 to {MOST_FRAMES}")
+    if not 0 < count <= MAX_FRAMES:
+        raise ValueError(f"{count} frames, required 1 to {MAX_FRAMES}")
     for frame in range(count):
         marks, values = next(lines, "").split(), next(lines, "").split()[1:]
         if len(marks) != COUNT or set(marks) - {"0", "1"}:
             raise ValueError(f"frame {frame} of {count} has {len(marks)} marks, required {COUNT} of 0 or 1")
-        given = [number for number, mark in enumerate(marks, 1) if mark == "1"]
-        needed = sum(MANY_VALUES.get(number, 1) for number in given)
+        marked = [number for number, mark in enumerate(marks, 1) if mark == "1"]
+        needed = sum(MANY_VALUES.get(number, 1) for number in marked)
         if len(values) != needed:
             raise ValueError(f"frame {frame} of {count} has {len(values)} values, required {needed}")
-        skipped = sum(MANY_VALUES[number] for number in given if number in MANY_VALUES)
-        places = [number - 1 for number in given if number not in MANY_VALUES]
-        whole = [int(value) for value in values[skipped:]]
-        if max(map(abs, whole), default=0) > LARGEST_VALUE:
+        skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
+        places = [number - 1 for number in marked if number not in MANY_VALUES]
+        numbers = [int(value) for value in values[skipped:]]
+        if max(map(abs, numbers), default=0) > LARGEST_VALUE:
             raise ValueError(f"frame {frame} has a value over {LARGEST_VALUE}")
         current = current.copy()
-        current[places] = whole
+        current[places] = numbers
         used[places] = True
         rows.append(current)
     return np.stack(rows), used
@@ -137,10 +137,8 @@ def _frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArra
 def _number(name: str) -> int | None:
     """Return the number of a parameter by the name of its channel, or None."""
     digits = name.removeprefix("fap").partition("_")[0]
-    fitting = (
-        name.startswith("fap") and digits.isascii() and digits.isdecimal() and len(MANY_VALUES) < int(digits) <= COUNT
-    )
-    return int(digits) if fitting else None
+    is_number = name.startswith("fap") and digits.isascii() and digits.isdecimal()
+    return int(digits) if is_number and len(MANY_VALUES) < int(digits) <= COUNT else None
 
 
 def move_faps(motion: Motion, units: Timeline[Unit]) -> Motion:
@@ -149,14 +147,13 @@ def move_faps(motion: Motion, units: Timeline[Unit]) -> Motion:
     Where the lips touch, ``lower_t_midlip`` and ``raise_b_midlip`` add up to 0.
     Raises InputError: as ``move_points``.
     """
-    moved = move_points(motion, units).expressed
-    template = mouth_template()
+    moved, template = move_points(motion, units).expressed, mouth_template()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [
         np.rint(sign * moved[:, template.row(point), axis] / lengths[unit] * STEPS)
         for _, _, point, axis, sign, unit in PARAMETERS
     ]
-    channels = tuple(Channel(f"fap{number}_{name}", FAP) for number, name, *_ in PARAMETERS)
+    channels = tuple(Channel(name, FAP) for name in NAMES.values())
     return Motion(np.stack(columns, axis=1), motion.rate_hz, channels)
 
 

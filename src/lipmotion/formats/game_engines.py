@@ -45,21 +45,23 @@ FORBIDDEN = frozenset('".:@/%')
 """Characters that no name in a path of Godot has."""
 
 
-def _weights(motion: Motion) -> list[str]:
+def _list_weights(motion: Motion) -> list[str]:
     return [channel.name for channel in motion.channels if channel.unit == WEIGHT]
 
 
-def _keys(generation: Generation, name: str, full: float, decimals: int, tolerance: float) -> tuple[Array, Array, bool]:
+def _choose_keys(
+    generation: Generation, name: str, full: float, decimals: int, tolerance: float
+) -> tuple[Array, Array, bool]:
     """Return times and values of the keys of a weight, and whether it is held between them."""
     motion, held = generation.motion, name in generation.stepped
     values: Array = np.round(full * motion[name].astype(np.float64), decimals) + 0.0
-    kept = key_frames(motion.time_s, values, tolerance, stepped=held)
-    return motion.time_s[kept], values[kept], held
+    frames = key_frames(motion.time_s, values, tolerance, stepped=held)
+    return motion.time_s[frames], values[frames], held
 
 
 def check_unity(motion: Motion) -> None:
     """Raise ExportError if motion has no weights, or fewer than two frames."""
-    if not _weights(motion) or len(motion.values) < 2:
+    if not _list_weights(motion) or len(motion.values) < 2:
         raise ExportError("the motion has no blendshapes, or no two frames; write .json or .csv")
 
 
@@ -67,19 +69,14 @@ def write_unity(path: Path, generation: Generation, source: Mapping[str, str], _
     """Write one clip, named as the recording, with a curve for each weight of the motion."""
     motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
     end_s = float(motion.time_s[-1])
-    curves = [line for weight in _weights(motion) for line in _curve(generation, weight)]
+    curves = [line for weight in _list_weights(motion) for line in _list_curve(generation, weight)]
     lines = [
         *("%YAML 1.1", "%TAG !u! tag:unity3d.com,2011:", "--- !u!74 &7400000", "AnimationClip:"),
         *("  m_ObjectHideFlags: 0", "  m_CorrespondingSourceObject: {fileID: 0}", "  m_PrefabInstance: {fileID: 0}"),
-        *("  m_PrefabAsset: {fileID: 0}", f"  m_Name: {_quoted(name)}", "  serializedVersion: 6", "  m_Legacy: 0"),
+        *("  m_PrefabAsset: {fileID: 0}", f"  m_Name: {_quote(name)}", "  serializedVersion: 6", "  m_Legacy: 0"),
         *("  m_Compressed: 0", "  m_UseHighQualityCurve: 1", *(f"  {name}: []" for name in _EMPTY)),
-        *(
-            "  m_FloatCurves:",
-            *curves,
-            "  m_PPtrCurves: []",
-            f"  m_SampleRate: {motion.rate_hz:.9g}",
-            "  m_WrapMode: 0",
-        ),
+        *("  m_FloatCurves:", *curves, "  m_PPtrCurves: []"),
+        *(f"  m_SampleRate: {motion.rate_hz:.9g}", "  m_WrapMode: 0"),
         *("  m_Bounds:", "    m_Center: {x: 0, y: 0, z: 0}", "    m_Extent: {x: 0, y: 0, z: 0}"),
         *("  m_ClipBindingConstant:", "    genericBindings: []", "    pptrCurveMapping: []"),
         *("  m_AnimationClipSettings:", "    serializedVersion: 2", "    m_AdditiveReferencePoseClip: {fileID: 0}"),
@@ -94,23 +91,20 @@ def write_unity(path: Path, generation: Generation, source: Mapping[str, str], _
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     """Return a name as YAML has it: in quotes, where it needs some."""
     return name if _PLAIN.fullmatch(name) else json.dumps(name, ensure_ascii=False)
 
 
-def _curve(generation: Generation, name: str) -> Iterator[str]:
-    times_s, keys, steps = _keys(generation, name, FULL, UNITY_DECIMALS, UNITY_TOLERANCE)
+def _list_curve(generation: Generation, name: str) -> Iterator[str]:
+    times_s, keys, steps = _choose_keys(generation, name, FULL, UNITY_DECIMALS, UNITY_TOLERANCE)
     slopes = np.diff(keys) / np.diff(times_s)
     yield from ("  - curve:", "      serializedVersion: 2", "      m_Curve:")
     for number, (time_s, key) in enumerate(zip(times_s.tolist(), keys.tolist(), strict=True)):
         before, after = slopes[max(number - 1, 0)], slopes[min(number, len(slopes) - 1)]
         yield from (
-            *(
-                "      - serializedVersion: 3",
-                f"        time: {time_s:.6f}",
-                f"        value: {key:.{UNITY_DECIMALS}f}",
-            ),
+            *("      - serializedVersion: 3", f"        time: {time_s:.6f}"),
+            f"        value: {key:.{UNITY_DECIMALS}f}",
             f"        inSlope: {'Infinity' if steps else f'{before:.6g}'}",
             f"        outSlope: {'Infinity' if steps else f'{after:.6g}'}",
             *(f"        tangentMode: {CONSTANT if steps else LINEAR}", "        weightedMode: 0"),
@@ -118,19 +112,20 @@ def _curve(generation: Generation, name: str) -> Iterator[str]:
         )
     yield from ("      m_PreInfinity: 2", "      m_PostInfinity: 2", "      m_RotationOrder: 4")
     attribute = f"blendShape.{name}"
-    yield f"    attribute: {_quoted(attribute)}"
+    yield f"    attribute: {_quote(attribute)}"
     yield from ("    path: ", f"    classID: {RENDERER}", "    script: {fileID: 0}")
 
 
 def check_godot(motion: Motion) -> None:
     """Raise ExportError if motion has no weights, or a name that no path of Godot can have."""
-    names = _weights(motion)
+    names = _list_weights(motion)
     if not names or not len(motion.values):
         raise ExportError("the motion has no blendshapes, or no frames; write .json or .csv")
     for name in names:
         if FORBIDDEN & {*name}:
+            letters = '. : @ / % "'
             raise ExportError(
-                f'the blendshape {name!r} has one of the letters . : @ / % ", which Godot replaces; rename it'
+                f"the blendshape {name!r} has one of the letters {letters}, which Godot replaces; rename it"
             )
 
 
@@ -141,8 +136,8 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
         *('[gd_resource type="Animation" format=3]', "", "[resource]", 'resource_name = "speech"'),
         *(f"length = {float(motion.time_s[-1]):.6g}", f"step = {1 / motion.rate_hz:.6g}"),
     ]
-    for number, name in enumerate(_weights(motion)):
-        times_s, values, steps = _keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
+    for number, name in enumerate(_list_weights(motion)):
+        times_s, values, steps = _choose_keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
         keys = ", ".join(
             f"{time_s:.6g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in zip(times_s, values, strict=True)
         )

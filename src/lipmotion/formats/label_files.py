@@ -9,7 +9,7 @@ from io import StringIO
 from itertools import islice
 from pathlib import Path
 
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import motion_suffix
 from lipmotion.formats.base import read_units as read_units_of_motion
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, service_tiers
@@ -90,8 +90,8 @@ class RecordingLabels:
     @property
     def words(self) -> tuple[str, ...] | None:
         """The words of the transcript, lower case, as they are usually read, or None."""
-        said = self.transcript.words if self.transcript else ()
-        return tuple(word for token in said for word in list_readings(token)[0]) or None
+        tokens = self.transcript.words if self.transcript else ()
+        return tuple(word for token in tokens for word in list_readings(token)[0]) or None
 
 
 def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
@@ -103,14 +103,14 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
     Raises InputError: one of them cannot be read.
     """
     seen: list[Path] = []
-    found: list[tuple[Path, RecordingLabels]] = []
+    read: list[tuple[Path, RecordingLabels]] = []
     for path in find_label_files(recording):
         if path not in ignored and not any(path.samefile(other) for other in seen):
             labels = _read(path, unknown_json=path.suffix == ".json")
-            found += [(path, labels)] if labels is not None else []
+            read += [(path, labels)] if labels is not None else []
             seen.append(path)
-    in_order = sorted(found, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
-    transcripts = (labels.transcript for _, labels in found if labels.transcript)
+    in_order = sorted(read, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
+    transcripts = (labels.transcript for _, labels in read if labels.transcript)
     return RecordingLabels(next(transcripts, None), next((each.phones for _, each in in_order if each.phones), None))
 
 
@@ -144,12 +144,12 @@ def read_transcript(path: Path | str, tier: str = "", speaker: str = "") -> str 
     """
     if isinstance(path, str) and not is_subtitles(path):
         return path
-    text, path = (path, Path("the transcript")) if isinstance(path, str) else (_text(path, "transcript"), path)
-    tiers = _timed_tiers(text, str(path))
+    text, path = (path, Path("the transcript")) if isinstance(path, str) else (_read_text(path, "transcript"), path)
+    tiers = _read_tiers(text, str(path))
     if tiers is None:
         _check_plain(text, path)
         return text
-    transcript = _transcript(tiers, str(path), tier, speaker)
+    transcript = _choose_transcript(tiers, str(path), tier, speaker)
     if transcript is None:
         what = "phones in time, but no words; give them as units" if any(map(holds_phones, tiers)) else "no word"
         raise InputError(f"{path}: the transcript holds {what}")
@@ -166,24 +166,22 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     tier, speaker : which tier and whose phones; empty: those of all speakers, whom a warning names
     Raises InputError: no such file or tier or speaker, as ``read_labels``, or no phones in time.
     """
-    text, where = _text(path, "units"), str(path)
-    tiers = _chosen(_timed_tiers(text, where) or [], where, tier, speaker)
-    phones = _tiers_of_phones(tiers, where)
+    text, where = _read_text(path, "units"), str(path)
+    tiers = _choose_tiers(_read_tiers(text, where) or [], where, tier, speaker)
+    phones = _choose_phones(tiers, where)
     if not phones and any(each.role in (WORDS, LINES) for each in tiers):
         raise InputError(f"{where}: holds words in time, but no phones; give it as a transcript (--transcript)")
     if not phones:
         held = f"{describe_json(text, where)}; " if is_json(text) else "holds no phones in time, "
-        raise InputError(
-            f"{where}: {held}required a motion file (.json, .npz), a TextGrid with a tier of "
-            "phones, or labels with times, one phone a line"
-        )
+        wanted = "a motion file (.json, .npz), a TextGrid with a tier of phones, or labels with times, one phone a line"
+        raise InputError(f"{where}: {held}required {wanted}")
     _name_speakers(phones, where)
     units = merge_timelines(
-        [with_words(phone_timeline(each, (), where, with_gaps=True), _words_of(each, tiers)) for each in phones]
+        [with_words(phone_timeline(each, (), where, with_gaps=True), _choose_words(each, tiers)) for each in phones]
     )
     recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
-    found = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
-    rows = (RecognisedPhone(each.start_s, each.end_s, match[1], float(match[2])) for each, match in found if match)
+    pairs = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
+    rows = (RecognisedPhone(each.start_s, each.end_s, match[1], float(match[2])) for each, match in pairs if match)
     return units if recognised is None else restore_confidences(units, rows)
 
 
@@ -192,7 +190,7 @@ def speakers_in(path: Path) -> tuple[str, ...]:
     if not path.is_file() or path.stat().st_size > LARGEST_LABELS:
         return ()
     try:
-        tiers = _timed_tiers(_text(path), "") or []
+        tiers = _read_tiers(_read_text(path), "") or []
     except InputError:  # said by the reader
         return ()
     return tuple(dict.fromkeys(tier.speaker for tier in split_speakers(tiers) if tier.speaker))
@@ -202,7 +200,7 @@ def holds_timings(path: Path) -> bool:
     """Return whether a file has the timings of a voice or an aligner; False: it is another file, or no file at all."""
     if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_LABELS:
         return False
-    text = _text(path)
+    text = _read_text(path)
     try:
         if MOTION.search(text[:64]):
             return False
@@ -213,10 +211,10 @@ def holds_timings(path: Path) -> bool:
 
 def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     """Return the labels of a file; None for JSON of another kind, if that is expected, else an error."""
-    text = "" if unknown_json and path.stat().st_size > LARGEST_LABELS else _text(path)
-    tiers = _timed_tiers(text, str(path)) if is_json(text) or not unknown_json else None
+    text = "" if unknown_json and path.stat().st_size > LARGEST_LABELS else _read_text(path)
+    tiers = _read_tiers(text, str(path)) if is_json(text) or not unknown_json else None
     if tiers is not None or unknown_json:
-        return None if tiers is None else _labels(tiers, str(path))
+        return None if tiers is None else _choose_labels(tiers, str(path))
     _check_plain(text, path)
     text, tags = parse_tagged_text(text)
     tokens = text.split()
@@ -229,37 +227,34 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, require_tokens(text)))),), tags))
 
 
-def _labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
+def _choose_labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
     """Return the words and the phones of tiers. Raises InputError: there are labels, and none is a phone or a word."""
-    chosen = _chosen(tiers, where)
-    phones = _tiers_of_phones(chosen, where)
-    transcript = _transcript(tiers, where)
+    chosen = _choose_tiers(tiers, where)
+    phones = _choose_phones(chosen, where)
+    transcript = _choose_transcript(tiers, where)
     if not phones:
         if transcript is None and any(tier.role != LINES and tier.labels for tier in chosen):
             raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
         return RecordingLabels(transcript)
     several = len(phones) > 1
     timeline = merge_timelines(
-        [phone_timeline(tier, _words_of(tier, chosen), where, with_gaps=several) for tier in phones]
+        [phone_timeline(tier, _choose_words(tier, chosen), where, with_gaps=several) for tier in phones]
     )
     unknown = [span for span in timeline if span.label.unit == UNKNOWN_PHONES]
     if unknown:
-        LOG.warning(
-            "%s: the phones of %d stretches of speech are not known, the first at %.2f s; its phones are left out, and "
-            "its words are aligned",
-            where,
-            len(unknown),
-            unknown[0].start_s,
+        what = (
+            f"the phones of {len(unknown)} stretches of speech are not known, the first at {unknown[0].start_s:.2f} s"
         )
+        LOG.warning("%s: %s; its phones are left out, and its words are aligned", where, what)
     return RecordingLabels(transcript, None if unknown else timeline)
 
 
-def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
+def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of a text whose form has times, in the phones of the inventory; None of any other text."""
     try:
         if is_textgrid(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
-        elif (found := ROOT.match(text)) and found[1] in READ_ROOTS:
+        elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
             tiers = xml_tiers(text, where)
         elif is_subtitles(text):
             tiers = [subtitle_tier(text, where)]
@@ -270,12 +265,8 @@ def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
     return None if tiers is None else [map_to_inventory(tier, where) for tier in tiers]
 
 
-def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> list[LabelTier]:
-    """Return the tiers that are said or seen, of those the ones that are asked for.
-
-    tier, speaker : names, in any case; of a tier, all of its speaker stay that hold something else
-    Raises InputError: there is no such tier or speaker.
-    """
+def _choose_tiers(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> list[LabelTier]:
+    """Return the tiers that are said or seen, of those the ones that are asked for."""
     tiers = split_speakers(tiers)
     if speaker:
         tiers = [each for each in tiers if each.speaker.lower() == speaker.lower()] or _refuse(
@@ -284,7 +275,7 @@ def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "
     if tier:
         named = next((each for each in tiers if each.name.lower() == tier.lower()), None)
         if named is None and any(each.speaker.lower() == tier.lower() for each in tiers):
-            return _chosen(tiers, where, speaker=tier)
+            return _choose_tiers(tiers, where, speaker=tier)
         named = named or _refuse("tier", tier, [each.name for each in tiers], where)[0]
         if not named.role or named.role == OTHER:
             named = replace(named, role=PHONE_LABELS if holds_phones(replace(named, role="")) else LINES)
@@ -297,10 +288,10 @@ def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "
 def _refuse(kind: str, name: str, known: list[str], where: str) -> list[LabelTier]:
     """Raise InputError: there is no such speaker or tier."""
     names = ", ".join(map(repr, list(dict.fromkeys(filter(None, known)))[:NAMED_TIERS])) or "none with a name"
-    raise InputError(f"{where}: has no {kind} {shortened(name)!r}; it has: {names}")
+    raise InputError(f"{where}: has no {kind} {shorten(name)!r}; it has: {names}")
 
 
-def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
+def _choose_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
     """Return the tiers of phones, one of each speaker. Raises InputError: a speaker has several."""
     phones: dict[str, LabelTier] = {}
     for tier in filter(holds_phones, tiers):
@@ -311,9 +302,9 @@ def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
     return list(phones.values())
 
 
-def _transcript(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> TimedTranscript | None:
+def _choose_transcript(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> TimedTranscript | None:
     """Return the words of the best tier of each speaker: one of words, of lines, or else the first of another kind."""
-    chosen = [each for each in _chosen(tiers, where, tier, speaker) if not holds_phones(each)]
+    chosen = [each for each in _choose_tiers(tiers, where, tier, speaker) if not holds_phones(each)]
     best: dict[str, LabelTier] = {}
     for role in (WORDS, LINES, ""):
         for each in chosen:
@@ -335,14 +326,14 @@ def _name_speakers(tiers: list[LabelTier], where: str) -> None:
     """Log a warning if tiers are of several speakers."""
     speakers = [tier.speaker for tier in tiers if tier.speaker]
     if len(speakers) > 1:
-        names = ", ".join(map(shortened, speakers[:NAMED_TIERS]))
+        names = ", ".join(map(shorten, speakers[:NAMED_TIERS]))
         LOG.warning("%s: %d people speak: %s; all are read; --tier NAME chooses one", where, len(speakers), names)
 
 
-def _words_of(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ...]:
+def _choose_words(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ...]:
     """Return the words in time of the speaker of some phones; none where labels hold several."""
-    said = [tier for tier in tiers if tier.speaker == phones.speaker and not holds_phones(tier)]
-    words = next((tier.labels for role in (WORDS, "") for tier in said if tier.role == role), ())
+    spoken = [tier for tier in tiers if tier.speaker == phones.speaker and not holds_phones(tier)]
+    words = next((tier.labels for role in (WORDS, "") for tier in spoken if tier.role == role), ())
     return words if all(len(label.text.split()) < 2 for label in words) else ()
 
 
@@ -357,10 +348,7 @@ def read_plain_text(path: Path) -> str:
 
 
 def check_plain_text(text: str, where: str) -> None:
-    """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words.
-
-    where : the file's name, for messages
-    """
+    """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words."""
     if is_textgrid(text) or line_tiers(text, where) is not None:
         raise InputError(f"{where}: holds labels in time, required the words alone; write them into a text file")
     _check_no_labels(text, where)
@@ -368,49 +356,43 @@ def check_plain_text(text: str, where: str) -> None:
 
 def _check_no_labels(text: str, where: str) -> None:
     """Raise InputError for labels, subtitles and documents in forms that are not read."""
-    start, found = text[:200].lstrip(), NO_ARROW.search(text)
-    line = shortened(found[0].strip()) if found else ""
+    start, match = text[:200].lstrip(), NO_ARROW.search(text)
+    line = shorten(match[0].strip()) if match else ""
+    lines = numbered = timed_lines = with_two = 0
+    header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
+    body = (each.strip() for each in StringIO(text[header.end() if header else 0 :]))
+    for each in islice(filter(None, body), JUDGED_LINES):
+        lines += 1
+        numbered += NUMBERED.match(each) is not None
+        timed_lines += TIME.match(each) is not None
+        with_two += sum(1 for _, _ in zip(TIME.finditer(each), "12", strict=False)) > 1
+    seems_timed = lines > 1 and ((2 * numbered > lines and timed_lines > 0) or 2 * with_two >= lines)
     clock = "00:00:01,000 --> 00:00:02,500"
     timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
     forms = {
         "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
         "is a master label file of many recordings; write a .lab beside each": start.startswith(MASTER),
-        f"begins with {shortened(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
+        f"begins with {shorten(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
         "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),
-        f"has the line {line!r}, two times as in subtitles; required: times as in {clock}, or the words alone": found,
-        f"{timed}; save it in one of these forms, or give the words alone": _seems_timed(text),
+        f"has the line {line!r}, two times as in subtitles; required: times as in {clock}, or the words alone": match,
+        f"{timed}; save it in one of these forms, or give the words alone": seems_timed,
     }
     wrong = next((message for message, is_so in forms.items() if is_so), None)
     if wrong is not None:
         raise InputError(f"{where}: {wrong}")
 
 
-def _seems_timed(text: str) -> bool:
-    """Return whether most of the first lines begin with a number and some with a time, or half hold two times."""
-    lines = numbered = timed = with_two = 0
-    header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
-    body = (line.strip() for line in StringIO(text[header.end() if header else 0 :]))
-    for line in islice(filter(None, body), JUDGED_LINES):
-        lines += 1
-        numbered += NUMBERED.match(line) is not None
-        times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))
-        timed += TIME.match(line) is not None
-        with_two += times > 1
-    return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * with_two >= lines)
-
-
 def _check_plain(text: str, path: Path) -> None:
     """Raise InputError for a text that is no plain text, or more than a transcript has."""
     if len(text) > LARGEST_TRANSCRIPT_BYTES:
-        raise InputError(
-            f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT_BYTES}: is it a transcript?"
-        )
+        most = f"required at most {LARGEST_TRANSCRIPT_BYTES}"
+        raise InputError(f"{path}: {len(text)} characters, {most}: is it a transcript?")
     if is_json(text):
         raise InputError(f"{path}: {describe_json(text, str(path))}")
     _check_no_labels(remove_known_tags(text), str(path))
 
 
-def _text(path: Path, kind: str = "label") -> str:
+def _read_text(path: Path, kind: str = "label") -> str:
     return read_text_file(path, kind, LARGEST_LABELS, western=True)
 
 
@@ -441,8 +423,7 @@ def write_labels(path: Path, units: Timeline[Unit]) -> None:
     """
     for label in [span.label for span in units]:
         if not is_line(label.phone + label.unit + label.word):
-            raise ExportError(
-                f"{path}: {shortened(repr(label))} has a line end, a control character or half a character"
-            )
+            what = "a line end, a control character or half a character"
+            raise ExportError(f"{path}: {shorten(repr(label))} has {what}")
     write = next(write for suffix, write in _WRITERS.items() if suffix.lower() == path.suffix.lower())
     write(path, units)

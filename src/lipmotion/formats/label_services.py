@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import next_at
 from lipmotion.formats.label_tiers import (
     EARLIEST_S,
@@ -178,43 +178,41 @@ def is_json(text: str) -> bool:
 def service_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of words, lines and phones of the JSON of a service; None: it has none.
 
-    where : the file's name, for messages
     Raises InputError: it is damaged (with its line), a symbol in it is not known, or a time is none.
     """
-    numbered = [(f"line {line}", value) for line, value in _documents(text, where)]
+    numbered = [(f"line {line}", value) for line, value in _decode_documents(text, where)]
     if len(numbered) == 1 and isinstance(numbered[0][1], list):
         numbered = [(f"item {number}", value) for number, value in enumerate(numbered[0][1], 1)]
     objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
     if not objects or any("mouthcues" in item or {"format", "channels"} <= item.keys() for _, item in objects):
         return None
-    for reader in (_column_tiers, _duration_tiers, _named_tiers):
+    for reader in (_read_columns, _read_durations, _read_named_tiers):
         tiers = reader(objects, where)
         if tiers is not None and not any(tier.labels for tier in tiers):
             raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
         if tiers is not None:
             break
     else:
-        tiers = _listed_tiers(objects, where) if len(objects) == len(numbered) else None
+        tiers = _read_lists(objects, where) if len(objects) == len(numbered) else None
     return tiers and [replace(t, labels=add_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
 
 
 def describe_json(text: str, where: str) -> str:
     """Return what JSON is that holds no words in time, for a message."""
-    value = next(_documents(text, where), (1, None))[1]
+    value = next(_decode_documents(text, where), (1, None))[1]
     first = value[0] if isinstance(value, list) and value else value
     names = list(first) if isinstance(first, dict) else []
     for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
         if name in names:
             return f"holds {what}, which is motion and no labels; render it"
-    named = ", ".join(map(shortened, names[:8])) or "no names"
+    named = ", ".join(map(shorten, names[:8])) or "no names"
     return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
 
 
-def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
+def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
     """Yield the values of a text, one after another, each with the number of its first line.
 
     Names of members are in lower case, without underscores and JavaScript's ``priv``; those of tiers stay.
-    Raises DamagedJsonError: with the line.
     """
 
     def plain(name: str) -> str:
@@ -230,85 +228,91 @@ def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         try:
             value, at = decoder.raw_decode(text, at)
         except json.JSONDecodeError as error:
-            raise DamagedJsonError(
-                f"{where}: line {error.lineno}: damaged JSON ({error.msg}); write it again"
-            ) from error
+            what = f"line {error.lineno}: damaged JSON ({error.msg})"
+            raise DamagedJsonError(f"{where}: {what}; write it again") from error
         except (ValueError, RecursionError) as error:
             raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
         yield line, value
         at = next_at(text, at)
 
 
-def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
+def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     """Return a time, NaN where it is missing, and how many such are a second where its form says that, else ``per_s``.
 
     Times are numbers, texts (``"1.5"``, ``"1.500s"``, ``"PT1.5S"``, ``"00:00:01,500"``), or seconds with nanos.
-    Raises InputError: it is none of these.
     """
     if isinstance(value, dict) and value.keys() & {"seconds", "nanos"}:
-        seconds, nanos = (_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
+        seconds, nanos = (_parse_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
     if not isinstance(value, str):
         missing = value in (None, -1)  # some services write -1 where they have none
         return math.nan if missing else require(values.number(), value, f"{where}: a time"), per_s
-    found, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
-    if found is None and not math.isnan(clock_s):
+    match, clock_s = DIGITS.fullmatch(value.strip()), parse_clock(value)
+    if match is None and not math.isnan(clock_s):
         return clock_s, 1
-    if found is not None:
-        value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
+    if match is not None:
+        value, per_s = match[1].replace(",", "."), {"s": 1, "ms": 1000}.get((match[2] or "").lower(), per_s)
     if value.strip().lower() in ("", "nan", "null", "none", "n/a", "-1", "-1.0"):
         return math.nan, per_s
     return parse_number(value, f"{where}: a time is", "a number of seconds"), per_s
 
 
-def _seconds(value: Any, where: str, per_s: float = 1) -> float:
+def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
     """Return a time in seconds. Raises InputError: it is missing, or no number."""
-    time, own = _number(value, where)
+    time, stated_per_s = _parse_number(value, where)
     if math.isnan(time):
         raise InputError(f"{where} has no time")
-    if abs(time / (own or per_s)) > LATEST_S:
+    if abs(time / (stated_per_s or per_s)) > LATEST_S:
         raise InputError(f"{where}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
-    return time / (own or per_s)
+    return time / (stated_per_s or per_s)
 
 
-def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
+def _read_row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
-    text = next((text for name in TEXTS if name in item and (text := _text(item[name])) is not None), None)
+    text = next((text for name in TEXTS if name in item and (text := _find_text(item[name])) is not None), None)
     role = WORDS if "word" in item or name in WORD_LISTS else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
-        found = shortened(repr(item.get("text") or item.get("word"))[:200])
-        raise InputError(f"{where}: {place}: its text is {found}, required a text")
-    if "visemeid" in item or item.get("type") == "viseme":
-        text, role = _viseme(item.get("visemeid", item.get("value")), f"{where}: {place}"), PHONE_LABELS
+        stored = shorten(repr(item.get("text") or item.get("word"))[:200])
+        raise InputError(f"{where}: {place}: its text is {stored}, required a text")
+    if "visemeid" in item or item.get("type") == "viseme":  # a number of Azure's, or a name of Polly's
+        viseme, role = item.get("visemeid", item.get("value")), PHONE_LABELS
+        if isinstance(viseme, str):
+            if viseme not in POLLY_VISEMES:
+                known = " ".join(POLLY_VISEMES)
+                raise InputError(f"{where}: {place}: no viseme of Polly is {shorten(viseme)!r}; known are: {known}")
+            text = POLLY_VISEMES[viseme]
+        else:
+            last = len(AZURE_VISEMES) - 1
+            text = AZURE_VISEMES[require(values.whole(0, last), viseme, f"{where}: {place}: the viseme")]
     if text is not None and "markname" in item and not MARK.fullmatch(text):
         raise InputError(
-            f"{where}: {place} is the mark {shortened(text)!r}, which is no word; name every mark as the word that "
+            f"{where}: {place} is the mark {shorten(text)!r}, which is no word; name every mark as the word that "
             'follows it, <mark name="hello"/>hello, or give the words as a transcript'
         )
-    start, end, times = _times(item, f"{where}: {place}")
-    return None if text is None else Row(start, end, text, place, times, _speaker(item), role)
+    start, end, times = _find_times(item, f"{where}: {place}")
+    return None if text is None else Row(start, end, text, place, times, _find_speaker(item), role)
 
 
-def _times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
+def _find_times(item: dict[str, Any], where: str) -> tuple[float, float, Times]:
     """Return the start and the end of an item by the first row of ``TIMES`` that it has."""
-    stamp, given = item.get("timestamp"), item
+    stamp, members = item.get("timestamp"), item
     if isinstance(stamp, list) and len(stamp) == 2:
-        given = {**given, "timestampstart": stamp[0], "timestampend": stamp[1]}
+        members = {**members, "timestampstart": stamp[0], "timestampend": stamp[1]}
     for name in ("time", "offsets"):  # an object of both
         if isinstance(item.get(name), dict):
-            given = {**given, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
-    times = next((row for row in TIMES if (row.start or row.end) in given), UNTIMED)
+            members = {**members, **{f"{name}{edge}": time for edge, time in item[name].items()}, name: None}
+    times = next((row for row in TIMES if (row.start or row.end) in members), UNTIMED)
     if item.get("type") in POLLY_KINDS and times not in TIMES[:2]:
-        is_speechify = {"start", "starttime"} <= given.keys()
-        times = POLLY if given.get("time") is not None else SPEECHIFY if is_speechify else times
-    start, per_s = _number(given.get(times.start), where, times.per_s)
-    end, per_s = _number(given.get(times.end), where, per_s)
-    if math.isnan(end) and times.duration in given:
-        end = start + _number(given[times.duration], where)[0]
+        is_speechify = {"start", "starttime"} <= members.keys()
+        times = POLLY if members.get("time") is not None else SPEECHIFY if is_speechify else times
+    start, per_s = _parse_number(members.get(times.start), where, times.per_s)
+    end, per_s = _parse_number(members.get(times.end), where, per_s)
+    if math.isnan(end) and times.duration in members:
+        end = start + _parse_number(members[times.duration], where)[0]
     return start, end, times._replace(per_s=per_s)
 
 
-def _text(value: Any) -> str | None:
+def _find_text(value: Any) -> str | None:
     """Return the text of a member: of a list its lines, of alternatives the first; None: it is no text."""
     if isinstance(value, list) and value:
         if all(isinstance(line, str) for line in value):
@@ -317,28 +321,28 @@ def _text(value: Any) -> str | None:
             return "".join(str(part["utf8"]) for part in value)
         value = value[0]
     if isinstance(value, dict):
-        return next((_text(value[name]) for name in TEXTS if name in value), None)
+        return next((_find_text(value[name]) for name in TEXTS if name in value), None)
     return value if isinstance(value, str) else None
 
 
-def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) -> list[Row]:
+def _find_rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) -> list[Row]:
     """Return the lines and words in a value, in order; ``name``: of the member that it is."""
     if depth > DEEPEST:
         return []
     if isinstance(value, dict):
-        said = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
-        return _rows_of_object(value, place, where, name, depth) if said else []
+        spoken = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
+        return _read_object(value, place, where, name, depth) if spoken else []
     rows: list[Row] = []
     items = value if isinstance(value, list) else []
     for number, each in enumerate(items[:1] if name in ALTERNATIVES else items, 1):
         is_stamp = isinstance(each, list) and len(each) == 3 and isinstance(each[0], str)  # IBM's
         item = dict(zip(("word", "start", "end"), each, strict=True)) if is_stamp else each
-        found: list[Row] = []
+        item_rows: list[Row] = []
         if isinstance(item, dict):
-            found = _rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
+            item_rows = _find_rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
         elif name in ("segments", "words"):
             require(values.members({}), item, f"{where}: {name!r}, item {number}")
-        for row in found:  # a token that is a piece of a word goes on with the one ahead of it
+        for row in item_rows:  # a token that is a piece of a word goes on with the one ahead of it
             piece = name == "tokens" and row.times.pieces and not row.text[:1].isspace()
             if rows and piece and row.speaker == rows[-1].speaker:
                 end = rows[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
@@ -349,14 +353,14 @@ def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) ->
     return rows
 
 
-def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
+def _read_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
     """Return an object's lines with words in time, else its words, alone or within its own time, else its lines."""
 
     def first_of(names: Iterable[str]) -> list[Row]:
         members = (each for each in names if isinstance(item.get(each), dict | list))
-        return next((rows for each in members if (rows := _rows(item[each], place, where, each, depth + 1))), [])
+        return next((rows for each in members if (rows := _find_rows(item[each], place, where, each, depth + 1))), [])
 
-    own = _row(item, place, where, name)
+    own = _read_row(item, place, where, name)
     timed = own is not None and not math.isnan(own.start)
     if name == "words" and own is None:
         raise InputError(f"{where}: {place}: no text; required a member 'word'")
@@ -370,33 +374,23 @@ def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, dep
     if not lines and (own is None or item.get("case") == MISSED):
         return []
     if not lines and own is not None:  # a word, perhaps with Gentle's phones
-        phones = _durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
-        spans = _in_a_row(phones, own.start, where) if phones else []
+        phones = _list_durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
+        spans = _chain_durations(phones, own.start, where) if phones else []
         rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
         return [own, *(Row(*row, own.times, own.speaker, PHONE_LABELS) for row in rows)]
     if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
         lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
-    speaker = own.speaker if own is not None else _speaker(item)
+    speaker = own.speaker if own is not None else _find_speaker(item)
     return [line if line.speaker else replace(line, speaker=speaker) for line in lines]
 
 
-def _speaker(item: dict[str, Any]) -> str:
+def _find_speaker(item: dict[str, Any]) -> str:
     return next((str(item[name]) for name in SPEAKERS if item.get(name) not in (None, "")), "")
 
 
-def _viseme(value: Any, where: str) -> str:
-    """Return the phone with the mouth of a viseme of Azure (a number) or of Polly (a name)."""
-    if isinstance(value, str):
-        if value not in POLLY_VISEMES:
-            known = " ".join(POLLY_VISEMES)
-            raise InputError(f"{where}: no viseme of Polly is {shortened(value)!r}; known are: {known}")
-        return POLLY_VISEMES[value]
-    return AZURE_VISEMES[require(values.whole(0, len(AZURE_VISEMES) - 1), value, f"{where}: the viseme")]
-
-
-def _listed_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
-    """Return lists of items in time: their phones, and the words of each speaker; None: there are none."""
-    rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
+def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
+    rows = [row for place, item in objects for row in _find_rows(item, place if len(objects) > 1 else "", where)]
     check_count(len(rows), where)
     words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
     missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
@@ -406,14 +400,10 @@ def _listed_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
         return [] if lists and not any(lists) else None
-    phones = _until_next([row for row in rows if row.role == PHONE_LABELS], [])
-    spoken = [LabelTier(PHONE_LABELS, tuple(_labels(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
+    phones = _last_until_next([row for row in rows if row.role == PHONE_LABELS], [])
+    spoken = [LabelTier(PHONE_LABELS, tuple(_scale_rows(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
     silences = [row.start for row in phones if row.text == SILENCE]
-    return spoken + _said_tiers(_until_next([row for row in rows if row.role != PHONE_LABELS], silences), where)
-
-
-def _said_tiers(rows: list[Row], where: str) -> list[LabelTier]:
-    """Return a tier of each speaker: of words, if nearly all are single ones, else of lines."""
+    rows = _last_until_next([row for row in rows if row.role != PHONE_LABELS], silences)
     half = len(rows) // 2
     first, again = ([(row.text, row.start) for row in part] for part in (rows[:half], rows[half:]))
     if half and first == again and rows[0].speaker != rows[-1].speaker:
@@ -425,12 +415,12 @@ def _said_tiers(rows: list[Row], where: str) -> list[LabelTier]:
     single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
     role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
-    for row, label in zip(rows, _labels(rows, role, where), strict=True):
+    for row, label in zip(rows, _scale_rows(rows, role, where), strict=True):
         by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
-    return [LabelTier(who or role, tuple(said), role, who) for who, said in by_speaker.items()]
+    return spoken + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
 
 
-def _until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
+def _last_until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
     """Return rows, of which events last to the next one or to a silence, and the last one is open."""
     starts = [row.start for row in rows if row.times.start in EVENTS]
     if not starts:
@@ -441,17 +431,13 @@ def _until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
     return [replace(row, end=later[bisect_right(edges, row.start)]) if math.isnan(row.end) else row for row in in_time]
 
 
-def _labels(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
-    """Return rows in seconds, in the unit that their names say, or else in the one that their lengths do.
-
-    Raises InputError: one ends long before it starts, or its time is none, or the unit is not known.
-    """
+def _scale_rows(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
+    """Return rows in seconds, in the unit that their names say, or else in the one that their lengths do."""
     parts = [part for row in rows for part in row.parts or (row,)]
     judged = [part for part in parts if not part.times.per_s and not math.isnan(part.start)]
     if any(row.times.usual == 0 for row in judged):
-        raise InputError(
-            f"{where}: its times are offsets in frames, whose length is not known; required start and end in seconds"
-        )
+        frames = "its times are offsets in frames, whose length is not known"
+        raise InputError(f"{where}: {frames}; required start and end in seconds")
     spans = [(row.start, row.end, row.text) for row in judged]
     per_s = unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
 
@@ -469,33 +455,33 @@ def _labels(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
     return [label(row) for row in rows]
 
 
-def _durations(items: Any, text: str, length: str, place: str, per_s: float) -> list[tuple[str, Any, Any, float]]:
+def _list_durations(items: Any, text: str, length: str, place: str, per_s: float) -> list[tuple[str, Any, Any, float]]:
     """Return the items of a list of objects: place, text, length and how many of its units are a second."""
     fields = [each if isinstance(each, dict) else {} for each in (items if isinstance(items, list) else [])]
     return [(f"{place} {number}", each.get(text), each.get(length), per_s) for number, each in enumerate(fields, 1)]
 
 
-def _in_a_row(items: Sequence[tuple[str, Any, Any, float]], start_s: float, where: str) -> list[TimedLabel]:
+def _chain_durations(items: Sequence[tuple[str, Any, Any, float]], start_s: float, where: str) -> list[TimedLabel]:
     """Return labels of which the lengths are given, one after another."""
     check_count(len(items), where)
     labels: list[TimedLabel] = []
     for place, text, length, per_s in items:
-        end_s = start_s + _seconds(length, f"{where}: {place}", per_s)
+        end_s = start_s + _parse_time(length, f"{where}: {place}", per_s)
         labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place))
         start_s = end_s
     return labels
 
 
-def _word_and_phone_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
+def _make_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
     check_count(max(len(words), len(phones)), where)
     phones = ipa_labels(phones, where)
     tiers = (LabelTier(WORDS, tuple(words), WORDS), LabelTier(PHONE_LABELS, tuple(phones), PHONE_LABELS))
     return [tier for tier in tiers if tier.labels]
 
 
-def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+def _read_columns(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return words and phones of parallel lists: of ElevenLabs' characters, of Cartesia's messages."""
-    found: dict[str, list[TimedLabel]] = defaultdict(list)
+    columns: dict[str, list[TimedLabel]] = defaultdict(list)
     pieces = 0
     for place, item in objects:
         for name in ("result", "timestampinfo"):
@@ -505,20 +491,20 @@ def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
         for name, owner in (owners or {"lists": item}).items():
             for role, names, per_s in COLUMNS:
                 if isinstance(owner.get(names[0]), list) and owner.keys() >= {*names}:
-                    found[role] += _columns(owner, names, per_s, f"{where}: {place}, {name}")
+                    columns[role] += _label_columns(owner, names, per_s, f"{where}: {place}, {name}")
                     pieces += per_s != 1 or "wordstarttimeseconds" in names
     if pieces > 1:
         raise InputError(f"{where}: holds {pieces} pieces whose times each begin at 0; save the sound of each apart")
-    characters = found["characters"]
+    characters = columns["characters"]
     owner_of = [number for number, label in enumerate(characters) for _ in label.text]
     for match in SPOKEN_WORD.finditer("".join(label.text for label in characters).replace("▁", " ")):
         first, last = characters[owner_of[match.start()]], characters[owner_of[match.end() - 1]]
-        found[WORDS].append(replace(first, end_s=last.end_s, text=match[0]))
-    tiers = _word_and_phone_tiers(found[WORDS], found[PHONE_LABELS], where)
-    return parse_seconds(tiers, where) if any(found.values()) else None
+        columns[WORDS].append(replace(first, end_s=last.end_s, text=match[0]))
+    tiers = _make_tiers(columns[WORDS], columns[PHONE_LABELS], where)
+    return parse_seconds(tiers, where) if any(columns.values()) else None
 
 
-def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
+def _label_columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
     """Return the items of parallel lists. Raises InputError: they are no lists, or of several lengths."""
     lists = [owner[name] for name in names]
     if not all(isinstance(each, list) for each in lists) or len({len(each) for each in lists}) > 1:
@@ -527,13 +513,13 @@ def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: s
     lists += [[*lists[1][1:], math.inf][: len(lists[1])]] if len(lists) == 2 else []
     labels = []
     for number, (text, *times) in enumerate(zip(*lists, strict=True), 1):
-        start_s, end_s = (time if time is math.inf else _seconds(time, f"{where} {number}", per_s) for time in times)
+        start_s, end_s = (time if time is math.inf else _parse_time(time, f"{where} {number}", per_s) for time in times)
         end_s += start_s if "duration" in names[-1] else 0.0
         labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where} {number}"), f"{names[0]} {number}"))
     return labels
 
 
-def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+def _read_durations(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return the phones of Piper (samples) and Kokoro (frames), whose durations alone are given, and Kokoro's words."""
     piper = [(place, item) for place, item in objects if isinstance(item.get("phonemealignments"), list)]
     kokoro = [item for _, item in objects if "phonemes" in item and isinstance(item.get("preddur"), list)]
@@ -544,7 +530,7 @@ def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     items: list[tuple[str, Any, Any, float]] = []
     for place, item in piper:
         rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
-        items += _durations(item["phonemealignments"], "phoneme", "numsamples", f"{place}, phoneme", rate)
+        items += _list_durations(item["phonemealignments"], "phoneme", "numsamples", f"{place}, phoneme", rate)
     for item in kokoro:
         letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):
@@ -554,13 +540,13 @@ def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             )
         pairs = enumerate(zip(letters, item["preddur"], strict=True))
         items += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
-    phones = _in_a_row(items, 0.0, where)
-    words = [row for item in kokoro for row in _rows({"tokens": item.get("tokens")}, "", where)]
-    timed = _labels([row for row in words if not math.isnan(row.start)], WORDS, where)
-    return _word_and_phone_tiers(timed, phones, where)
+    phones = _chain_durations(items, 0.0, where)
+    words = [row for item in kokoro for row in _find_rows({"tokens": item.get("tokens")}, "", where)]
+    timed = _scale_rows([row for row in words if not math.isnan(row.start)], WORDS, where)
+    return _make_tiers(timed, phones, where)
 
 
-def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+def _read_named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return the tiers of the JSON of the Montreal Forced Aligner and of praatIO, by their names."""
     named = objects[0][1].get("tiers") if len(objects) == 1 else None
     if isinstance(named, list) and all(isinstance(tier, dict) and "name" in tier for tier in named):
@@ -577,7 +563,7 @@ def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             place = f"tier {name!r}, entry {number}"
             if not isinstance(entry, list) or len(entry) not in (2, 3):
                 raise InputError(f"{where}: {place} is no list of start, end and label")
-            *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
+            *times_s, text = (*(_parse_time(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
             labels.append(TimedLabel(times_s[0], times_s[-1], require(_TEXT, text, f"{where}: {place}"), place))
         if len(tier["entries"][0] if tier["entries"] else ()) == 3:
             tiers.append(find_tier(name, labels))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, sort_lines
 from lipmotion.types.values import parse_number
@@ -67,7 +67,7 @@ GLOTTAL_STOP = "q"
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
-MOST_LABELS = 250_000
+MAX_LABELS = 250_000
 """Most labels of a file: phones of five hours of speech."""
 TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3
 """How long a phone, and a word, alone or of a line, last."""
@@ -113,20 +113,20 @@ class LabelTier:
 
 def find_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
     """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
-    found = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
+    owner = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
     role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
     if name == RECOGNISED:
         role = RECOGNISED_PHONES
     last_s = -math.inf
     known_s = [last_s := label.start_s if label.start_s > EARLIEST_S else last_s for label in labels]
     in_time = [label for _, label in sorted(zip(known_s, labels, strict=True), key=lambda pair: pair[0])]
-    return LabelTier(name, tuple(in_time), role, speaker or (found["speaker"].strip() if found else ""))
+    return LabelTier(name, tuple(in_time), role, speaker or (owner["speaker"].strip() if owner else ""))
 
 
 def check_count(count: int, where: str) -> None:
     """Raise InputError for more labels than a recording has."""
-    if count > MOST_LABELS:
-        raise InputError(f"{where}: more than {MOST_LABELS} labels; give those of one recording")
+    if count > MAX_LABELS:
+        raise InputError(f"{where}: more than {MAX_LABELS} labels; give those of one recording")
 
 
 def require_time(text: str, place: str, where: str) -> float:
@@ -147,13 +147,13 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
         for start, end, text in spans
         if math.inf > end > start and classify_label(text) is SpokenAs.SPEECH
     ]
-    whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
+    all_whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
     if len(lengths) < 1 + (usual == 1):
-        return usual if whole else 1
+        return usual if all_whole else 1
     times = median(lengths) / (TYPICAL_PHONE_S if role == PHONE_LABELS else TYPICAL_WORD_S)
-    limits = WHOLE_LIMITS if whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
+    limits = WHOLE_LIMITS if all_whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
     per_s = next((per_s for limit, per_s in limits if times < limit), TICKS_PER_S)
-    if not whole and per_s != 1000:
+    if not all_whole and per_s != 1000:
         return 1
     starts = [start for start, *_ in spans if not math.isnan(start)]
     if per_s == 0 or (per_s > 1 and len(lengths) > 2 and max(starts) - min(starts) < median(lengths)):
@@ -170,15 +170,16 @@ def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[
     per_s : how many of their units are a second; 0: how long words last decides
     Raises InputError: as ``unit_of_times``.
     """
-    said = [tier for tier in tiers if tier.role != OTHER]
-    judged = next((tier for tier in said if tier.role == WORDS or holds_phones(tier)), next(iter(said), None))
+    spoken = [tier for tier in tiers if tier.role != OTHER]
+    judged = next((tier for tier in spoken if tier.role == WORDS or holds_phones(tier)), next(iter(spoken), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
     role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
     per_s = per_s or unit_of_times(spans, role, where)
-    scaled = [
-        [replace(each, start_s=each.start_s / per_s, end_s=each.end_s / per_s) for each in t.labels] for t in tiers
-    ]
-    return [replace(tier, labels=tuple(labels)) for tier, labels in zip(tiers, scaled, strict=True)]
+    scaled = []
+    for tier in tiers:
+        labels = (replace(each, start_s=each.start_s / per_s, end_s=each.end_s / per_s) for each in tier.labels)
+        scaled.append(replace(tier, labels=tuple(labels)))
+    return scaled
 
 
 def holds_phones(tier: LabelTier) -> bool:
@@ -194,13 +195,13 @@ def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     unknown = [tier for tier in tiers if not tier.role and any(label.text for label in tier.labels)]
     if len(unknown) < 2 or any(tier.speaker or tier.role in (WORDS, LINES) for tier in tiers):
         return tiers
-    said = [
+    spoken = [
         [label for label in tier.labels if read_line_words(extract_spoken_text(label.text), tier.name)]
         for tier in unknown
     ]
-    if any(map(holds_phones, unknown)) or not all(said):
+    if any(map(holds_phones, unknown)) or not all(spoken):
         return tiers
-    first, others = said[0], [label for labels in said[1:] for label in labels]
+    first, others = spoken[0], [label for labels in spoken[1:] for label in labels]
     shared_s = sum(
         max(min(a.end_s, b.end_s) - max(a.start_s, b.start_s), 0.0) for a in first[:1000] for b in others[:1000]
     )
@@ -227,9 +228,9 @@ def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[
             edges = (span.start_s - timed[place].start_s, span.end_s - timed[place].end_s)
             inside = max(map(abs, edges)) <= WHOLE_WORD_S
         word = timed[place].text if inside else ""
-        said = word if is_line(word) and classify_label(word) is SpokenAs.SPEECH else ""
-        again = place > before and bool(spans) and said == spans[-1].label.word != ""
-        spans.append(replace(span, label=replace(span.label, word=said, again=again)))
+        spoken_word = word if is_line(word) and classify_label(word) is SpokenAs.SPEECH else ""
+        again = place > before and bool(spans) and spoken_word == spans[-1].label.word != ""
+        spans.append(replace(span, label=replace(span.label, word=spoken_word, again=again)))
     return Timeline(tuple(spans))
 
 
@@ -245,24 +246,21 @@ def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
     for tier in tiers:
         for label in tier.labels:
             place = f"{where}: {label.position}"
-            start_s, end_s = _times(label, where)
+            start_s, end_s = _find_times(label, where)
             words: list[TimedWord] = []
             for part in label.parts or (label,):
                 text = extract_spoken_text(part.text, names) if classify_label(part.text) is SpokenAs.SPEECH else ""
                 single = not tier.role and len(read_line_words(text, place)) == 1
                 timed = bool(label.parts) or tier.role == WORDS or single
-                words += time_words(text, *(_times(part, where) if timed else (None, None)), where=place)
+                words += time_words(text, *(_find_times(part, where) if timed else (None, None)), where=place)
             lines.append(TranscriptLine(tuple(words), start_s, end_s))
             count += len(words)
             check_word_count(count, where)
     return sort_lines(lines)
 
 
-def _times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
-    """Return the times of a label, None where they are not known: nothing is said before the sound begins.
-
-    Raises InputError: it ends before it starts.
-    """
+def _find_times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
+    """Return the times of a label, None where they are not known: nothing is said before the sound begins."""
     if label.end_s < label.start_s:
         raise _reversed(label, where)
     start_s, end_s = (time_s if EARLIEST_S < time_s < math.inf else None for time_s in (label.start_s, label.end_s))
@@ -285,18 +283,30 @@ def phone_timeline(
     with_gaps : gaps between labels are allowed, and stay
     Raises InputError: a label that is no phone, or labels that overlap or leave a gap.
     """
-    _check_order(tier.labels, where, with_gaps=with_gaps)
-    labels = _whole_phones(tier.labels)
+    reached_s = 0.0
+    for number, label in enumerate(tier.labels):
+        if not min(label.start_s, label.end_s) > EARLIEST_S:
+            raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
+        if label.end_s < label.start_s:
+            raise _reversed(label, where)
+        late_s, which = label.start_s - reached_s, f"{where}: {label.position} starts at {label.start_s:g} s, "
+        if late_s < -ROUNDING_S:
+            raise InputError(f"{which}before the one ahead of it ends ({reached_s:g} s); labels must not overlap")
+        if number and not with_gaps and late_s > ROUNDING_S:
+            gap = f"the one before it ends at {reached_s:g} s; phones must follow each other without a gap"
+            raise InputError(f"{which}{gap}: label silence as sil")
+        reached_s = label.end_s
+    labels = _join_states(tier.labels)
     phones: list[str] = []
     for label in labels:
         phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
         if phone is None:
-            found = f"{label.position} is {label.text[:40]!r}"
-            raise InputError(f"{where}: {found}, which is no phone; the phones are: {' '.join(PHONES)}")
+            which_label = f"{label.position} is {label.text[:40]!r}"
+            raise InputError(f"{where}: {which_label}, which is no phone; the phones are: {' '.join(PHONES)}")
         phones.append(phone)
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words and not marked:
-        phones = _reduced(labels, phones, words)
+        phones = _reduce_vowels(labels, phones, words)
     starts_s = [max(label.start_s, 0.0) for label in labels]
     ends_s = [
         label.end_s if following_s > label.end_s + ROUNDING_S else following_s
@@ -304,25 +314,6 @@ def phone_timeline(
     ] + [max(labels[-1].end_s, 0.0)]
     units = (Unit("", UNKNOWN_PHONES) if phone == UNKNOWN_PHONES else Unit(phone) for phone in phones)
     return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, units, strict=True)))
-
-
-def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -> None:
-    """Raise InputError for labels without times, that overlap or end before they start, or that leave a gap."""
-    end_s = 0.0
-    for number, label in enumerate(labels):
-        if not min(label.start_s, label.end_s) > EARLIEST_S:
-            raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
-        if label.end_s < label.start_s:
-            raise _reversed(label, where)
-        late_s, found = label.start_s - end_s, f"{where}: {label.position} starts at {label.start_s:g} s, "
-        if late_s < -ROUNDING_S:
-            raise InputError(f"{found}before the one ahead of it ends ({end_s:g} s); labels must not overlap")
-        if number and not with_gaps and late_s > ROUNDING_S:
-            raise InputError(
-                f"{found}the one before it ends at {end_s:g} s; phones must follow each other without a gap: label "
-                "silence as sil"
-            )
-        end_s = label.end_s
 
 
 def merge_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
@@ -348,26 +339,24 @@ def phone_of(text: str) -> str | None:
     return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(classify_label(inner))
 
 
-def _whole_phones(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
-    """Return labels of whole phones: states of a phone (``...[2]``, ``...[3]``, ...) become one, and a closure of
-    TIMIT's with what it opens to (``pcl``, ``p``).
-    """
-    whole: list[TimedLabel] = []
+def _join_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
+    """Return states of a phone (``...[2]``, ``...[3]``, ...) as one, and closures of TIMIT's with what they open to."""
+    phones: list[TimedLabel] = []
     last = -1
     for label in labels:
         match = STATE_NUMBER.search(label.text)
         state = int(match[1]) if match else -1
         name = STATE_NUMBER.sub("", label.text)
-        before = whole[-1].text.lower() if whole else ""
-        if (whole and state > last >= 0 and before == name.lower()) or name.lower() in CLOSURES.get(before, ()):
-            whole[-1] = replace(whole[-1], end_s=label.end_s, text=name)
+        before = phones[-1].text.lower() if phones else ""
+        if (phones and state > last >= 0 and before == name.lower()) or name.lower() in CLOSURES.get(before, ()):
+            phones[-1] = replace(phones[-1], end_s=label.end_s, text=name)
         else:
-            whole.append(replace(label, text=name))
+            phones.append(replace(label, text=name))
         last = state
-    return whole
+    return phones
 
 
-def _reduced(labels: Sequence[TimedLabel], phones: Sequence[str], words: Sequence[TimedLabel]) -> list[str]:
+def _reduce_vowels(labels: Sequence[TimedLabel], phones: Sequence[str], words: Sequence[TimedLabel]) -> list[str]:
     """Return the phones with the unstressed vowels of every word reduced by the lexicon's rule."""
     result = list(phones)
     middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
@@ -393,37 +382,35 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
     unspoken = [label.text in PAUSES or classify_label(label.text) is not SpokenAs.SPEECH for label in labels]
     for label, pause in zip(labels, unspoken, strict=True):
         if len(label.text) > LONGEST_SYMBOL:
-            length = len(label.text)
-            raise InputError(
-                f"{where}: {label.position} has {length} letters, required a phone: {LONGEST_SYMBOL} at most"
-            )
+            long = f"{label.position} has {len(label.text)} letters"
+            raise InputError(f"{where}: {long}, required a phone: {LONGEST_SYMBOL} at most")
         unknown = "" if pause else read_ipa(label.text)[1]
         if unknown:
             raise InputError(
-                f"{where}: {label.position} is {shortened(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
+                f"{where}: {label.position} is {shorten(label.text)!r}, which is no phone (not IPA: {unknown!r}); "
                 f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
             )
-    begun: dict[int, list[str]] = defaultdict(list)
+    phones_of: dict[int, list[str]] = defaultdict(list)
     # no sound goes on beyond silence
     tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
     for phone, number in read_tokens(tokens):
-        begun[number].append(phone)
-    found: list[TimedLabel] = []
+        phones_of[number].append(phone)
+    result: list[TimedLabel] = []
     for number, label in enumerate(labels):
-        phones = begun.get(number, [])
+        phones = phones_of.get(number, [])
         if phones:
             each_s = (label.end_s - label.start_s) / len(phones)
             edges_s = [label.start_s + place * each_s for place in range(len(phones))] + [label.end_s]
-            found += [
+            result += [
                 replace(label, start_s=start_s, end_s=end_s, text=phone)
                 for phone, start_s, end_s in zip(phones, edges_s[:-1], edges_s[1:], strict=True)
             ]
-        elif not unspoken[number] and found and found[-1].end_s >= label.start_s:
-            found[-1] = replace(found[-1], end_s=label.end_s)
+        elif not unspoken[number] and result and result[-1].end_s >= label.start_s:
+            result[-1] = replace(result[-1], end_s=label.end_s)
         else:
             is_speech = classify_label(label.text) is SpokenAs.UNKNOWN
-            found.append(replace(label, text=UNKNOWN_PHONES if is_speech else SILENCE))
-    return found
+            result.append(replace(label, text=UNKNOWN_PHONES if is_speech else SILENCE))
+    return result
 
 
 def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:

@@ -51,8 +51,8 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     curves, points, steps = [], 0, bool(SHOWING & set(generation.stepped))
     for name, values in ((OPEN, mouth_open(generation)), (FORM, mouth_form(generation))):
         rounded = np.round(values, DECIMALS) + 0.0
-        kept = key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
-        keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in kept]
+        frames = key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
+        keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in frames]
         segments: list[float] = [*keys[0]]
         for time_s, value in keys[1:]:
             segments += [STEPPED_SEGMENT if steps else LINEAR_SEGMENT, time_s, value]
@@ -72,7 +72,7 @@ def mouth_open(generation: Generation) -> Array:
     if "opening" in motion.names:
         gap = spoken_mouth(motion, generation.units).gap
     else:
-        gap = _by_weights(motion, arkit_mouth().gap)
+        gap = _sum_effects(motion, arkit_mouth().gap)
     return np.clip(gap / FULL_GAP, 0.0, 1.0)
 
 
@@ -84,11 +84,11 @@ def mouth_form(generation: Generation) -> Array:
     else:
         template = mouth_template()
         corners = arkit_mouth().moved[:, [template.row(LEFT_CORNER), template.row(RIGHT_CORNER)], 0]
-        wider = _by_weights(motion, corners[:, 0] - corners[:, 1])
+        wider = _sum_effects(motion, corners[:, 0] - corners[:, 1])
     return np.clip(wider / np.where(wider > 0, LARGEST_WIDENING, LARGEST_NARROWING), -1.0, 1.0)
 
 
-def _by_weights(motion: Motion, effects: Array) -> Array:
+def _sum_effects(motion: Motion, effects: Array) -> Array:
     """Return the sum of the effects of blendshapes by their weights [shape=(T,)]."""
     total = np.zeros(len(motion.values))
     for name, effect in zip(arkit_mouth().known, effects, strict=True):

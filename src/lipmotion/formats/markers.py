@@ -23,9 +23,9 @@ LEFT_EYE = frozenset(("eyel", "leye", "lefteye", "eyeleft", "exl", "lex", "leyeo
 RIGHT_EYE = frozenset(("eyer", "reye", "righteye", "eyeright", "exr", "rex", "reyeouter", "eyerouter", "righteyeouter"))
 RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear", "mastoid", "fhd", "lfhd", "rfhd")
 """Beginnings of names, after a side, of other markers that do not move against the skull."""
-LEAST_RIGID_MARKERS = 3
+MIN_RIGID_MARKERS = 3
 LARGEST_COORDINATE = 1e6
-LEAST_DISTANCE = 1e-3
+MIN_DISTANCE = 1e-3
 """Least distance of the eye corners in any frame, as a share of the median."""
 
 DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}
@@ -36,8 +36,8 @@ MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
 
 def measure_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:
     """Return the channels of markers in the head's frame, and the distances between those of the lips."""
-    points = {int(found[1]): places for name, places in markers.items() if (found := MARKER.match(name))}
-    names = [str(int(found[1])) if (found := MARKER.match(name)) else name for name in markers]
+    points = {int(match[1]): places for name, places in markers.items() if (match := MARKER.match(name))}
+    names = [str(int(match[1])) if (match := MARKER.match(name)) else name for name in markers]
     curves = {
         name: np.linalg.norm(points[one] - points[other], axis=1)
         for name, (one, other) in DISTANCES.items()
@@ -68,23 +68,30 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     left, right = (next((name for name in markers if _plain(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
     if not (left and right):
         return {name: places * millimetres / MILLIMETRES for name, places in markers.items()}
-    rigid = [left, right, *(name for name in markers if name not in {left, right} and _is_rigid(name))]
+    rigid = [left, right]
+    for name in markers:
+        plain = _plain(name)
+        beginnings = (plain.removeprefix("left").removeprefix("right"), plain[1:])
+        if name not in rigid and any(each.startswith(RIGID) for each in beginnings):
+            rigid.append(name)
     moving = [name for name in markers if name not in rigid]
     if not moving:
         raise InputError(f"all markers are those of the head ({', '.join(rigid[:6])}), required markers of the mouth")
     places = np.stack([markers[name] for name in (*rigid, *moving)], axis=1)
-    if len(rigid) >= LEAST_RIGID_MARKERS:
-        places = _steadied(places, len(rigid))
+    if len(rigid) >= MIN_RIGID_MARKERS:
+        places = _steady(places, len(rigid))
     centre = places[:, :2].mean(axis=1, keepdims=True)
     across = places[:, 0] - places[:, 1]
     distances = np.linalg.norm(across, axis=1)
     distance = float(np.median(distances))
-    if not distances.min() > LEAST_DISTANCE * max(distance, LEAST_DISTANCE):
+    if not distances.min() > MIN_DISTANCE * max(distance, MIN_DISTANCE):
         raise InputError("the two eye corners are in one place, required the outer corners of both eyes")
-    if len(rigid) >= LEAST_RIGID_MARKERS:
+    if len(rigid) >= MIN_RIGID_MARKERS:
         across = np.broadcast_to(across.mean(axis=0), across.shape)
-    turned = _rotated(places - centre, _least_rotations(across)) / distance
-    turned = turned @ _quarter_turn(turned[:, len(rigid) :].mean(axis=(0, 1))).T
+    turned = _rotate(places - centre, _smallest_rotations(across)) / distance
+    _, y, z = turned[:, len(rigid) :].mean(axis=(0, 1))  # about x by quarters, so that the mouth is below the eyes
+    cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[round(float(np.arctan2(z, -y) / (np.pi / 2))) % 4]
+    turned = turned @ np.array([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]]).T
     return {name: turned[:, len(rigid) + column] for column, name in enumerate(moving)}
 
 
@@ -92,12 +99,7 @@ def _plain(name: str) -> str:
     return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
-def _is_rigid(name: str) -> bool:
-    plain = _plain(name)
-    return plain.removeprefix("left").removeprefix("right").startswith(RIGID) or plain[1:].startswith(RIGID)
-
-
-def _steadied(places: Array, rigid: int) -> Array:
+def _steady(places: Array, rigid: int) -> Array:
     """Return places moved so that the first markers lie as in the first frame, by least squares [shape=(T, N, 3)].
 
     Source: Kabsch 1976, "A solution for the best rotation to relate two sets of vectors".
@@ -109,15 +111,15 @@ def _steadied(places: Array, rigid: int) -> Array:
     signs = np.ones((len(places), 3))
     signs[:, 2] = np.sign(np.linalg.det(left @ right))
     rotations = np.einsum("tji,tj,tkj->tik", right, signs, left)
-    return _rotated(places - centres, rotations) + centres[0]
+    return _rotate(places - centres, rotations) + centres[0]
 
 
-def _rotated(places: Array, rotations: Array) -> Array:
+def _rotate(places: Array, rotations: Array) -> Array:
     """Return places [shape=(T, N, 3)] under one rotation a frame [shape=(T, 3, 3)]."""
     return np.einsum("tij,tnj->tni", rotations, places)
 
 
-def _least_rotations(across: Array) -> Array:
+def _smallest_rotations(across: Array) -> Array:
     """Return the least rotations that turn directions into the axis x [shape=(T, 3, 3)]; half turns are about y."""
     x, y, z = (across / np.linalg.norm(across, axis=1, keepdims=True)).T
     opposite = x < -1 + 1e-9
@@ -126,10 +128,3 @@ def _least_rotations(across: Array) -> Array:
     rotations = np.moveaxis(rows, 2, 0)
     rotations[opposite] = np.diag([-1.0, 1.0, -1.0])
     return rotations
-
-
-def _quarter_turn(mouth: Array) -> Array:
-    """Return the rotation about x by quarters that brings a place below the eyes [shape=(3, 3)]."""
-    quarters = round(float(np.arctan2(mouth[2], -mouth[1]) / (np.pi / 2)))
-    cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[quarters % 4]
-    return np.array([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]])

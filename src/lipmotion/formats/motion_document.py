@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import MotionFormat, read_members, write_json
 from lipmotion.printable import is_line
 from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
@@ -35,13 +35,10 @@ FRAMES_AT_ONCE = 4096
 """Frames whose variance is computed at once."""
 
 
-def _document(
+def _describe(
     generation: Generation, source: Mapping[str, str], model: Mapping[str, str]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the members that are before the values, and those after them.
-
-    Raises InputError: a channel has a name that would not be read.
-    """
+    """Return the members before the values, and after. Raises InputError: a channel's name would not be read."""
     motion = generation.motion
     channels = [{"name": channel.name, "unit": channel.unit} for channel in motion.channels]
     checked = require(items(members(_CHANNEL)), channels, "channels")
@@ -72,16 +69,15 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     if not isinstance(version, int) or version < 1:
         raise InputError(f"the motion document has version {version!r}, required {VERSION}; export it again")
     if version > VERSION:
-        raise InputError(
-            f"the motion document has version {version}, this lipmotion reads up to {VERSION}: upgrade lipmotion"
-        )
+        newer = f"the motion document has version {version}"
+        raise InputError(f"{newer}, this lipmotion reads up to {VERSION}: upgrade lipmotion")
     with json_errors("the motion document"):
-        found = _DOCUMENT(document)
-        channels = tuple(Channel(**channel) for channel in found["channels"])
+        checked = _DOCUMENT(document)
+        channels = tuple(Channel(**channel) for channel in checked["channels"])
         if isinstance(values, np.ndarray) and values.dtype.kind not in "fiu":
             raise InputError(f"the motion document has values of {values.dtype}, required numbers; export it again")
         array = np.asarray(values, dtype=np.float64)
-        motion = Motion(array.reshape(0, len(channels)) if array.size == 0 else array, found["rate_hz"], channels)
+        motion = Motion(array.reshape(0, len(channels)) if array.size == 0 else array, checked["rate_hz"], channels)
     return motion, parse_units(document.get("units"), document.get(RECOGNISED))
 
 
@@ -96,19 +92,18 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
             RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
             for start_s, end_s, name, confidence in _ROWS(recognised or [])
         ]
-        return restore_confidences(Timeline(tuple(map(_span, _UNITS(rows)))), confidences)
+        return restore_confidences(Timeline(tuple(map(_read_span, _UNITS(rows)))), confidences)
 
 
-def _span(row: Any) -> Span[Unit]:
+def _read_span(row: Any) -> Span[Unit]:
     unit = Unit(row["phone"], row.get("unit", ""), row.get("word", ""), again=row.get("again", False))
     span = Span(row["start_s"], row["end_s"], unit)
     if not is_line(span.label.phone + span.label.unit + span.label.word):
-        label = shortened(repr(span.label))
+        label = shorten(repr(span.label))
         raise InputError(f"{label} has a line end, a control character or half a character in it; correct it")
     if not span.start_s >= 0 or span.end_s == float("inf"):
-        raise InputError(
-            f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"
-        )
+        lasts = f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s"
+        raise InputError(f"{lasts}, required: finite times from 0")
     return span
 
 
@@ -131,7 +126,7 @@ _DOCUMENT = members(
 def write_json_file(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
     """Write one JSON object: format, version, rate_hz, channels, values, confidence, units, source, model."""
     certain = {} if (confidence := generation.confidence) is None else {"confidence": confidence.round(2).tolist()}
-    before, after = _document(generation, source, model)
+    before, after = _describe(generation, source, model)
     write_json(path, before, "values", generation.motion.values, certain | after)
 
 
@@ -166,7 +161,7 @@ def write_npz(path: Path, generation: Generation, source: Mapping[str, str], mod
     A standard deviation is the model's, in the unit of its channel: the square root of ``Generation.variance``.
     ``confidence`` [shape=(T,)] is ``Generation.confidence``, where that is known.
     """
-    before, after = _document(generation, source, model)
+    before, after = _describe(generation, source, model)
     document = as_json(before | after, ensure_ascii=False)
     values = generation.motion.values
     rows: dict[str, Callable[[slice], NDArray[np.floating[Any]]]] = {

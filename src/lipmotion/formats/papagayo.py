@@ -19,7 +19,7 @@ from lipmotion.articulation.cue_sheets import (
     parse_cue_time,
     parse_shape,
 )
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
 from lipmotion.units.mouth_chart import REST, SHAPES
@@ -42,16 +42,19 @@ def project_text(sheet: CueSheet, sound_file: str) -> str:
     """
     sheet = replace(sheet, fps=float(math.ceil(sheet.fps - WHOLE_RATE_TOLERANCE)))
     shown = list_frame_shapes(sheet)
-    phrases = [find_words_of_run(sheet, first, last) for first, last in _runs(shown)]
-    said = [" ".join(word for *_, word in phrase) for phrase in phrases]
+    moving = [False, *(shape != REST for shape in shown), False]
+    starts = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame]]
+    ends = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame + 2]]
+    phrases = [find_words_of_run(sheet, first, last) for first, last in zip(starts, ends, strict=True)]
+    texts = [" ".join(word for *_, word in phrase) for phrase in phrases]
     lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(shown)}"]
-    lines += ["1", "\tVoice 1", f"\t{'|'.join(said)}", f"\t{len(phrases)}"]
-    for phrase, words in zip(phrases, said, strict=True):
+    lines += ["1", "\tVoice 1", f"\t{'|'.join(texts)}", f"\t{len(phrases)}"]
+    for phrase, words in zip(phrases, texts, strict=True):
         lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]
         for first, last, word in phrase:
-            starts = [frame for frame in range(first, last + 1) if frame == first or shown[frame] != shown[frame - 1]]
-            lines.append(f"\t\t\t{word} {first} {last} {len(starts)}")
-            lines += [f"\t\t\t\t{frame} {SHAPES[shown[frame]].blair}" for frame in starts]
+            changes = [frame for frame in range(first, last + 1) if frame == first or shown[frame] != shown[frame - 1]]
+            lines.append(f"\t\t\t{word} {first} {last} {len(changes)}")
+            lines += [f"\t\t\t\t{frame} {SHAPES[shown[frame]].blair}" for frame in changes]
     return "\n".join(lines) + "\n"
 
 
@@ -82,14 +85,6 @@ def _one_line(text: str) -> str:
     return text if is_line(text) else printable(text)
 
 
-def _runs(shown: list[str]) -> list[tuple[int, int]]:
-    """Return the first and the last frame of each stretch without rest."""
-    moving = [False, *(shape != REST for shape in shown), False]
-    starts = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame]]
-    ends = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame + 2]]
-    return list(zip(starts, ends, strict=True))
-
-
 class _Lines:
     """The lines of a file, one after another, with their numbers."""
 
@@ -109,8 +104,7 @@ class _Lines:
 
     def count(self) -> int:
         """Return the number on the next line. Raises InputError: it is none."""
-        text = self.next()
-        return int(parse_cue_time(text, self.place))
+        return int(parse_cue_time(self.next(), self.place))
 
 
 def parse_project(text: str) -> CueSheet:
@@ -129,31 +123,24 @@ def parse_project(text: str) -> CueSheet:
         )
     lines.next()
     lines.next()
-    found: list[tuple[float, str, str]] = []
+    shapes: list[tuple[float, str, str]] = []
     words: list[Span[str]] = []
     for _ in range(lines.count()):
         for _ in range(3):
             lines.next()
         for _ in range(lines.count()):
-            word, first, last, count = _word(lines)
-            words.append(Span(first / fps, (last + 1) / fps, word))
+            line = lines.next()
+            fields = line.rsplit(maxsplit=3)
+            if len(fields) != 4:
+                wanted = "a word, its frames and the number of its shapes"
+                raise InputError(f"{lines.place} is {shorten(line)!r}, required {wanted}")
+            first, last, count = (int(parse_cue_time(field, lines.place)) for field in fields[1:])
+            words.append(Span(first / fps, (last + 1) / fps, fields[0]))
             for _ in range(count):
                 frame, _, name = lines.next().partition(" ")
-                found.append((parse_cue_time(frame, lines.place) / fps, name, lines.place))
-            found.append(((last + 1) / fps, "", ""))
-    chart = choose_chart(name for _, name, _ in found if name)
-    rows = [(start_s, parse_shape(name, chart, place) if name else REST) for start_s, name, place in found]
-    kept = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=False) if row[0] < after[0]]
-    return build_cue_sheet(kept, frames / fps, float(fps), Timeline(tuple(words)))
-
-
-def _word(lines: _Lines) -> tuple[str, int, int, int]:
-    """Return a word, its first and its last frame, and how many shapes it has. Raises InputError: it is none."""
-    line = lines.next()
-    fields = line.rsplit(maxsplit=3)
-    if len(fields) != 4:
-        raise InputError(
-            f"{lines.place} is {shortened(line)!r}, required a word, its frames and the number of its shapes"
-        )
-    first, last, count = (int(parse_cue_time(field, lines.place)) for field in fields[1:])
-    return fields[0], first, last, count
+                shapes.append((parse_cue_time(frame, lines.place) / fps, name, lines.place))
+            shapes.append(((last + 1) / fps, "", ""))
+    chart = choose_chart(name for _, name, _ in shapes if name)
+    rows = [(start_s, parse_shape(name, chart, place) if name else REST) for start_s, name, place in shapes]
+    lasting = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=False) if row[0] < after[0]]
+    return build_cue_sheet(lasting, frames / fps, float(fps), Timeline(tuple(words)))

@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Iterable
 from html import escape
 from itertools import pairwise
 from typing import Any
@@ -64,8 +63,8 @@ def parse_tsv(text: str) -> CueSheet:
         cues = [(place, [",".join(fields[:-1]), fields[-1]]) for place, fields in cues]
     chart = choose_chart((fields[-1] for _, fields in cues), LETTERS)
     rows = [(parse_cue_time(fields[0], place), parse_shape(fields[-1], chart, place)) for place, fields in cues]
-    ends_s = [parse_cue_time(fields[-2], place) for place, fields in cues[-1:]]
-    return build_cue_sheet(rows, max(ends_s, default=0.0), CUES_FPS)
+    end_s = parse_cue_time(cues[-1][1][-2], cues[-1][0]) if cues else 0.0
+    return build_cue_sheet(rows, end_s, CUES_FPS)
 
 
 def xml_text(sheet: CueSheet, sound_file: str) -> str:
@@ -85,7 +84,11 @@ def xml_text(sheet: CueSheet, sound_file: str) -> str:
 
 def parse_xml(text: str) -> CueSheet:
     """Return the cues of an ``.xml``. Raises InputError: there is none, or one is none, with its number."""
-    return _of_cues(found.groups() for found in _CUE.finditer(text))
+    rows, end_s = [], 0.0
+    for number, (start, end, letter) in enumerate(_CUE.findall(text), 1):
+        rows.append((parse_cue_time(start, f"cue {number}"), parse_shape(letter, LETTERS, f"cue {number}")))
+        end_s = parse_cue_time(end, f"cue {number}")
+    return build_cue_sheet(rows, end_s, CUES_FPS)
 
 
 def json_text(sheet: CueSheet, sound_file: str) -> str:
@@ -107,25 +110,14 @@ def parse_json(text: str) -> CueSheet:
         cues = document if isinstance(document, list) else next(document[name] for name in LISTS if name in document)
     except (ValueError, RecursionError, StopIteration, TypeError) as error:
         raise InputError(f"not a file of Rhubarb ({error or 'no mouthCues'}); export it again") from error
-    found: list[tuple[str, str, str, str]] = []
+    items: list[tuple[str, str, str, str]] = []
     for number, cue in enumerate(cues if isinstance(cues, list) else [], 1):
         fields = cue if isinstance(cue, dict) else {}
         start, shape = (next((str(fields[n]) for n in names if n in fields), "None") for names in (STARTS, NAMES))
-        found.append((f"cue {number}", start, str(fields.get("end", start)), shape))
-    chart = choose_chart((shape for *_, shape in found), LETTERS)
-    rows = [(parse_cue_time(start, place), parse_shape(shape, chart, place)) for place, start, _, shape in found]
-    return build_cue_sheet(
-        rows, max((parse_cue_time(end, place) for place, _, end, _ in found[-1:]), default=0.0), CUES_FPS
-    )
-
-
-def _of_cues(cues: Iterable[Iterable[str]]) -> CueSheet:
-    """Return cues of their starts, ends and letters."""
-    rows, end_s = [], 0.0
-    for number, (start, end, letter) in enumerate(cues, 1):
-        place = f"cue {number}"
-        rows.append((parse_cue_time(start, place), parse_shape(letter, LETTERS, place)))
-        end_s = parse_cue_time(end, place)
+        items.append((f"cue {number}", start, str(fields.get("end", start)), shape))
+    chart = choose_chart((shape for *_, shape in items), LETTERS)
+    rows = [(parse_cue_time(start, place), parse_shape(shape, chart, place)) for place, start, _, shape in items]
+    end_s = parse_cue_time(items[-1][2], items[-1][0]) if items else 0.0
     return build_cue_sheet(rows, end_s, CUES_FPS)
 
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Audio, to_sixteen_bits
 
 SOUND_CODECS: dict[str, tuple[str, str, int | None]] = {
@@ -30,7 +30,7 @@ def write_sound(path: Path, audio: Audio) -> None:
         raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(SOUND_CODECS)}")
     if not len(audio.samples):
         raise ExportError(f"{path}: the sound has no samples")
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         import av
 
         container_name, codec, rate_hz = SOUND_CODECS[path.suffix.lower()]

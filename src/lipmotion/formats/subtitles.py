@@ -11,9 +11,9 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import LINES, LabelTier, TimedLabel, check_count
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.values import parse_clock
 from lipmotion.units import group_words, is_silent
@@ -59,13 +59,13 @@ LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]"
 LYRICS_LINE = re.compile(rf"((?:\[{TIME}\]\s{{0,4}}){{1,100}}).*")
 PHONES = ".phones"
 """A file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words."""
-_ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+_ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 
 def is_subtitles(text: str) -> bool:
     """Return whether a text is a file of subtitles or lyrics, or Whisper's table of lines."""
-    found = (form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
-    return text.startswith(("WEBVTT", HEADER)) or any(found)
+    matches = (form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
+    return text.startswith(("WEBVTT", HEADER)) or any(matches)
 
 
 def subtitle_tier(text: str, where: str) -> LabelTier:
@@ -73,12 +73,11 @@ def subtitle_tier(text: str, where: str) -> LabelTier:
 
     Left out are notes and styles, the repetitions of captions that scroll, and what stands before the first cue.
     Numbers of cues may be missing, and blank lines too.
-    where : the file's name, for messages
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words.
     """
-    read = _rows if text.startswith(HEADER) else _lyrics if LYRICS.search(text) else _cues
-    cues = list((_dialogue if read is _cues and SUBSTATION.search(text) else read)(text, where))
-    labels = (replace(cue, parts=_words(cue)) for cue in _without_repetitions(cues))
+    read = _read_table if text.startswith(HEADER) else _read_lyrics if LYRICS.search(text) else _read_cues
+    cues = list((_read_dialogue if read is _read_cues and SUBSTATION.search(text) else read)(text, where))
+    labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(cues))
     return LabelTier("subtitles", tuple(labels), LINES)
 
 
@@ -89,11 +88,11 @@ def subtitle_words(text: str) -> str:
     return "\n".join(extract_spoken_text(WORD_TIME.sub("", line), names) for line in lines)
 
 
-def _lyrics(text: str, where: str) -> Iterator[TimedLabel]:
+def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
     """Yield the lines of lyrics in order, each to the next; several times before a line repeat it."""
     cues: list[TimedLabel] = []
-    found = re.search(r"\[offset:\s?([+-]?\d{1,7})\s?\]", text)
-    early_s = int(found[1]) / 1000 if found else 0.0
+    offset = re.search(r"\[offset:\s?([+-]?\d{1,7})\s?\]", text)
+    early_s = int(offset[1]) / 1000 if offset else 0.0
     for number, row in enumerate(StringIO(text), 1):
         line = row.strip()
         timed = LYRICS_LINE.fullmatch(line)
@@ -110,27 +109,27 @@ def _lyrics(text: str, where: str) -> Iterator[TimedLabel]:
         yield replace(cue, end_s=end_s)
 
 
-def _cues(text: str, where: str) -> Iterator[TimedLabel]:
+def _read_cues(text: str, where: str) -> Iterator[TimedLabel]:
     cue, lines, count = None, list[str](), 0
     for number, row in enumerate(StringIO(text), 1):
         line = row.rstrip("\r\n")
         times = (TIMES.fullmatch(line) or SBV.fullmatch(line)) if ":" in line else None
         if times is None and (CUE.match(line) or NO_ARROW.match(line)):
             wanted = "00:00:01,000 --> 00:00:02,500"
-            raise InputError(f"{where}: line {number} is {shortened(line.strip())!r}; required times as in {wanted}")
+            raise InputError(f"{where}: line {number} is {shorten(line.strip())!r}; required times as in {wanted}")
         if times is None:
             lines.append(line)
             continue
         if cue is not None:
-            yield replace(cue, text=_shown(lines))
+            yield replace(cue, text=_join_shown(lines))
         count += 1
         check_count(count, where)
         cue, lines = TimedLabel(parse_clock(times[1]), parse_clock(times[2]), "", f"line {number}"), []
     if cue is not None:
-        yield replace(cue, text=_shown([*lines, "", ""]))
+        yield replace(cue, text=_join_shown([*lines, "", ""]))
 
 
-def _shown(lines: list[str]) -> str:
+def _join_shown(lines: list[str]) -> str:
     """Return the lines that a cue shows, of all up to the times of the next one: without that one's name, and notes."""
     blank = [number for number, line in enumerate(lines) if not line]
     if lines and (lines[-1].strip().isdecimal() or (blank and blank[-1] == len(lines) - 2)):
@@ -144,38 +143,40 @@ def _shown(lines: list[str]) -> str:
     return "\n".join(shown)
 
 
-def _rows(text: str, where: str) -> Iterator[TimedLabel]:
+def _read_table(text: str, where: str) -> Iterator[TimedLabel]:
     """Yield the rows of Whisper's table as cues."""
     for number, row in enumerate(StringIO(text), 1):
         line = row.rstrip("\r\n")
         if number == 1 or not line.strip():
             continue
         check_count(number, where)
-        found = ROW.fullmatch(line)
-        if found is None:
-            raise InputError(f"{where}: line {number} is {shortened(line)!r}; required: start, end and text, with tabs")
-        yield TimedLabel(int(found[1]) / 1000, int(found[2]) / 1000, found[3], f"line {number}")
+        match = ROW.fullmatch(line)
+        if match is None:
+            raise InputError(f"{where}: line {number} is {shorten(line)!r}; required: start, end and text, with tabs")
+        yield TimedLabel(int(match[1]) / 1000, int(match[2]) / 1000, match[3], f"line {number}")
 
 
-def _without_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
+def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
     """Return cues without the lines that captions that scroll repeat."""
-    plain = [tuple(" ".join(WORD_TIME.sub("", line).split()) for line in cue.text.split("\n")) for cue in cues]
-    plain = [tuple(extract_spoken_text(line).strip() for line in lines) for lines in plain]
+    plain = [
+        tuple(extract_spoken_text(" ".join(WORD_TIME.sub("", line).split())).strip() for line in cue.text.split("\n"))
+        for cue in cues
+    ]
     bridges = sum(
         cue.end_s - cue.start_s < BRIDGE_S and shown[-len(lines) :] == lines
         for cue, lines, shown in zip(cues[1:], plain[1:], plain, strict=False)
     )
     if bridges < BRIDGES_SHARE * len(cues) or bridges < 2:
         return cues
-    kept = cues[:1]
+    shortened_cues = cues[:1]
     for before, cue, shown, lines in zip(cues, cues[1:], plain, plain[1:], strict=False):
-        most = min(len(lines), len(shown)) if cue.start_s <= before.end_s + NEAR_S else 0
-        repeated = next((n for n in range(most, 0, -1) if shown[-n:] == lines[:n]), 0)
-        kept.append(replace(cue, text="\n".join(cue.text.split("\n")[repeated:])))
-    return kept
+        longest = min(len(lines), len(shown)) if cue.start_s <= before.end_s + NEAR_S else 0
+        repeated = next((n for n in range(longest, 0, -1) if shown[-n:] == lines[:n]), 0)
+        shortened_cues.append(replace(cue, text="\n".join(cue.text.split("\n")[repeated:])))
+    return shortened_cues
 
 
-def _words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
+def _split_words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
     """Return the words of a cue with times, where these stand between them."""
     text = cue.text
     marks = list(WORD_TIME.finditer(text))
@@ -190,14 +191,8 @@ def _words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
     )
 
 
-def _dialogue(text: str, where: str) -> Iterator[TimedLabel]:
-    """Yield the dialogue of SubStation Alpha, without drawings; comments, styles and what else it holds are left out.
-
-    The tags of styles (``{\\an8}``, ``{\\i1}``) are left out too. The text is the last field, and may hold commas.
-    where : the file's name, for messages
-    Raises InputError: a line of dialogue with too few fields, times that are none, or an end before the start, with its
-    line; too many lines.
-    """
+def _read_dialogue(text: str, where: str) -> Iterator[TimedLabel]:
+    """Yield the dialogue of SubStation Alpha, without drawings and tags of styles (``{\\an8}``, ``{\\i1}``)."""
     fields, in_events = DEFAULT_FIELDS, True
     for number, row in enumerate(StringIO(text), 1):
         line = row.strip()
@@ -213,7 +208,7 @@ def _dialogue(text: str, where: str) -> Iterator[TimedLabel]:
             start, end = (re.fullmatch(TIME, by_name.get(edge, "").strip()) for edge in ("start", "end"))
             if start is None or end is None or len(values) < len(fields):
                 wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
-                raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
+                raise InputError(f"{where}: line {number} is {shorten(line)!r}; required a line as {wanted}")
             shown, drawing = "", False
             for place, part in enumerate(STYLES.split(by_name.get("text", values[-1]))):
                 modes = DRAWING_MODE.findall(part) if place % 2 else []  # of a tag
@@ -246,21 +241,15 @@ def write_subrip(path: Path, units: Timeline[Unit]) -> None:
 
     After a failure there is no partial file. Raises ExportError: the file cannot be written.
     """
-    lines: list[str] = []
-    for number, (start_s, end_s, text) in enumerate(list_shown_labels(path, units), 1):
-        lines += [f"{number}", f"{clock(start_s, ',')} --> {clock(end_s, ',')}", text, ""]
-    with whole_file(path) as temporary:
-        temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
+    cues = enumerate(list_shown_labels(path, units), 1)
+    lines = [f"{number}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for number, (a, b, text) in cues]
+    with atomic_file(path) as temporary:
+        temporary.write_text("".join(lines), encoding="utf-8", newline="\n")
 
 
 def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
-    """Write the words in time, or the phones where the name ends with ``.phones.vtt``, one a cue; silence has none.
-
-    After a failure there is no partial file. Raises ExportError: the file cannot be written.
-    """
-    lines = ["WEBVTT", ""]
-    for start_s, end_s, text in list_shown_labels(path, units):
-        shown = "".join(_ESCAPES.get(letter, letter) for letter in text)
-        lines += [f"{clock(start_s, '.')} --> {clock(end_s, '.')}", shown, ""]
-    with whole_file(path) as temporary:
-        temporary.write_text("\n".join(lines), encoding="utf-8", newline="\n")
+    """Write the same as WebVTT; phones where the name ends with ``.phones.vtt``."""
+    cues = list_shown_labels(path, units)
+    lines = [f"{clock(a, '.')} --> {clock(b, '.')}\n{text.translate(_ESCAPES)}\n" for a, b, text in cues]
+    with atomic_file(path) as temporary:
+        temporary.write_text("\n".join(["WEBVTT\n", *lines]), encoding="utf-8", newline="\n")

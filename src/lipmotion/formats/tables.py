@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat, format_rows
 from lipmotion.meshes.files.steady_rate import (
     TIME_COLUMN,
@@ -34,7 +34,7 @@ from lipmotion.meshes.files.steady_rate import (
     times_to_seconds,
 )
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, is_known
-from lipmotion.storage.text_table import LONGEST_LINE, TextTable, numbers_in, open_table
+from lipmotion.storage.text_table import LONGEST_LINE, numbers_in, open_table
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -76,7 +76,7 @@ APP_RATE = 60
 DAY_S = 86_400.0
 MISREAD_ROWS = 10
 """More rows a second apart are frames, of which a spreadsheet made seconds."""
-MOST_CURVES = 2000
+MAX_CURVES = 2000
 _TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(?:[.,]\d{1,9})?))?", re.ASCII)
 
 
@@ -84,7 +84,7 @@ def check_table(motion: Motion) -> None:
     """Raise ExportError if a channel's name would break the header."""
     for name in motion.names:
         if set(name) & set(',;"') or not name.isprintable():
-            raise ExportError(f"the channel name {shortened(name)!r} does not fit in a table; write .json or .npz")
+            raise ExportError(f"the channel name {shorten(name)!r} does not fit in a table; write .json or .npz")
     if len(",".join([TIME, *motion.names])) >= LONGEST_LINE:
         raise ExportError(f"the channel names do not fit in a line of {LONGEST_LINE} letters; write .json or .npz")
 
@@ -108,24 +108,19 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """
     try:
         with open_table(path) as table:
-            if table.names[0] == TIME and len(table.names) > 1:
-                return _even_table(table), Timeline(())
+            if table.names[0] != TIME or len(table.names) < 2:
+                return read_curve_motion(path)
+            columns, numbers = len(table.names), array("d")
+            for line, fields in table.rows:
+                if len(fields) != columns:
+                    raise ValueError(f"line {line} has {len(fields)} fields, required {columns} numbers in each")
+                numbers.extend(numbers_in(fields, line))
+            values = np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
+            channels = tuple(Channel(name, WEIGHT if arkit_name(name) else EYE_DISTANCE) for name in table.names[1:])
     except ValueError as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
-    return read_curve_motion(path)
-
-
-def _even_table(table: TextTable) -> Motion:
-    """Return the motion of a table of ``write_table``. Raises ValueError: a field is no number, or rows are uneven."""
-    columns, numbers = len(table.names), array("d")
-    for line, fields in table.rows:
-        if len(fields) != columns:
-            raise ValueError(f"line {line} has {len(fields)} fields, required {columns} numbers in each")
-        numbers.extend(numbers_in(fields, line))
-    values = np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
-    channels = (Channel(name, WEIGHT if arkit_name(name) else EYE_DISTANCE) for name in table.names[1:])
     time_s = values[:, 0]
     if len(time_s) < 2:
         raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
@@ -134,7 +129,7 @@ def _even_table(table: TextTable) -> Motion:
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")
-    return Motion(values[:, 1:], exact_rate(round(float(1 / step_s), 6)), tuple(channels))
+    return Motion(values[:, 1:], exact_rate(round(float(1 / step_s), 6)), channels), Timeline(())
 
 
 def timecode(time_s: float) -> str:
@@ -217,15 +212,17 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
             keys = list(map(column_key, names))
             timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
             used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
-            if timed is None or not 0 < len(used) <= MOST_CURVES:
+            if timed is None or not 0 < len(used) <= MAX_CURVES:
                 raise ValueError(
-                    f"the first line is {shortened(','.join(names))!r}, required 'time_s,opening,...', or curves "
+                    f"the first line is {shorten(','.join(names))!r}, required 'time_s,opening,...', or curves "
                     "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
                 )
-            times, names, values = _rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
+            times, names, values = _read_rows(
+                table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None
+            )
             coded = bool(re.search("[:;]", times[0][1]))
             if coded:
-                time_s = _seconds([_timecode(text, line) for line, text in times])
+                time_s = _codes_to_seconds([_parse_timecode(text, line) for line, text in times])
             else:
                 time_s = times_to_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
             return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
@@ -235,7 +232,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
 
 
-def _rows(
+def _read_rows(
     rows: Iterator[tuple[int, list[str]]], names: list[str], timed: int, used: list[int], counted: int | None
 ) -> tuple[list[tuple[int, str]], list[str], Array]:
     """Return the lines and times of the rows, and names and values of curves [shape=(N, P)]: NaN without a face."""
@@ -247,12 +244,14 @@ def _rows(
         while len(fields) > columns and not fields[-1].strip():
             fields.pop()
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
-        found = [fields[column] for column in used if column < len(fields)]
-        if not any(map(str.strip, found)) or (counted is not None and fields[counted : counted + 1] in (["0"], [" 0"])):
+        curves = [fields[column] for column in used if column < len(fields)]
+        if not any(map(str.strip, curves)) or (
+            counted is not None and fields[counted : counted + 1] in (["0"], [" 0"])
+        ):
             continue
         if len(fields) != columns:
-            curves = len(fields) - columns + len(used)
-            raise ValueError(f"line {line} has {curves} curves, required {len(used)}; delete it if it is the last")
+            count = len(fields) - columns + len(used)
+            raise ValueError(f"line {line} has {count} curves, required {len(used)}; delete it if it is the last")
         if not faces:
             texts = [column for column in used if _is_text(fields[column], names[column])]
             used = [column for column in used if column not in texts]
@@ -260,13 +259,13 @@ def _rows(
                 raise ValueError(f"line {line} has no numbers beside the time")
             of_names = [c for c in texts if is_known(fields[c].strip()) or fields[c].strip() == "_neutral"]
             if of_names:
-                return _of_single_scores(chain([(line, fields)], rows), names, timed, of_names[0], used)
+                return _read_single_scores(chain([(line, fields)], rows), names, timed, of_names[0], used)
             if texts:
-                named = ", ".join(shortened(names[column]) for column in texts)
+                named = ", ".join(shorten(names[column]) for column in texts)
                 LOG.warning("%d columns hold text, not numbers, and are left out: %s", len(texts), named)
-                found = [fields[column] for column in used]
+                curves = [fields[column] for column in used]
         faces.append(len(times) - 1)
-        numbers.extend(numbers_in(found, line))
+        numbers.extend(numbers_in(curves, line))
     if not times:
         raise ValueError("there are no rows")
     values = np.full((len(times), len(used)), np.nan)
@@ -283,10 +282,10 @@ def _is_text(field: str, name: str) -> bool:
     return False
 
 
-def _of_single_scores(
+def _read_single_scores(
     rows: chain[tuple[int, list[str]]], names: list[str], timed: int, named: int, used: list[int]
 ) -> tuple[list[tuple[int, str]], list[str], Array]:
-    """Return what ``_rows`` does of a table with one blendshape a row: its name in one column, its score in another."""
+    """Return what ``_read_rows`` does of a table with one blendshape a row: its name, its score in another column."""
     score = next((column for column in used if names[column].strip().lower() in SCORES), used[-1])
     frames: dict[str, dict[str, float]] = {}
     lines: dict[str, int] = {}
@@ -300,68 +299,67 @@ def _of_single_scores(
     return [(line, time) for time, line in lines.items()], known, values
 
 
-def _timecode(text: str, line: int) -> Timecode:
-    found = _TIMECODE.fullmatch(text)
-    if found is None or int(found[2]) > 59 or int(found[3]) > 59:
+def _parse_timecode(text: str, line: int) -> Timecode:
+    code = _TIMECODE.fullmatch(text)
+    if code is None or int(code[2]) > 59 or int(code[3]) > 59:
         raise ValueError(
-            f"line {line} begins with {shortened(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
+            f"line {line} begins with {shorten(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
             "shorten it: take the file as it was recorded"
         )
-    seconds = (int(found[1]) * 60 + int(found[2])) * 60 + int(found[3])
-    if found[4] is None:
+    seconds = (int(code[1]) * 60 + int(code[2])) * 60 + int(code[3])
+    if code[4] is None:
         return Timecode(seconds, 0.0, "")
-    if found[4] in ".,":
-        return Timecode(seconds, float("0." + re.sub("[.,]", "", found[5])), ".")
-    return Timecode(seconds, float(found[5].replace(",", ".")), found[4])
+    if code[4] in ".,":
+        return Timecode(seconds, float("0." + re.sub("[.,]", "", code[5])), ".")
+    return Timecode(seconds, float(code[5].replace(",", ".")), code[4])
 
 
-def _seconds(codes: list[Timecode]) -> Array:
+def _codes_to_seconds(codes: list[Timecode]) -> Array:
     """Return timecodes as seconds since the midnight before the first [shape=(N,)]."""
-    whole = np.array([code.seconds for code in codes], float)
+    seconds = np.array([code.seconds for code in codes], float)
     frames = np.array([code.frames for code in codes])
     day_s, mark = DAY_S, codes[0].mark
     if mark == "." and len(codes) > MISREAD_ROWS and (frames == frames[0]).all():
         mark = ""
-    if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(whole)) == 1:
+    if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(seconds)) == 1:
         LOG.warning("rows are a second apart: the last field of the timecodes is taken for frames (MM:SS:FF)")
-        whole, frames, mark = whole // 60, whole % 60, ":"
+        seconds, frames, mark = seconds // 60, seconds % 60, ":"
     if not mark:
-        starts = np.flatnonzero(np.diff(whole)) + 1
+        starts = np.flatnonzero(np.diff(seconds)) + 1
         if len(starts) < 2:
             raise ValueError(
                 "the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet has shortened them"
             )
-        rate = (starts[-1] - starts[0]) / ((whole[starts[-1]] - whole[starts[0]]) % DAY_S)
-        LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(whole), rate)
-        return np.asarray(np.arange(len(whole)) / rate)
+        rate = (starts[-1] - starts[0]) / ((seconds[starts[-1]] - seconds[starts[0]]) % DAY_S)
+        LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(seconds), rate)
+        return np.asarray(np.arange(len(seconds)) / rate)
     if mark == ".":
-        time_s = whole + frames
+        time_s = seconds + frames
     else:
-        passed = np.flatnonzero(np.diff(whole) == 1)
-        most = int(frames.max() if len(passed) > 1 else frames[passed].max() if len(passed) else frames.max())
-        if most >= TIMECODE_RATES[-1]:
-            raise InputError(f"a timecode has frame {most}, required less than {TIMECODE_RATES[-1]}")
-        shown = next(rate for rate in TIMECODE_RATES if rate > most)
+        passed = np.flatnonzero(np.diff(seconds) == 1)
+        last = int(frames[passed].max() if len(passed) == 1 else frames.max())
+        if last >= TIMECODE_RATES[-1]:
+            raise InputError(f"a timecode has frame {last}, required less than {TIMECODE_RATES[-1]}")
+        shown = next(rate for rate in TIMECODE_RATES if rate > last)
         rate = shown if len(passed) else max(shown, APP_RATE)
-        time_s = whole + frames / rate
-        if mark == ";" or _drops_frames(whole, frames, rate):
-            time_s, day_s = _dropped_s(whole, frames, rate), float(_dropped_s(np.array(DAY_S), np.array(0.0), rate))
+        time_s = seconds + frames / rate
+        # every full minute but each tenth follows the last frame of a second with frame 2 (4 of 60)
+        first = np.flatnonzero((np.diff(seconds) == 1) & (seconds[1:] % 60 == 0) & (seconds[1:] % 600 != 0)) + 1
+        jumps = (frames[first - 1] >= rate - 1) & (np.floor(frames[first]) == rate // 15)
+        if mark == ";" or (rate in {30, 60} and len(first) and jumps.all()):
+            time_s, day_s = (
+                _drop_frames(seconds, frames, rate),
+                float(_drop_frames(np.array(DAY_S), np.array(0.0), rate)),
+            )
     over = np.concatenate([[0.0], np.cumsum(np.diff(time_s) < -DAY_S / 2)])
     return time_s + day_s * over
 
 
-def _dropped_s(whole: Array, frames: Array, rate: int) -> Array:
+def _drop_frames(seconds: Array, frames: Array, rate: int) -> Array:
     """Return drop-frame timecodes in seconds: every minute but each tenth leaves out numbers 0 and 1 (SMPTE 12M)."""
-    minutes = np.floor(whole / 60)
+    minutes = np.floor(seconds / 60)
     dropped = rate / 15 * (minutes - np.floor(minutes / 10))
-    return (whole * rate + frames - dropped) * 1001 / (1000 * rate)
-
-
-def _drops_frames(whole: Array, frames: Array, rate: int) -> bool:
-    """Return whether every full minute but each tenth follows the last frame of a second with frame 2 (4 of 60)."""
-    first = np.flatnonzero((np.diff(whole) == 1) & (whole[1:] % 60 == 0) & (whole[1:] % 600 != 0)) + 1
-    jumps = (frames[first - 1] >= rate - 1) & (np.floor(frames[first]) == rate // 15)
-    return rate in {30, 60} and bool(len(first)) and bool(jumps.all())
+    return (seconds * rate + frames - dropped) * 1001 / (1000 * rate)
 
 
 TABLE = MotionFormat(write_table, read_table_motion, check_table)

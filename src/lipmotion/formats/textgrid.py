@@ -9,9 +9,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import LabelTier, TimedLabel, check_count, find_tier, require_time
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.units import RECOGNISED, group_words, list_recognised_phones
 
@@ -35,11 +35,7 @@ def is_textgrid(text: str) -> bool:
 
 
 def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
-    """Return the interval tiers of a TextGrid; point tiers are ignored.
-
-    where : the file's name, for messages
-    Raises InputError: not a whole TextGrid.
-    """
+    """Return the interval tiers of a TextGrid; point tiers are ignored. Raises InputError: not a whole TextGrid."""
     tokens = _tokens(text)
     tiers: list[LabelTier] = []
     total = 0
@@ -53,13 +49,13 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
         for number in range(1, tier_count + 1):
             place = f"tier {number}"
             kind, name = _take(tokens, "text"), _take(tokens, "text")
-            place = f"tier {shortened(name)!r}"
+            place = f"tier {shorten(name)!r}"
             _take(tokens, "number"), _take(tokens, "number")
             count = _count(tokens)
             total += count
             check_count(total, where)
             if count and kind not in (INTERVALS, POINTS):
-                raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
+                raise _DamagedError(f"its kind is {shorten(kind)!r}, required {INTERVALS} or {POINTS}")
             labels = []
             for position in (f"{place}, interval {i + 1}" for i in range(count)):
                 start_s = require_time(_take(tokens, "number"), position, where)
@@ -80,9 +76,8 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
     while match := TOKEN.search(text, at):
         at = match.end()
         if match.lastgroup == "text":
-            while (
-                text[at : at + 1] == '"' and (closing := text.find('"', at + 1)) > 0
-            ):  # written twice: one in the text
+            # a quote that is written twice is one in the text
+            while text[at : at + 1] == '"' and (closing := text.find('"', at + 1)) > 0:
                 at = closing + 1
             yield "text", text[match.start() + 1 : at - 1]
         elif match.lastgroup:
@@ -107,12 +102,10 @@ def _take(tokens: Iterator[tuple[str, str]], wanted: str) -> str:
 def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     """Write phones in time to a TextGrid in long text form, with the tiers ``phones`` and ``words``.
 
-    units : the phones; where a label has no phone, the name of its unit is written
-    Words are those of ``units.group_words``. If phones were recognised, a third tier, ``recognised``, holds these
-    with their confidence (``p 0.37``), so that a reader can tell them from corrected ones (``units.recognised``).
-    Times are as exact as floats are. After a failure there is no partial file.
+    Where a label has no phone, the name of its unit is written. Words are those of ``units.group_words``. Recognised
+    phones are in a third tier, ``recognised``, with their confidence (``p 0.37``), so that a reader can tell them from
+    corrected ones. Times are as exact as floats are. After a failure there is no partial file.
     Raises ExportError: the file cannot be written.
-    Source: Praat manual, "TextGrid file formats".
     """
     phones = [(float(span.start_s), float(span.end_s), span.label.phone or span.label.unit) for span in units]
     words = [(float(span.start_s), float(span.end_s), span.label) for span in group_words(units)]
@@ -126,24 +119,18 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
     lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
     for number, (name, intervals) in enumerate(tiers, 1):
-        whole = _filled(intervals, end_s)
+        filled: list[Interval] = []  # what is a gap has no text: Praat requires intervals that follow each other
+        reached_s = 0.0
+        for start_s, stop_s, text in [*intervals, (end_s, end_s, "")]:
+            filled += [(reached_s, start_s, "")] if start_s > reached_s else []
+            filled.append((max(reached_s, start_s), stop_s, text))
+            reached_s = stop_s
+        filled.pop()
         lines += [f"    item [{number}]:", '        class = "IntervalTier"', f'        name = "{name}"']
-        lines += ["        xmin = 0", f"        xmax = {end_s}", f"        intervals: size = {len(whole)}"]
-        for place, (start_s, stop_s, text) in enumerate(whole, 1):
+        lines += ["        xmin = 0", f"        xmax = {end_s}", f"        intervals: size = {len(filled)}"]
+        for place, (start_s, stop_s, text) in enumerate(filled, 1):
             quoted = text.replace('"', '""')
             lines += [f"        intervals [{place}]:", f"            xmin = {start_s}", f"            xmax = {stop_s}"]
             lines.append(f'            text = "{quoted}"')
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _filled(intervals: list[Interval], duration_s: float) -> list[Interval]:
-    """Return intervals from 0 s to the end that follow each other; what was a gap has no text. Praat requires that."""
-    whole: list[Interval] = []
-    end_s = 0.0
-    for start_s, stop_s, text in intervals:
-        if start_s > end_s:
-            whole.append((end_s, start_s, ""))
-        whole.append((end_s if start_s < end_s else start_s, stop_s, text))
-        end_s = stop_s
-    return [*whole, (end_s, duration_s, "")] if end_s < duration_s else whole

@@ -9,7 +9,7 @@ passed over, and between keys of bones everything is linear.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -77,10 +77,10 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         if all(name in motion.names for name in sources):
             values = np.mean([motion[name] for name in sources], axis=0)
             stepped = bool({*sources} & {*generation.stepped})
-            kept = key_frames(time_s, values, TOLERANCE, stepped=stepped)
+            keys = key_frames(time_s, values, TOLERANCE, stepped=stepped)
             if stepped:  # between keys everything is linear
-                kept = sorted({*kept, *(frame - 1 for frame in kept if frame)})
-            morphs += [(frames[frame], morph, float(values[frame])) for frame in kept]
+                keys = sorted({*keys, *(frame - 1 for frame in keys if frame)})
+            morphs += [(frames[frame], morph, float(values[frame])) for frame in keys]
     curves = {name: motion[name].astype(np.float64) for name in (*ANGLES, *MOVED_BY["gaze"]) if name in motion.names}
     angles = {}
     if {*ANGLES} <= {*curves}:
@@ -89,18 +89,14 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
         angles[EYES] = np.pad(weights_to_gaze(still | curves), ((0, 0), (0, 1)))
     turns = {bone: (head_quaternions(turned) * MIRRORED).tolist() for bone, turned in angles.items()}
-    bones = [
-        (frame, bone, turn)
-        for frame, *each in zip(frames, *turns.values(), strict=True)
-        for bone, turn in zip(turns, each, strict=True)
-    ]
+    bones = [(frame, bone, turn[row]) for row, frame in enumerate(frames) for bone, turn in turns.items()]
     with path.open("wb") as file:
-        file.write(MARK.ljust(MARK_BYTES, b"\0") + _named("lipmotion", MODEL_BYTES) + COUNT.pack(len(bones)))
+        file.write(MARK.ljust(MARK_BYTES, b"\0") + _encode_name("lipmotion", MODEL_BYTES) + COUNT.pack(len(bones)))
         for frame, bone, turn in bones:
-            file.write(BONE_KEY.pack(_named(bone, 15), frame, 0, 0, 0, *turn, bytes(LINEAR)))
+            file.write(BONE_KEY.pack(_encode_name(bone, 15), frame, 0, 0, 0, *turn, bytes(LINEAR)))
         file.write(COUNT.pack(len(morphs)))
         for frame, morph, value in sorted(morphs, key=lambda key: key[0]):
-            file.write(MORPH_KEY.pack(_named(morph, 15), frame, value))
+            file.write(MORPH_KEY.pack(_encode_name(morph, 15), frame, value))
         file.write(4 * COUNT.pack(0))  # camera, lights, shadows, and what newer versions hold of inverse kinematics
 
 
@@ -110,8 +106,8 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     Weights are linear between keys, and constant before the first and after the last one. Raises InputError: no motion
     of MikuMikuDance, or none of its morphs is one of the mouth.
     """
-    morphs, bones, camera = _read_keys(path, lambda name: bool(_channels(name)) or name in {HEAD, EYES})
-    moved = {name for morph in morphs for name in _channels(morph)}
+    morphs, bones, camera = _read_keys(path, lambda name: bool(_find_channels(name)) or name in {HEAD, EYES})
+    moved = {name for morph in morphs for name in _find_channels(morph)}
     if not moved & {*VRM_VOWELS, *ARKIT_MOUTH}:
         named = ", ".join([*morphs][:8]) or "none"
         raise InputError(
@@ -123,26 +119,25 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     curves: dict[str, tuple[np.ndarray, str]] = {}
     for morph, keys in sorted(morphs.items(), key=lambda each: each[0] not in MORPHS):
         at, values = zip(*keys, strict=True)
-        for name in _channels(morph):
+        for name in _find_channels(morph):
             curves.setdefault(name, (np.interp(frames, at, values), WEIGHT))
     if HEAD in bones:
-        curves |= {
-            name: (curve, RADIAN) for name, curve in zip(ANGLES, _turned(HEAD, bones[HEAD], frames).T, strict=True)
-        }
+        turned = _turn_bone(HEAD, bones[HEAD], frames)
+        curves |= {name: (curve, RADIAN) for name, curve in zip(ANGLES, turned.T, strict=True)}
     if EYES in bones:
-        looks = gaze_to_weights(_turned(EYES, bones[EYES], frames)[:, :2])
+        looks = gaze_to_weights(_turn_bone(EYES, bones[EYES], frames)[:, :2])
         curves |= {name: (curve, WEIGHT) for name, curve in looks.items()}
     table = np.stack([curve for curve, _ in curves.values()], axis=1)
     return Motion(table, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())
 
 
-def _channels(morph: str) -> tuple[str, ...]:
+def _find_channels(morph: str) -> tuple[str, ...]:
     """Return the channels that a morph moves: a standard one, or a vowel or blendshape by its name; none of others."""
     known = vowel_name(morph) or arkit_name(morph)
     return MORPHS.get(morph, (known,) if known else ())
 
 
-def _turned(bone: str, keys: Turns, frames: np.ndarray) -> np.ndarray:
+def _turn_bone(bone: str, keys: Turns, frames: np.ndarray) -> np.ndarray:
     """Return the angles of a bone at some frames [shape=(T, 3)]. Raises InputError: a rotation is none."""
     at, turns = zip(*keys, strict=True)
     if not all(map(any, turns)):
@@ -151,22 +146,17 @@ def _turned(bone: str, keys: Turns, frames: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(frames, at, column) for column in angles.T], axis=1)
 
 
-def _named(name: str, size: int) -> bytes:
+def _encode_name(name: str, size: int) -> bytes:
     """Return a name in Shift JIS in so many bytes, cut between letters."""
-    kept = name.encode(ENCODING, "replace")
-    while len(kept) > size:
+    while len(name.encode(ENCODING, "replace")) > size:
         name = name[:-1]
-        kept = name.encode(ENCODING, "replace")
-    return kept.ljust(size, b"\0")
+    return name.encode(ENCODING, "replace").ljust(size, b"\0")
 
 
 def _read_keys(path: Path, is_known: Callable[[str], bool]) -> tuple[Mapping[str, Keys], Mapping[str, Turns], int]:
     """Return the keys of morphs and bones by their names, in order, and the number of the camera's.
 
-    Of several keys of one frame, the last counts.
-
-    is_known : whether a name means something: that shows the encoding of all names
-    Raises InputError: not a VMD file, too large, cut short, or a value that is not finite.
+    Of several keys of one frame, the last counts. Names that mean something (``is_known``) show the encoding of all.
     """
     size = path.stat().st_size
     if size > LARGEST_FILE_BYTES:
@@ -180,35 +170,29 @@ def _read_keys(path: Path, is_known: Callable[[str], bool]) -> tuple[Mapping[str
     morphs: dict[bytes, dict[int, float]] = {}
     camera = 0
     try:
-        for name, frame, (_, _, _, x, y, z, w) in _keys(content, at, BONE_KEY):
+        for name, frame, (_, _, _, x, y, z, w) in _unpack_keys(content, at, BONE_KEY):
             bones.setdefault(name, {})[frame] = (x, y, z, w)
         at += COUNT.size + COUNT.unpack_from(content, at)[0] * BONE_KEY.size
-        for name, frame, (value,) in _keys(content, at, MORPH_KEY) if at < len(content) else ():
+        for name, frame, (value,) in _unpack_keys(content, at, MORPH_KEY) if at < len(content) else ():
             morphs.setdefault(name, {})[frame] = value
         if at < len(content):
             at += COUNT.size + COUNT.unpack_from(content, at)[0] * MORPH_KEY.size
             camera = COUNT.unpack_from(content, at)[0] if at + COUNT.size <= len(content) else 0
     except struct.error as error:
         raise InputError("the motion of MikuMikuDance is cut short; save it again") from error
-    encoding = max(ENCODINGS, key=lambda each: _understood((*morphs, *bones), each, is_known))
-    return (
-        {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in morphs.items()},
-        {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in bones.items()},
-        camera,
-    )
+
+    def judge(encoding: str) -> tuple[int, int]:  # how many names it makes known, and minus the letters it cannot read
+        texts = [name.decode(encoding, "replace") for name in (*morphs, *bones)]
+        return sum(map(is_known, texts)), -sum(text.count("\ufffd") for text in texts)
+
+    encoding = max(ENCODINGS, key=judge)
+    named_morphs = {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in morphs.items()}
+    named_bones = {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in bones.items()}
+    return named_morphs, named_bones, camera
 
 
-def _understood(names: Iterable[bytes], encoding: str, is_known: Callable[[str], bool]) -> tuple[int, int]:
-    """Return how many names an encoding makes known ones, and minus how many letters it cannot read."""
-    texts = [name.decode(encoding, "replace") for name in names]
-    return sum(map(is_known, texts)), -sum(text.count("\ufffd") for text in texts)
-
-
-def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[bytes, int, list[float]]]:
-    """Yield the name of each key of a counted list, its frame and its numbers.
-
-    Raises struct.error: it is cut short. Raises InputError: a frame of another day, or a value that is not finite.
-    """
+def _unpack_keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[bytes, int, list[float]]]:
+    """Yield the name of each key of a counted list, its frame and its numbers. Raises struct.error: cut short."""
     (count,) = COUNT.unpack_from(content, at)
     if count * form.size > len(content) - at - COUNT.size:
         raise struct.error

@@ -8,7 +8,7 @@ from collections import defaultdict
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_tiers import LINES, OTHER, LabelTier, TimedLabel, check_count, find_tier
 from lipmotion.types.values import parse_clock
 
@@ -22,7 +22,6 @@ NEAR_S, DEEPEST = 0.01, 20
 def xml_tiers(text: str, where: str) -> list[LabelTier]:
     """Return the tiers of an ``.eaf``, or the lines of captions.
 
-    where : the file's name, for messages
     Raises InputError: damaged XML, or a time that is none.
     """
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text, re.IGNORECASE):
@@ -34,13 +33,13 @@ def xml_tiers(text: str, where: str) -> list[LabelTier]:
     check_count(sum(1 for _ in root.iter()) // 4, where)
     for element in root.iter():  # without namespaces
         element.tag = str(element.tag).rpartition("}")[2]
-    return _elan_tiers(root, where) if root.tag == "ANNOTATION_DOCUMENT" else [_caption_tier(root, where)]
+    return _read_elan(root, where) if root.tag == "ANNOTATION_DOCUMENT" else [_read_captions(root, where)]
 
 
-def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
+def _read_elan(root: Element, where: str) -> list[LabelTier]:
     """Return the tiers of ELAN; annotations that divide another without times are one label with its time."""
     slots_s = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
-    times_s = {name: _seconds(f"{value}ms", {}, where) if value else math.nan for name, value in slots_s.items()}
+    times_s = {name: _parse_seconds(f"{value}ms", {}, where) if value else math.nan for name, value in slots_s.items()}
     spans_s: dict[str | None, tuple[float, float]] = {}
     owners: dict[str | None, str | None] = {}
     for each in root.iter("ALIGNABLE_ANNOTATION"):
@@ -60,13 +59,13 @@ def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
         timed = [(spans_s.get(aligned, (math.nan, math.nan)), " ".join(parts)) for aligned, parts in texts.items()]
         rows = enumerate(sorted(timed, key=lambda row: (math.isnan(row[0][0]), row[0])), 1)
         labels = [TimedLabel(*span_s, text, f"tier {name!r}, annotation {number}") for number, (span_s, text) in rows]
-        found = find_tier(name, labels, tier.get("PARTICIPANT") or "")
-        role = found.role or (OTHER if tier.get("PARENT_REF") else LINES if found.speaker else "")
-        tiers.append(LabelTier(name, found.labels, role, found.speaker))
+        named = find_tier(name, labels, tier.get("PARTICIPANT") or "")
+        role = named.role or (OTHER if tier.get("PARENT_REF") else LINES if named.speaker else "")
+        tiers.append(LabelTier(name, named.labels, role, named.speaker))
     return tiers
 
 
-def _caption_tier(root: Element, where: str) -> LabelTier:
+def _read_captions(root: Element, where: str) -> LabelTier:
     """Return the lines of TTML or of YouTube's captions; spans with times are parts of them."""
     attributes = {name.rpartition("}")[2]: value for name, value in root.attrib.items()}
     multiplier = attributes.get("frameRateMultiplier", "1 1").replace(":", " ").split()
@@ -80,7 +79,7 @@ def _caption_tier(root: Element, where: str) -> LabelTier:
     labels: list[TimedLabel] = []
 
     def visit(element: Element, start_s: float, end_s: float) -> None:
-        start_s, end_s = _times(element, start_s, end_s, per_s, where)
+        start_s, end_s = _read_times(element, start_s, end_s, per_s, where)
         if element.tag not in ("p", "text"):
             for child in element:
                 visit(child, start_s, end_s)
@@ -92,7 +91,7 @@ def _caption_tier(root: Element, where: str) -> LabelTier:
             child.text = f"\n{child.text or ''}" if child.tag == "br" else child.text
             if child is element or not {"begin", "t"} & child.attrib.keys():
                 continue
-            text, times_s = "".join(child.itertext()), _times(child, start_s, end_s, per_s, where)
+            text, times_s = "".join(child.itertext()), _read_times(child, start_s, end_s, per_s, where)
             if glued and not text[:1].isspace():  # a syllable
                 text, times_s = parts[-1].text + text, (parts.pop().start_s, times_s[1])
             parts.append(TimedLabel(*times_s, text, place))
@@ -105,17 +104,17 @@ def _caption_tier(root: Element, where: str) -> LabelTier:
     return LabelTier("captions", tuple(labels), LINES)
 
 
-def _times(element: Element, start_s: float, end_s: float, per_s: dict[str, float], where: str) -> tuple[float, float]:
+def _read_times(
+    element: Element, start_s: float, end_s: float, per_s: dict[str, float], where: str
+) -> tuple[float, float]:
     """Return the start and the end of an element within those of its owner, to which its times are relative.
 
     Where they go beyond the owner's end, and would fit as times of the whole file, they are such.
     """
-    given = {name: element.get(name) for name in ("begin", "end", "dur", "start", "t", "d")}
-    ms = {name: f"{value}ms" for name, value in given.items() if name in ("t", "d") and value}
-    begin, end, duration = (
-        None if value is None else _seconds(value, per_s, where)
-        for value in (given["begin"] or given["start"] or ms.get("t"), given["end"], given["dur"] or ms.get("d"))
-    )
+    stated = {name: element.get(name) for name in ("begin", "end", "dur", "start", "t", "d")}
+    ms = {name: f"{stated[name]}ms" for name in ("t", "d") if stated[name]}
+    texts = (stated["begin"] or stated["start"] or ms.get("t"), stated["end"], stated["dur"] or ms.get("d"))
+    begin, end, duration = (None if text is None else _parse_seconds(text, per_s, where) for text in texts)
     from_s = start_s + (begin or 0.0)
     until_s = from_s + duration if duration is not None else start_s + end if end is not None else end_s
     absolute = begin is not None and end is not None and start_s <= begin + NEAR_S and end <= end_s + NEAR_S
@@ -124,11 +123,11 @@ def _times(element: Element, start_s: float, end_s: float, per_s: dict[str, floa
     return from_s, until_s
 
 
-def _seconds(value: str, per_s: dict[str, float], where: str) -> float:
+def _parse_seconds(value: str, per_s: dict[str, float], where: str) -> float:
     """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: it is none."""
     clock_s, offset = parse_clock(value, per_s.get("f", 0)), OFFSET_TIME.fullmatch(value.strip())
     if not math.isnan(clock_s):
         return clock_s
     if offset is None:
-        raise InputError(f"{where}: a time is {shortened(value)!r}, required as in 00:00:01.500, 1.5s or 36f")
+        raise InputError(f"{where}: a time is {shorten(value)!r}, required as in 00:00:01.500, 1.5s or 36f")
     return float(offset[1]) / {"h": 1 / 3600, "m": 1 / 60, "ms": 1000, **per_s}.get(offset[2] or "s", 1)

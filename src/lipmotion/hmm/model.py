@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from_arrays
-from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Configuration
 
 Neighbour = str | None
@@ -123,6 +123,10 @@ class UnitHmm:
     bigram: Bigram
     typical_fit: float = 0.0
 
+    def __repr__(self) -> str:
+        densities, components, features = self.mixtures.size
+        return f"UnitHmm({densities} densities of {components} components, {features} features)"
+
     def stay(self, unit: str, state: int) -> float:
         """Return log P(stay in this state)."""
         return float(self.log_stay[self.table.density(unit, state)])
@@ -160,14 +164,14 @@ def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
     """Deserialise models. Raises ModelFormatError: an array is missing, undeclared, inconsistent or out of range."""
     with format_errors("the phone models", "train or download the model again", verb="are"):
         refuse_undeclared(arrays, NAMES, MODELS)
-        named = checked_arrays(arrays, NAMES)
+        named = check_arrays(arrays, NAMES)
         units, counts, names, free = (tuple(named[key].tolist()) for key in ("units", "counts", "names", "free"))
         if not set(free) <= set(units) or len(set(units)) < len(units) or sum(counts) > len(names):
             raise ValueError(f"{len(names)} states of {len(units)} units, {len(free)} of them silent")
         required = make_plain_states(units, counts, free).names
         if names[: len(required)] != required or len(set(names)) < len(names):
             raise ValueError("the names of the states are not those of the units")
-        stored = checked_arrays(arrays, MODELS, **named.sizes, R=sum(counts))
+        stored = check_arrays(arrays, MODELS, **named.sizes, R=sum(counts))
         table = StateTable(units, counts, names, free)
         bigram = bigram_from_array(units, stored["bigram"])
         return UnitHmm(

@@ -43,7 +43,7 @@ LEAST_TOTAL = {SINGLE: 1e-20, DOUBLE: 1e-150}
 is less than what probabilities are raised to."""
 LEAST_POSTERIOR = 1e-20
 """Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
-LEAST_PROBABILITY = 1e-100
+MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
@@ -90,7 +90,7 @@ def factorial_posteriors(
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
-    if min(_least_probability(loop) for loop in (audio, visual)) >= LEAST_PROBABILITY:
+    if min(_least_probability(loop) for loop in (audio, visual)) >= MIN_PROBABILITY:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     found = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
     result = next((each for each in found if each is not None), None) or _zero_posteriors(audio, visual, logs)

@@ -1,4 +1,4 @@
-"""The figures of an evaluation as a text table."""
+"""The figures of an evaluation, and of a comparison, as text tables."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def figures_table(figures: Mapping[str, Any]) -> str:
     lines += [f"no figures with transcript: {silent} of {figures['clips']} clips have no words"] if silent else []
     lines += PINNED if any("unpinned" in condition for condition in figures["conditions"].values()) else []
     for name, condition in figures["conditions"].items():
-        rows = condition["channels"] | _eigenlips_row(condition)
+        means = condition.get("eigenlips")  # over all eigenlips
+        rows = condition["channels"] | ({f"{len(means['channels'])} eigenlips": means} if means else {})
         size = max(9, *map(len, rows))
         lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
         for channel, row in rows.items():
@@ -41,14 +42,7 @@ def figures_table(figures: Mapping[str, Any]) -> str:
     return "\n".join(map(printable, lines))
 
 
-def _eigenlips_row(condition: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the row of the means over all eigenlips; empty without eigenlips."""
-    means = condition.get("eigenlips")
-    return {f"{len(means['channels'])} eigenlips": means} if means else {}
-
-
 def _summary(condition: Mapping[str, Any]) -> list[str]:
-    """Return the lines of figures over all channels."""
     lines = [
         f"  mean ACC {condition['acc']:.3f}; AMSE {condition['amse']:.4f}; "
         f"lag of {condition['leading']} {condition['lag_ms']:+.1f} ms"
@@ -61,6 +55,12 @@ def _summary(condition: Mapping[str, Any]) -> list[str]:
         return lines
     low, high = condition["opening_acc_95"]
     quiet, original = condition["silence"]["generated"], condition["silence"]["original"]
+    without_pins = []
+    free = condition.get("unpinned")
+    if free is not None:
+        acc, (free_low, free_high) = figure_text(free["channels"]["opening"]["acc"], ".3f"), free["opening_acc_95"]
+        head = f"  without pins: ACC of opening {acc} ({free_low:.3f} to {free_high:.3f}), mean ACC {free['acc']:.3f}"
+        without_pins = [head, *(f"  {line}" for line in _closure_lines(free))]
     return [
         f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
         *lines[1:],
@@ -68,12 +68,11 @@ def _summary(condition: Mapping[str, Any]) -> list[str]:
         f"  silence: opening {figure_text(quiet['mean'], '.4f')} ± {figure_text(quiet['std'], '.4f')} "
         f"(original {figure_text(original['mean'], '.4f')} ± {figure_text(original['std'], '.4f')}, "
         f"{quiet['frames']} frames)",
-        *_unpinned(condition),
+        *without_pins,
     ]
 
 
 def _closure_lines(condition: Mapping[str, Any]) -> list[str]:
-    """Return the lines of closure figures."""
     phones = condition["closures_p_b_m"]
     return [
         closures_line(condition["closures"]),
@@ -92,18 +91,53 @@ def closures_line(closures: Mapping[str, Any]) -> str:
     )
 
 
-def _unpinned(condition: Mapping[str, Any]) -> list[str]:
-    """Return the lines of figures without pins; none where they were not computed."""
-    free = condition.get("unpinned")
-    if free is None:
-        return []
-    low, high = free["opening_acc_95"]
-    acc = figure_text(free["channels"]["opening"]["acc"], ".3f")
-    head = f"  without pins: ACC of opening {acc} ({low:.3f} to {high:.3f}), mean ACC {free['acc']:.3f}"
-    return [head, *(f"  {line}" for line in _closure_lines(free))]
-
-
 def figure_text(value: float | None, form: str) -> str:
     """Return a figure as text, formatted by ``form``; None is a dash of the same width."""
     width = form.partition(".")[0].strip("+")
     return f"{'–':>{width or 0}}" if value is None else format(value, form)
+
+
+COLUMNS = {
+    "acc": ("ACC", "7.3f"),
+    "rmse": ("RMSE", "9.4f"),
+    "nrmse": ("nRMSE", "7.3f"),
+    "lag_ms": ("lag ms", "8.1f"),
+    "variance": ("variance", "10.2f"),
+    "jerk": ("jerk", "7.2f"),
+    "modulation_db": ("modulation dB", "15.1f"),
+}
+"""Head and form of every column, by the name of the figure."""
+
+
+def comparison_table(figures: Mapping[str, Any]) -> str:
+    """Return the figures of ``lipmotion.compare`` as text."""
+    lines = [f"reference: {figures['reference']}"]
+    for pair in figures["others"]:
+        lines += ["", f"{pair['name']}: {pair['frames']} frames at {pair['rate_hz']:g} a second"]
+        lines += [f"  {note}" for note in pair["notes"]]
+        if pair["channels"]:
+            size = max(9, *map(len, pair["channels"]))
+            head = "".join(f"{name:>{int(form.partition('.')[0])}}" for name, form in COLUMNS.values())
+            lines.append(f"  {'channel':{size}}{head}")
+            for channel, row in pair["channels"].items():
+                cells = "".join(figure_text(row[name], form) for name, (_, form) in COLUMNS.items())
+                lines.append(f"  {channel:{size}}{cells}")
+            lines.append(f"  mean ACC {figure_text(pair['acc'], '.3f')}")
+        lines += [closures_line(pair["closures"])] if "closures" in pair else []
+        if "points" in pair:
+            lines.append(f"  points: {', '.join(_point_figures(pair['points']))}")
+        if "upper_face" in pair:
+            deviation = figure_text(pair["upper_face"]["deviation"], "+.4f")
+            lines.append(f"  upper face: deviation {deviation} over {pair['upper_face']['curves']} curves")
+    return "\n".join(map(printable, lines))
+
+
+def _point_figures(points: Mapping[str, Any]) -> list[str]:
+    parts = [f"landmark distance {figure_text(points['landmark_distance_mm'], '.2f')} mm over {points['points']}"]
+    if points["lip_points"]:
+        error = figure_text(points["lip_vertex_error_mm"], ".2f")
+        parts.insert(0, f"lip vertex error {error} mm over {points['lip_points']}")
+    if points["upper_points"]:
+        deviation = figure_text(points["upper_face_deviation_mm"], "+.2f")
+        parts.append(f"upper-face deviation {deviation} mm over {points['upper_points']}")
+    return parts

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.articulation import unseen_share
+from lipmotion.motion.encoding_regression import EncodingRegression
 from lipmotion.motion.network_steps import (
     STEP,
     ConvolutionalShape,
@@ -27,7 +28,7 @@ from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraini
 from lipmotion.motion.reliability import rate_clearness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Speech, sub_monitor
 
 Array = NDArray[np.float64]
@@ -44,6 +45,8 @@ trained on clean speech, the other one in noise and rooms."""
 SURE_POSTERIORS = (0.75, 0.9)
 """For an unknown voice it has no share at the first mean posterior, all of its share at the second one. A known voice
 has all of it in a clear recording, too."""
+ENCODING_SHARE = 0.5
+"""Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none."""
 
 TARGETS = {
     "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
@@ -60,6 +63,7 @@ class AcousticNetwork(Predictor):
     mean, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
     variances : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
     beside    : the network that knows posteriors (None: no phone recogniser was installed in training)
+    encoding  : the regression on the encoding of the sound, for other voices (None: a model of an earlier version)
     """
 
     network: ConvolutionalNetwork
@@ -67,9 +71,10 @@ class AcousticNetwork(Predictor):
     scale: Array
     variances: Array
     beside: PosteriorNetwork | None = None
+    encoding: EncodingRegression | None = None
     name: ClassVar[str] = "network"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS
-    CONTAINS: ClassVar[frozenset[str]] = frozenset({PosteriorNetwork.name})
+    CONTAINS: ClassVar[frozenset[str]] = frozenset({PosteriorNetwork.name, EncodingRegression.name})
 
     @classmethod
     def conditions(cls, motion_s: float, most: int) -> int:
@@ -96,7 +101,9 @@ class AcousticNetwork(Predictor):
         variances = measure_error_variances(training, predicted, scale)
         last = replace(training, monitor=sub_monitor(training.monitor, 0.8, 1))
         beside = PosteriorNetwork.trained(last) if have_posteriors(examples) else None
-        return PredictorFit(cls(network, mean, scale, variances, beside))
+        encoded = all(example.speech.encoding is not None for example in examples)
+        encoding: Any = EncodingRegression.fit(training).predictor if encoded else None
+        return PredictorFit(cls(network, mean, scale, variances, beside, encoding))
 
     def can_predict(self, speech: Speech) -> bool:
         """Return whether speech has a spectrum."""
@@ -111,14 +118,23 @@ class AcousticNetwork(Predictor):
             raise InputError("the speech has no spectrum; an engine that uses one says so by ``inputs``")
         spectrum = speech.spectrum
         motion, distortion = speech.once(self, lambda: self._predict(spectrum))
-        network, posteriors = self.beside, speech.posteriors
-        if network is None or posteriors is None:
-            return motion, distortion
-        (known, unknown), (none, full) = POSTERIOR_SHARES, SURE_POSTERIORS
-        strange, sure = unseen_share(speech.voice), np.clip((posteriors.mean - none) / (full - none), 0, 1)
-        fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
-        share = (fitting * (known + strange * (unknown - known)))[:, None]
-        return motion + share * (network.predict(speech)[0] - motion), distortion
+        network, posteriors, strange = self.beside, speech.posteriors, unseen_share(speech.voice)
+        if network is not None and posteriors is not None:
+            (known, unknown), (none, full) = POSTERIOR_SHARES, SURE_POSTERIORS
+            sure = np.clip((posteriors.mean - none) / (full - none), 0, 1)
+            fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
+            share = (fitting * (known + strange * (unknown - known)))[:, None]
+            motion = motion + share * (network.predict(speech)[0] - motion)
+        encoded = self.predict_encoded(speech)
+        if encoded is not None:
+            motion = motion + ENCODING_SHARE * min(2 * strange, 1.0) * (encoded - motion)
+        return motion, distortion
+
+    def predict_encoded(self, speech: Speech) -> Array | None:
+        """Return motion from the encoding of the sound alone, for voices that training does not know."""
+        if self.encoding is None or speech.encoding is None or speech.voice >= 1:
+            return None
+        return self.encoding.predict(speech)[0]
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""
@@ -147,17 +163,22 @@ class AcousticNetwork(Predictor):
             name: array.astype(np.float16) for name, array in SHAPE.arrays(self.network).items()
         }
         arrays |= {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
-        return arrays | (self.beside.arrays() if self.beside is not None else {})
+        for part in (self.beside, self.encoding):
+            arrays |= part.arrays() if part is not None else {}
+        return arrays
 
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> AcousticNetwork:
         """Deserialise a network; as ``Predictor.from_arrays``."""
-        stored = checked_arrays(arrays, TARGETS, Q=dimensions)
+        stored = check_arrays(arrays, TARGETS, Q=dimensions)
         mean, scale = stored["network_targets"]
         network = SHAPE.from_arrays(arrays, dimensions + 1)
         found = not arrays.keys().isdisjoint(PosteriorNetwork.ARRAYS)
         beside = PosteriorNetwork.from_arrays(arrays, dimensions) if found else None
-        return cls(network, mean, check_scale(scale, "network_targets"), stored["network_variances"], beside)
+        scale = check_scale(scale, "network_targets")
+        encoded = not arrays.keys().isdisjoint(EncodingRegression.ARRAYS)
+        encoding = EncodingRegression.from_arrays(arrays, dimensions) if encoded else None
+        return cls(network, mean, scale, stored["network_variances"], beside, encoding)
 
 
 def _trained(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:

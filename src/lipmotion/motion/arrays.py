@@ -20,7 +20,7 @@ from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, f
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.stats.pca import Pca, check_orthonormal
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
@@ -65,7 +65,7 @@ def scaling_from_arrays(arrays: Arrays, dimensions: int) -> VarianceScaling | No
     """Deserialise what ``scaling_to_arrays`` returned. Raises ValueError: a wrong shape, type or range."""
     if "scaling" not in arrays:
         return None
-    return VarianceScaling(*checked_arrays(arrays, SCALING, Q=dimensions)["scaling"])
+    return VarianceScaling(*check_arrays(arrays, SCALING, Q=dimensions)["scaling"])
 
 
 def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> LearnedMotion:
@@ -76,7 +76,7 @@ def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> Lea
     """
     with format_errors("the learned motion"):
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
-        limits = MotionLimits(*checked_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
+        limits = MotionLimits(*check_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
         check_poses(limits, space, closure)
         scaling = scaling_from_arrays(arrays, space.dimensions)
         modulation = filter_from_arrays(arrays, space.dimensions, needed=filtered)
@@ -94,7 +94,7 @@ def motion_from_arrays(
     space = _space(arrays)
     closure = None
     if OPENING in space.direct_names:
-        stored = checked_arrays(arrays, CLOSURE, Q=space.dimensions)
+        stored = check_arrays(arrays, CLOSURE, Q=space.dimensions)
         column, closed = stored["closure"]
         if column != space.direct_names.index(OPENING) or closed < 0:
             raise ValueError(
@@ -103,7 +103,7 @@ def motion_from_arrays(
         closure = Closure(int(column), float(closed), stored["closure_follow"])
     unit_set = PHONE_SET
     if units != PHONE_SET.name:
-        unit_set = UnitSet(units, _unit_of_phone(checked_arrays(arrays, UNITS)["units"]))
+        unit_set = UnitSet(units, _unit_of_phone(check_arrays(arrays, UNITS)["units"]))
     return unit_set, space, closure, articulation_from_arrays(arrays, space.dimensions)
 
 
@@ -123,7 +123,7 @@ LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTIC
 
 
 def _space(arrays: Arrays) -> MotionSpace:
-    stored = checked_arrays(arrays, CHANNELS)
+    stored = check_arrays(arrays, CHANNELS)
     count, direct = stored.sizes["P"], stored["direct"]
     channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
     if len({channel.name for channel in channels}) < count:
@@ -133,7 +133,7 @@ def _space(arrays: Arrays) -> MotionSpace:
     if len(direct) == count:
         refuse_undeclared(arrays.keys() & POINTS.keys())
         return MotionSpace(channels, direct, None)
-    points = checked_arrays(arrays, POINTS, R=count - len(direct))
+    points = check_arrays(arrays, POINTS, R=count - len(direct))
     check_orthonormal("points_basis", points["points_basis"])
     return MotionSpace(channels, direct, Pca(points["points_mean"], points["points_basis"]))
 

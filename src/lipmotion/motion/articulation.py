@@ -19,7 +19,7 @@ from lipmotion.motion.frame_labels import with_neighbours
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import with_dynamics
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
 from lipmotion.units import PHONES, SILENCE, VOWELS, describe_unknown_phone, find_similar_phone, is_silent
 
@@ -278,7 +278,7 @@ def articulation_from_arrays(arrays: Arrays, dimensions: int) -> ArticulationPri
     """
     if arrays.keys().isdisjoint(ARTICULATION):
         return None
-    stored = checked_arrays(arrays, ARTICULATION, Q=dimensions)
+    stored = check_arrays(arrays, ARTICULATION, Q=dimensions)
     pairs = zip(stored["contexts"].tolist(), stored["context_counts"].tolist(), strict=True)
     contexts = {(left, phone, right): count for (left, phone, right), count in pairs}
     return ArticulationPrior(stored["articulation_centre"], stored["articulation_matrix"], contexts)

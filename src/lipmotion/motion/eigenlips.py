@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import check_orthonormal, fit_pca
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
@@ -122,8 +122,8 @@ def eigenlips_from_arrays(arrays: Arrays, remedy: str = "train the model again")
     """
     with format_errors("the eigenlips", remedy, verb="are"):
         refuse_undeclared(arrays, SIZE, SPACES)
-        height, width = checked_arrays(arrays, SIZE)["size"].tolist()
-        spaces = checked_arrays(arrays, SPACES, D=height * width)
+        height, width = check_arrays(arrays, SIZE)["size"].tolist()
+        spaces = check_arrays(arrays, SPACES, D=height * width)
         for basis in spaces["basis"]:
             check_orthonormal("basis", basis)
         return Eigenlips(spaces["mean"], spaces["basis"], spaces["explained"], (height, width))

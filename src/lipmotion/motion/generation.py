@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior, unseen_share
 from lipmotion.motion.closure import REACH_S, Closure, choose_closed_frames, find_closable_ranges, is_never_negative
@@ -18,8 +18,8 @@ from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import (
     choose_closing_reach,
+    follow_encoding,
     open_before_speech,
-    open_vowels,
     raise_contrast,
     widen_range,
 )
@@ -91,13 +91,14 @@ class LearnedMotion:
         closing_units: Container[str] = (),
         reliability: NDArray[np.float64] | float = 1.0,
         voice: float = 1.0,
+        encoded: NDArray[np.float64] | None = None,
     ) -> tuple[Motion, ReducedVariance]:
         """Return the motion of all channels at 100 Hz, and its variance, by parameter generation.
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
-        Voices that training does not know part their lips to speak, have open vowels, and typical talkers' range
-        (``motion.unknown_voice``).
+        Voices that training does not know part their lips to speak, follow the encoding of the sound, and have typical
+        talkers' range (``motion.unknown_voice``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -106,6 +107,7 @@ class LearnedMotion:
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
+        encoded       : motion from the encoding of the sound alone, for other voices [shape=(T, Q)]
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
@@ -114,10 +116,11 @@ class LearnedMotion:
         if self.prior is not None:
             statistics = self.prior.blended(statistics, units, frames, reliability, voice)
             if voice < 1 and scaling is not None and self.closure is not None:
-                column, reach_s = self.closure.column, choose_closing_reach(voice)
+                reach_s = choose_closing_reach(voice)
                 statistics = raise_contrast(statistics, self.prior, units, frames, reliability, voice)
-                statistics = open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
                 statistics = open_before_speech(statistics, self.prior, units, frames, reliability, voice)
+                if encoded is not None:
+                    statistics = follow_encoding(statistics, encoded, voice)
                 gain = widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
         ranges = find_closable_ranges(units, frames, closing_units, reach_s) if close else []
@@ -174,7 +177,7 @@ def resolve_pins(constraints: Constraints | None, space: MotionSpace, frames: in
     for pin in constraints.pins if constraints else ():
         if pin.channel not in names:
             raise InputError(
-                f"cannot pin {shortened(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
+                f"cannot pin {shorten(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
             )
         frame = frame_of(pin.time_s, frames, FRAME_RATE_HZ)
         if frame is None:

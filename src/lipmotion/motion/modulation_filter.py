@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
 from lipmotion.stats.modulation_spectrum import measure_modulation_spectrum
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule
 
 Array = NDArray[np.float64]
@@ -160,4 +160,4 @@ def filter_from_arrays(arrays: Arrays, dimensions: int, *, needed: bool = False)
     """
     if "modulation" not in arrays and not needed:
         return None
-    return ModulationFilter(checked_arrays(arrays, MODULATION, N=2 * REACH + 1, Q=dimensions)["modulation"])
+    return ModulationFilter(check_arrays(arrays, MODULATION, N=2 * REACH + 1, Q=dimensions)["modulation"])

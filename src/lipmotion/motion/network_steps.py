@@ -21,7 +21,7 @@ from lipmotion.stats.network_training import (
     fit_network,
 )
 from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, make_recurrent_network
-from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays
 from lipmotion.types import Progress
 
 Array = NDArray[np.float64]
@@ -138,7 +138,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
 
         Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
         """
-        stored = checked_arrays(arrays, self.specs, O=outputs)
+        stored = check_arrays(arrays, self.specs, O=outputs)
         *stacked, output = (stored[name] for name in self.specs)
         return self.network(stacked, LinearMap(output[:-1], output[-1]))
 

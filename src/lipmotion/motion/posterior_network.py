@@ -34,7 +34,7 @@ from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraini
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import SequenceNetwork, TrainingPlan, TrainingSequence
 from lipmotion.stats.recurrence import RecurrentNetwork
-from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 
 Array = NDArray[np.float64]
@@ -207,7 +207,7 @@ class PosteriorNetwork(Predictor):
             raise ModelFormatError(
                 "a posterior network without spectra, as of 2026-11-23; required one with spectra: train again"
             )
-        stored = checked_arrays(arrays, TARGETS, Q=dimensions)
+        stored = check_arrays(arrays, TARGETS, Q=dimensions)
         centre, scale = stored["posterior_targets"]
         return cls(
             SHAPE.from_arrays(arrays, dimensions),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import Registry
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, silent_monitor
 
 Array = NDArray[np.float64]
@@ -106,6 +106,13 @@ class Predictor(ABC):
         """Return whether speech has what ``predict`` needs of it: a spectrum, for instance."""
         return True
 
+    def predict_encoded(self, speech: Speech) -> Array | None:  # noqa: ARG002
+        """Return motion from the encoding of the sound alone [shape=(T, Q)], for voices that training does not know.
+
+        None: there is no such prediction, or training knows the voice.
+        """
+        return None
+
     def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:  # noqa: ARG002
         """Return features on which models of other people can stand, and the distortion; None: there are none.
 
@@ -125,7 +132,7 @@ class Predictor(ABC):
         Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
         """
         constructor: Any = cls  # every predictor is a dataclass
-        restored: PredictorT = constructor(**checked_arrays(arrays, cls.ARRAYS, Q=dimensions).arrays)
+        restored: PredictorT = constructor(**check_arrays(arrays, cls.ARRAYS, Q=dimensions).arrays)
         return restored
 
 
@@ -136,6 +143,7 @@ PREDICTORS: Registry[type[Predictor]] = Registry(
         "network": "lipmotion.motion.acoustic_network:AcousticNetwork",
         "posteriors": "lipmotion.motion.posterior_network:PosteriorNetwork",
         "prior": "lipmotion.motion.prior_regression:PriorRegression",
+        "encoding": "lipmotion.motion.encoding_regression:EncodingRegression",
     },
 )
 

@@ -13,7 +13,7 @@ from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
 from lipmotion.stats.delta_windows import mark_known_dynamics, with_dynamics
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, Example, Speech
 
 Array = NDArray[np.float64]
@@ -134,7 +134,7 @@ class PriorRegression(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PriorRegression:
         """Deserialise a regression; as ``Predictor.from_arrays``."""
-        stored = checked_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
+        stored = check_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
         sizes = tuple(stored["prior_sizes"].tolist())
         if sum(sizes) != stored.sizes["R"] or sizes[2:] != (len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS):
             raise ValueError(f"prior_sizes {sizes}, whose sum is not {stored.sizes['R']}, or of another version")

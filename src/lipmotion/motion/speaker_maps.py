@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, estimate_closed_opening, find_closable_ranges
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES
 
@@ -223,7 +223,7 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
     """Deserialise maps. Raises ModelFormatError: an array is missing, unknown, or has a wrong shape, type or range."""
     with format_errors("the table of speakers"):
         refuse_undeclared(arrays, SPEAKERS)
-        stored = checked_arrays(arrays, SPEAKERS, V=len(VISEME_NAMES))
+        stored = check_arrays(arrays, SPEAKERS, V=len(VISEME_NAMES))
         channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
         names = tuple(stored["names"].tolist())
         if (

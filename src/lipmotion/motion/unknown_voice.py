@@ -24,9 +24,9 @@ from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Timeline, Unit, frames_
 from lipmotion.units import VOWELS, is_silent
 
 Array = NDArray[np.float64]
-LEAST_OPENING_SHARE = 0.4
-"""Share of the opening that the table of articulation gives a vowel, which a voice that training does not know has at
-least: what the model makes of its vowels is shut where it takes them for something else."""
+LATE_ENCODING_SHARE = 0.2
+"""Share of the motion from the encoding alone after all that is done for such a voice, where training knows it half or
+less: what the sound says of the lips corrects what is only usual (docs/results/voices.md)."""
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
@@ -47,40 +47,23 @@ RETAINED = (0.52, 0.62)
 where phones cannot be relied on at all, and where they can. The more there is doubt, the closer motion is to a mean."""
 
 
-def open_vowels(
-    statistics: Callable[[slice], Statistics],
-    prior: ArticulationPrior,
-    column: int,
-    units: Timeline[Unit],
-    frames: int,
-    reliability: Array | float,
-    voice: float,
+def follow_encoding(
+    statistics: Callable[[slice], Statistics], encoded: Array, voice: float
 ) -> Callable[[slice], Statistics]:
-    """Return means and precisions of ranges of frames, with the mouth open in vowels.
+    """Return means and precisions of ranges of frames, drawn towards motion from the encoding of the sound alone.
 
-    statistics  : returns those of a model
-    prior       : the table of articulation
-    column      : of the opening in the motion space
-    reliability : of the phones in time, 0 to 1 [shape=(frames,)]
-    voice       : how well training knows the voice, 0 to 1; at 1 nothing changes
-    Where the mean of the opening is less than a share of the table's, all dimensions are drawn towards the table until
-    it is not. Precisions stay those of the model.
+    statistics : returns those of a model
+    encoded    : the motion [shape=(T, Q)]
+    voice      : how well training knows the voice, 0 to 1; at 1 nothing changes
+    Precisions stay those of the model.
     """
-    values = prior.trajectory(units, frames, reliability)
-    opening = values[:, column]
-    vowels = np.zeros(frames)
-    for span in units:
-        if span.label.phone in VOWELS:
-            vowels[slice(*frames_of(span, frames))] = 1
-    least = LEAST_OPENING_SHARE * unseen_share(voice) * vowels * np.maximum(opening, 0)
+    share = LATE_ENCODING_SHARE * min(2 * unseen_share(voice), 1.0)
 
-    def opened(chosen: slice) -> Statistics:
+    def followed(chosen: slice) -> Statistics:
         means, precisions = statistics(chosen)
-        shut = means[:, 0, column]
-        share = np.clip((least[chosen] - shut) / np.maximum(opening[chosen] - shut, 1e-9), 0, 1)
-        return means + share[:, None, None] * (slice_dynamics(values, chosen) - means), precisions
+        return means + share * (slice_dynamics(encoded, chosen) - means), precisions
 
-    return opened
+    return followed
 
 
 def raise_contrast(
@@ -93,8 +76,8 @@ def raise_contrast(
 ) -> Callable[[slice], Statistics]:
     """Return means and precisions of ranges of frames, with consonants less open, and vowels by their duration.
 
-    The arguments are those of ``open_vowels``; at ``voice`` 1 nothing changes. All articulators move as from the
-    mean consonant to the mean vowel of the table. Precisions stay those of the model.
+    statistics, reliability, voice : as of ``LearnedMotion.generate``; at ``voice`` 1 nothing changes
+    All articulators move as from the mean consonant to the mean vowel of the table. Precisions stay those of the model.
     Source: Lindblom 1963 (vowel reduction): the shorter a vowel, the more it misses its target.
     """
     wider = np.zeros((frames, 1))
@@ -126,10 +109,10 @@ def open_before_speech(
 ) -> Callable[[slice], Statistics]:
     """Return means and precisions of ranges of frames, with the mouth open before speech begins.
 
-    The arguments are those of ``open_vowels``; at ``voice`` 1 and 0 nothing changes. All dimensions are drawn
-    towards their median in speech. Precisions stay those of the model. A voice of which nothing is known may be a known
-    one in noise, and its recording may begin anywhere. A model of few phones half knows its own speaker's voice, too:
-    the fewer it was trained on, the less changes.
+    statistics, reliability, voice : as of ``LearnedMotion.generate``; at ``voice`` 1 and 0 nothing changes
+    All dimensions are drawn towards their median in speech. Precisions stay those of the model. A voice of which
+    nothing is known may be a known one in noise, and its recording may begin anywhere. A model of few phones half knows
+    its own speaker's voice, too: the fewer it was trained on, the less changes.
     Source: Scobbie, Schaeffler & Mennen 2011 (lips part and breath is taken before the first sound).
     """
     first_s = next((span.start_s for span in units if not is_silent(span.label.phone)), 0.0)

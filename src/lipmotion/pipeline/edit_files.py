@@ -11,18 +11,18 @@ from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.formats.motion_document import list_unit_rows, parse_units
+from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.request import Request, located
+from lipmotion.pipeline.request import Request, locate_paths
 from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.storage.files import (
     LARGEST_TEXT_BYTES,
+    atomic_file,
     check_source,
     read_text_file,
     sha256_of,
     sound_reference,
-    whole_file,
 )
 from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
@@ -63,11 +63,10 @@ class EditFile:
 
     def undo(self, count: int = 1) -> EditFile:
         """Return the file with its last edits taken back. Raises InputError: there are fewer."""
-        steps = self.edits.steps
+        steps, left = self.edits.steps, len(self.edits.steps) - count
         if not 0 <= count <= len(steps):
             raise InputError(f"{count} edits to take back, required 0 to {len(steps)}: the number of edits")
-        kept = len(steps) - count
-        return replace(self, edits=Edits(steps[:kept]), undone=(*steps[kept:], *self.undone))
+        return replace(self, edits=Edits(steps[:left]), undone=(*steps[left:], *self.undone))
 
     def redo(self, count: int = 1) -> EditFile:
         """Return the file with edits made again that were taken back. Raises InputError: there are fewer."""
@@ -79,44 +78,39 @@ class EditFile:
         """Return the file with some more edits; what was taken back is gone. Raises InputError: as ``Edits.then``."""
         return replace(self, edits=self.edits.then(*edits), undone=()) if edits else self
 
-    def session(self, asked: Request | None = None, *, model: Model | None = None, **more: Any) -> Session:
+    def session(self, request: Request | None = None, *, model: Model | None = None, **more: Any) -> Session:
         """Return a session of the recording; or of a given request, with the phones of the file if it has none.
 
         more : of ``Session``; who gives its ``audio`` has checked whose it is
         Raises InputError: the file names no recording, and there is no other request; or its phones are those of
         another recording. Others as ``load_model``.
         """
-        if asked is None:
+        if request is None:
             if self.named.recording is None:
                 raise InputError("the edits name no recording; give it: lipmotion animate RECORDING --edits FILE")
-            asked = read_request(self.named)
-        model = model or load_model(self.named.model)
-        if self.units is None:
-            return Session(asked, model=model, **more)
-        if asked.units is not None or asked.transcript is not None:
+            request = read_request(self.named)
+        if self.units is not None and (request.units is not None or request.transcript is not None):
             LOG.warning("the phones that were edited are not used: words or phones are given; numbers may mean others")
-            return Session(asked, model=model, **more)
-        if self.sha256 and "audio" not in more and isinstance(asked.recording, str | Path):
-            check_sound(Path(asked.recording), self.sha256)
-        request, lasts_s = replace(asked, units=self.units), max((span.end_s for span in self.units), default=0.0)
-        return Session(request, model=model, outlook=self.outlook, lasts_s=lasts_s, **more)
+        elif self.units is not None:
+            if self.sha256 and "audio" not in more and isinstance(request.recording, str | Path):
+                check_sound(Path(request.recording), self.sha256)
+            request = replace(request, units=self.units)
+            more |= {"outlook": self.outlook, "lasts_s": max((span.end_s for span in self.units), default=0.0)}
+        return Session(request, model=model or load_model(self.named.model), **more)
 
 
-def begun(asked: Request) -> EditFile:
-    """Return a file without edits of a recording, but for the moods that tags in its words ask for.
+def create_edit_file(request: Request, session: Session | None = None) -> tuple[EditFile, Generation]:
+    """Return a file of a recording, and its motion; its only edits are the moods that tags in the words ask for.
 
-    Its phones are recognised or aligned now. Raises as ``animate``.
+    session : of the recording, where there is one; None: its phones are recognised or aligned now
+    Raises as ``animate``.
     """
-    return begun_with(asked, Session(read_request(asked), model=load_model(asked.model)))[0]
-
-
-def begun_with(asked: Request, session: Session) -> tuple[EditFile, Generation]:
-    """Return the file of ``begun`` for a session of a request, and its motion."""
-    named = Request(**{name: getattr(asked, name) for name in HELD})
+    session = session or Session(read_request(request), model=load_model(request.model))
+    named = Request(**{name: getattr(request, name) for name in HELD})
     if not (isinstance(named.recording, Path | None) and isinstance(named.lexicon, Path | None)):
         raise InputError("a file of edits names its recording and lexicon, required paths of files, not values")
-    generation = session.generated()
-    moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not held
+    generation = session.generate()
+    moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not stored
     digest = sha256_of(named.recording) if named.recording else ""
     return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook, sha256=digest), generation
 
@@ -124,10 +118,9 @@ def begun_with(asked: Request, session: Session) -> tuple[EditFile, Generation]:
 def check_sound(recording: Path, sha256: str) -> None:
     """Raise InputError unless a recording is the one of a digest, whose phones were found, or it cannot be read."""
     check_source(recording, "recording")
-    found = sha256_of(recording)
-    if found != sha256:
+    if (digest := sha256_of(recording)) != sha256:
         raise InputError(
-            f"{recording}: is another recording than when its phones were found (SHA-256 {found[:12]}, required "
+            f"{recording}: is another recording than when its phones were found (SHA-256 {digest[:12]}, required "
             f"{sha256[:12]}); put the old one back, or begin anew with this one, under another name"
         )
 
@@ -156,7 +149,7 @@ def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
     Raises InputError: no such file, another suffix, or not a file of edits of this version.
     """
     path = Path(path)
-    if _suffix(path) == TOML:
+    if _check_suffix(path) == TOML:
         members: Any = read_toml(path, "edits", f"use {JSON}")
     else:
         try:
@@ -165,48 +158,39 @@ def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
             raise InputError(f"{path}: not a file of edits ({error})") from error
     if not isinstance(members, dict) or members.get("format") != FORMAT:
         raise InputError(f'{path}: not a file of edits; it must begin with "format": "{FORMAT}"')
-    if members.get("version") != VERSION:
-        found = describe_value(members.get("version"))
-        raise InputError(f"{path}: edits of version {found}, required {VERSION}; update lipmotion")
+    if (version := members.get("version")) != VERSION:
+        raise InputError(f"{path}: edits of version {describe_value(version)}, required {VERSION}; update lipmotion")
     if not phones:
         members.pop("units", None)
     try:
-        return _content(members, path.parent)
+        known = {"format", "version", *HELD, DIGEST, "steps", "undone", "units", "recognised", "outlook"}
+        if unknown := sorted(set(members) - known):
+            raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
+        commands = items(text(LARGEST_TEXT_BYTES))
+        steps, undone = (require(commands, members.get(name, []), name) for name in ("steps", "undone"))
+        named = locate_paths(Request.parsed({name: members[name] for name in HELD if name in members}), path.parent)
+        units = parse_units(members["units"], members.get("recognised")) if "units" in members else None
+        outlook, sha256 = _OUTLOOK(members.get("outlook")), require(_TEXT, members.get(DIGEST, ""), DIGEST)
+        return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps, sha256)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _suffix(path: Path) -> str:
+def _check_suffix(path: Path) -> str:
     """Return the suffix of a file of edits, in lower case. Raises InputError: another one."""
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
     return path.suffix.lower()
 
 
-def _content(members: dict[str, Any], folder: Path) -> EditFile:
-    known = {"format", "version", *HELD, DIGEST, "steps", "undone", "units", "recognised", "outlook"}
-    if unknown := sorted(set(members) - known):
-        raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
-    steps, undone = (_sentences(members, name) for name in ("steps", "undone"))
-    named = located(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
-    units = parse_units(members["units"], members.get("recognised")) if "units" in members else None
-    outlook, sha256 = _OUTLOOK(members.get("outlook")), require(_TEXT, members.get(DIGEST, ""), DIGEST)
-    return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps, sha256)
-
-
-def _sentences(members: dict[str, Any], name: str) -> list[str]:
-    return list(require(items(text(LARGEST_TEXT_BYTES)), members.get(name, []), name))
-
-
 def write_edits(file: EditFile, path: str | Path) -> None:
     """Write a file of edits. Raises InputError: another suffix.  Raises ExportError: it cannot be written."""
     path = Path(path)
-    kind = _suffix(path)
+    suffix = _check_suffix(path)
     members: dict[str, Any] = {"format": FORMAT, "version": VERSION}
-    usual = Request()
     for name in HELD:
         value = getattr(file.named, name)
-        if value != getattr(usual, name):
+        if value != getattr(Request(), name):
             members[name] = sound_reference(value, path) if isinstance(value, Path) else value
     if file.sha256:
         members[DIGEST] = file.sha256
@@ -217,21 +201,17 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         members |= list_unit_rows(file.units)
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
-    content = _as_toml(members) if kind == TOML else as_json_rows(members)
-    with whole_file(path) as temporary:
+    if suffix == TOML:  # a line each, and lists with a line for each of their members
+        content = ""
+        for name, value in members.items():
+            rows = "".join(f"  {_toml_value(row)},\n" for row in value) if isinstance(value, list | tuple) else ""
+            content += (
+                f"{name} = [\n{rows}]\n" if isinstance(value, list | tuple) else f"{name} = {_toml_value(value)}\n"
+            )
+    else:
+        content = as_json_rows(members)
+    with atomic_file(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
-
-
-def _as_toml(members: dict[str, Any]) -> str:
-    """Return members as TOML: a line each, and lists with a line for each of their members."""
-    lines = []
-    for name, value in members.items():
-        if isinstance(value, list | tuple):
-            rows = "".join(f"  {_toml_value(row)},\n" for row in value)
-            lines.append(f"{name} = [\n{rows}]\n")
-        else:
-            lines.append(f"{name} = {_toml_value(value)}\n")
-    return "".join(lines)
 
 
 def _toml_value(value: Any) -> str:

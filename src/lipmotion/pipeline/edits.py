@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any, ClassVar, get_type_hints
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MoodKey, format_moods, parse_moods, sort_moods
@@ -17,7 +17,7 @@ from lipmotion.types.staging import Staging
 from lipmotion.types.values import describe_value, parse_number, parse_whole
 from lipmotion.units import PHONES, describe_unknown_phone, is_silent
 
-LEAST_PHONE_S = 0.01
+MIN_PHONE_S = 0.01
 """Shortest phone that an edit may leave."""
 
 
@@ -48,25 +48,12 @@ class Step:
     def __str__(self) -> str:
         return self.form.format(**{field.name: _written(getattr(self, field.name)) for field in fields(self)})
 
-    @classmethod
-    def parsed(cls, sentence: str) -> Step | None:
-        """Return the edit that a sentence states; None: it has another form.
-
-        Raises InputError: a value is not allowed.
-        """
-        pattern, readers = _pattern(cls.form, cls)  # type: ignore[arg-type] # a class can be hashed
-        found = pattern.fullmatch(sentence.strip())
-        if found is None:
-            return None
-        return cls(**{name: read(text) for (name, read), text in zip(readers.items(), found.groups(), strict=True)})
-
 
 @lru_cache
-def _pattern(form: str, kind: Any) -> tuple[re.Pattern[str], dict[str, Any]]:
-    """Return the pattern of a kind of sentence, and what reads its values, by the names of the fields."""
-    types = get_type_hints(kind)
-    pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(form))
-    names = re.findall(r"{(\w+)}", form)
+def _read_form(kind: Any) -> tuple[re.Pattern[str], dict[str, Any]]:
+    """Return the pattern of a kind of command, and what reads its values, by the names of the fields."""
+    types, names = get_type_hints(kind), re.findall(r"{(\w+)}", kind.form)
+    pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(kind.form))
     return re.compile(pattern.replace(r"\ ", r"\s+")), {name: _READ[types[name]][1] for name in names}
 
 
@@ -80,7 +67,7 @@ class PhoneStep(Step):
     """An edit of the phones in time; they are numbered from 1, as they are after the edits before it."""
 
     @abstractmethod
-    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:
         """Return the phones in time after the edit. Raises InputError: it is not possible."""
 
     def _index(self, units: Timeline[Unit], number: int) -> int:
@@ -90,7 +77,7 @@ class PhoneStep(Step):
         return number - 1
 
 
-def _known(phone: str, word: str = "") -> Unit:
+def _unit_of(phone: str, word: str = "") -> Unit:
     """Return the label of a phone that a user gives. Raises InputError: there is no such phone."""
     if phone not in PHONES:
         raise InputError(describe_unknown_phone(phone))
@@ -105,23 +92,23 @@ class PhoneIs(PhoneStep):
     number: int
     phone: str
 
-    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
         spans = list(units)
-        spans[place] = replace(spans[place], label=_known(self.phone, spans[place].label.word))
+        spans[place] = replace(spans[place], label=_unit_of(self.phone, spans[place].label.word))
         return Timeline(tuple(spans))
 
 
-def _moved_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
+def _move_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
     """Return phones with another time between the phone at place ``before`` and the next one.
 
-    Raises InputError: one of both would last less than ``LEAST_PHONE_S``, or there is no such border.
+    Raises InputError: one of both would last less than ``MIN_PHONE_S``, or there is no such border.
     """
     spans = list(units)
     first_s, last_s = spans[before].start_s, spans[before + 1].end_s
-    if not first_s + LEAST_PHONE_S - 1e-9 <= time_s <= last_s - LEAST_PHONE_S + 1e-9:
-        least, most = first_s + LEAST_PHONE_S, last_s - LEAST_PHONE_S
-        raise InputError(f"{str(step)!r}: required {least:.3f} to {most:.3f} s, between the phones beside it")
+    if not first_s + MIN_PHONE_S - 1e-9 <= time_s <= last_s - MIN_PHONE_S + 1e-9:
+        required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s"
+        raise InputError(f"{str(step)!r}: required {required}, between the phones beside it")
     for place, change in ((before, {"end_s": time_s}), (before + 1, {"start_s": time_s})):
         label = replace(spans[place].label, confidence=None)
         spans[place] = replace(spans[place], label=label, **change)
@@ -136,11 +123,11 @@ class PhoneBegins(PhoneStep):
     number: int
     time_s: float
 
-    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
         if place == 0:
             raise InputError(f"{str(self)!r}: the first phone begins with the recording")
-        return _moved_border(self, units, place - 1, self.time_s)
+        return _move_border(self, units, place - 1, self.time_s)
 
 
 @dataclass(frozen=True)
@@ -151,11 +138,11 @@ class PhoneEnds(PhoneStep):
     number: int
     time_s: float
 
-    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
         if place == len(units) - 1:
             raise InputError(f"{str(self)!r}: the last phone ends with the recording")
-        return _moved_border(self, units, place, self.time_s)
+        return _move_border(self, units, place, self.time_s)
 
 
 @dataclass(frozen=True)
@@ -165,13 +152,13 @@ class PhoneRemoved(PhoneStep):
     form: ClassVar[str] = "remove phone {number}"
     number: int
 
-    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
         spans = list(units)
         if len(spans) == 1:
             raise InputError(f"{str(self)!r}: it is the only phone; say what it is: 'phone 1 is sil'")
-        gone = spans.pop(place)
-        change = {"end_s": gone.end_s} if place else {"start_s": gone.start_s}
+        removed = spans.pop(place)
+        change = {"end_s": removed.end_s} if place else {"start_s": removed.start_s}
         other = max(place - 1, 0)
         spans[other] = replace(spans[other], label=replace(spans[other].label, confidence=None), **change)
         return Timeline(tuple(spans))
@@ -186,11 +173,11 @@ class PhoneInserted(PhoneStep):
     start_s: float
     end_s: float
 
-    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         last_s = units[-1].end_s if len(units) else 0.0
-        if not (self.start_s >= 0 and self.start_s + LEAST_PHONE_S - 1e-9 <= self.end_s <= last_s + 1e-9):
-            raise InputError(f"{str(self)!r}: required at least {LEAST_PHONE_S} s within 0 to {last_s:.3f} s")
-        return with_span(units, [Span(self.start_s, min(self.end_s, last_s), _known(self.phone))])
+        if not (self.start_s >= 0 and self.start_s + MIN_PHONE_S - 1e-9 <= self.end_s <= last_s + 1e-9):
+            raise InputError(f"{str(self)!r}: required at least {MIN_PHONE_S} s within 0 to {last_s:.3f} s")
+        return with_span(units, [Span(self.start_s, min(self.end_s, last_s), _unit_of(self.phone))])
 
 
 @dataclass(frozen=True)
@@ -201,17 +188,16 @@ class PhoneSplit(PhoneStep):
     number: int
     time_s: float
 
-    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
-        whole = units[place]
-        least_s, most_s = whole.start_s + LEAST_PHONE_S, whole.end_s - LEAST_PHONE_S
-        if not least_s - 1e-9 <= self.time_s <= most_s + 1e-9:
+        phone = units[place]
+        if not phone.start_s + MIN_PHONE_S - 1e-9 <= self.time_s <= phone.end_s - MIN_PHONE_S + 1e-9:
             raise InputError(
-                f"{str(self)!r}: the phone lasts from {whole.start_s:.3f} to {whole.end_s:.3f} s, required a time at "
-                f"least {LEAST_PHONE_S} s within"
+                f"{str(self)!r}: the phone lasts from {phone.start_s:.3f} to {phone.end_s:.3f} s, required a time at "
+                f"least {MIN_PHONE_S} s within"
             )
-        label = replace(whole.label, confidence=None)
-        parts = (Span(whole.start_s, self.time_s, label), Span(self.time_s, whole.end_s, label))
+        label = replace(phone.label, confidence=None)
+        parts = (Span(phone.start_s, self.time_s, label), Span(self.time_s, phone.end_s, label))
         return Timeline((*units.spans[:place], *parts, *units.spans[place + 1 :]))
 
 
@@ -245,7 +231,7 @@ class WordSaid(Step):
         _check_said(self, self.phones.split())
 
     @property
-    def own(self) -> dict[str, tuple[str, ...]]:
+    def pronunciation_of(self) -> dict[str, tuple[str, ...]]:
         """The phones of the word."""
         return {self.word: tuple(self.phones.split())}
 
@@ -253,7 +239,7 @@ class WordSaid(Step):
 def _check_said(step: Step, phones: Sequence[str]) -> None:
     """Raise InputError unless phones are those of a word that an edit says."""
     for phone in phones:
-        if _known(phone) and is_silent(phone):
+        if _unit_of(phone) and is_silent(phone):
             raise InputError(f"{str(step)!r}: a word has no silence in it; say two words")
 
 
@@ -280,13 +266,13 @@ class WordsSaidSo(WordsSaid):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for word, phones in self.own.items():
+        for word, phones in self.pronunciation_of.items():
             if not phones:
-                raise InputError(f"{str(self)!r}: {shortened(repr(word))} has no phones; required WORD PHONES, WORD …")
+                raise InputError(f"{str(self)!r}: {shorten(repr(word))} has no phones; required WORD PHONES, WORD …")
             _check_said(self, phones)
 
     @property
-    def own(self) -> dict[str, tuple[str, ...]]:
+    def pronunciation_of(self) -> dict[str, tuple[str, ...]]:
         """The phones of words, by word."""
         parts = (part.split() for part in self.pronunciations.split(","))
         return {word: tuple(phones) for word, *phones in filter(None, parts)}
@@ -318,8 +304,7 @@ class PinStep(CurveStep):
     time_s: float
 
     @property
-    def edit(self) -> Pin:
-        """The pin."""
+    def edit(self) -> Pin:  # noqa: D102
         return Pin(self.time_s, self.channel, self.value)
 
 
@@ -333,8 +318,7 @@ class GainStep(CurveStep):
     end_s: float
 
     @property
-    def edit(self) -> Gain:
-        """The gain."""
+    def edit(self) -> Gain:  # noqa: D102
         return Gain(self.start_s, self.end_s, self.factor)
 
 
@@ -349,8 +333,7 @@ class CurveGainStep(CurveStep):
     end_s: float
 
     @property
-    def edit(self) -> Gain:
-        """The gain."""
+    def edit(self) -> Gain:  # noqa: D102
         return Gain(self.start_s, self.end_s, self.factor, self.channel)
 
 
@@ -365,8 +348,7 @@ class DrawStep(CurveStep):
     end_s: float
 
     @property
-    def edit(self) -> DrawnCurve:
-        """The drawn stretch."""
+    def edit(self) -> DrawnCurve:  # noqa: D102
         return DrawnCurve(self.start_s, self.end_s, self.channel, self.values)
 
 
@@ -379,8 +361,7 @@ class HoldStep(CurveStep):
     end_s: float
 
     @property
-    def edit(self) -> Hold:
-        """The held stretch."""
+    def edit(self) -> Hold:  # noqa: D102
         return Hold(self.start_s, self.end_s)
 
 
@@ -416,22 +397,22 @@ class UnlockStep(Step):
     end_s: float
 
 
-def locks(steps: Sequence[Step]) -> dict[int, LockStep]:
+def find_locks(steps: Sequence[Step]) -> dict[int, LockStep]:
     """Return the locks that hold after some edits, by their places among these.
 
     Raises InputError: what is taken out was not locked.
     """
-    held: dict[int, LockStep] = {}
+    locks: dict[int, LockStep] = {}
     for place, step in enumerate(steps):
         if isinstance(step, LockStep):
-            held[place] = step
+            locks[place] = step
         elif isinstance(step, UnlockStep):
-            same = [n for n, lock in held.items() if (lock.start_s, lock.end_s) == (step.start_s, step.end_s)]
+            same = [n for n, lock in locks.items() if (lock.start_s, lock.end_s) == (step.start_s, step.end_s)]
             if not same:
-                found = "; ".join(map(repr, map(str, held.values()))) or "nothing"
-                raise InputError(f"{str(step)!r}: locked is {found}")
-            del held[same[-1]]
-    return held
+                locked = "; ".join(map(repr, map(str, locks.values()))) or "nothing"
+                raise InputError(f"{str(step)!r}: locked is {locked}")
+            del locks[same[-1]]
+    return locks
 
 
 @dataclass(frozen=True)
@@ -452,7 +433,7 @@ class SetStep(Step):
         kind = next((kind for kind in (Delivery, Staging) if self.name in _names(kind)), None)
         if kind is None:
             known = ", ".join((*_names(Delivery), *_names(Staging)))
-            raise InputError(f"{str(self)!r}: nothing is called {shortened(repr(self.name))}; required one of: {known}")
+            raise InputError(f"{str(self)!r}: nothing is called {shorten(repr(self.name))}; required one of: {known}")
         return kind
 
     @property
@@ -465,11 +446,7 @@ class SetStep(Step):
             return _TRUTH[self.value]
         if isinstance(usual, str):
             return self.value
-        return (
-            parse_whole(self.value, f"{self.name} is")
-            if isinstance(usual, int)
-            else parse_number(self.value, f"{self.name} is")
-        )
+        return (parse_whole if isinstance(usual, int) else parse_number)(self.value, f"{self.name} is")
 
 
 @dataclass(frozen=True)
@@ -508,24 +485,25 @@ FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form
 """Their sentences, for messages and help; times are in seconds."""
 
 
-def step_of(sentence: str) -> Step:
+def parse_step(sentence: str) -> Step:
     """Return the edit that a sentence states. Raises InputError: it states none, or a value is not allowed.
 
-    >>> step_of("phone 12 ends 1.24")
+    >>> parse_step("phone 12 ends 1.24")
     PhoneEnds(number=12, time_s=1.24)
-    >>> str(step_of("pin  jawOpen .2 at 1"))
+    >>> str(parse_step("pin  jawOpen .2 at 1"))
     'pin jawOpen 0.2 at 1.0'
     """
     if not isinstance(sentence, str):
         raise InputError(f"an edit is {describe_value(sentence)}, required a sentence: {FORMS[0]!r}")
     for kind in STEPS:
-        step = kind.parsed(sentence)
-        if step is not None:
-            return step
+        pattern, readers = _read_form(kind)  # type: ignore[arg-type] # a class can be hashed
+        if match := pattern.fullmatch(sentence.strip()):
+            values = zip(readers.items(), match.groups(), strict=True)
+            return kind(**{name: read(text) for (name, read), text in values})
     first = sentence.split()[:1]
     near = [form for form in FORMS if form.split()[:1] == first] or FORMS
     required = f"required {'one of: ' if len(near) > 1 else ''}{'; '.join(near)}"
-    raise InputError(f"{shortened(repr(sentence))} is no edit; {required} (whole numbers, seconds as 1.24, one word)")
+    raise InputError(f"{shorten(repr(sentence))} is no edit; {required} (whole numbers, seconds as 1.24, one word)")
 
 
 @dataclass(frozen=True)
@@ -544,7 +522,7 @@ class Edits:
 
     def then(self, *edits: str | Step) -> Edits:
         """Return these edits and some more, sentences or values. Raises InputError: a sentence states no edit."""
-        return Edits(self.steps + tuple(edit if isinstance(edit, Step) else step_of(edit) for edit in edits))
+        return Edits(self.steps + tuple(edit if isinstance(edit, Step) else parse_step(edit) for edit in edits))
 
     @classmethod
     def of_pins(cls, pins: Iterable[Pin]) -> Edits:
@@ -556,19 +534,18 @@ class Edits:
         """The steps as sentences."""
         return tuple(map(str, self.steps))
 
-    def delivery(self, asked: Delivery = Delivery()) -> Delivery:  # noqa: B008 # a frozen value
-        """Return how the motion is delivered: as is asked for, and where nothing is, as these edits set it."""
-        found = replace(asked, **self._set(asked, Delivery()))
-        keys = sort_moods([*found.moods, *(step.key for step in self.steps if isinstance(step, MoodStep))])
-        return replace(found, mood=format_moods(keys)) if keys != found.moods else found
+    def delivery(self, requested: Delivery = Delivery()) -> Delivery:  # noqa: B008 # a frozen value
+        """Return how the motion is delivered; a requested value that is not the default wins over these edits."""
+        delivery = replace(requested, **self._settings(requested, Delivery()))
+        keys = sort_moods([*delivery.moods, *(step.key for step in self.steps if isinstance(step, MoodStep))])
+        return replace(delivery, mood=format_moods(keys)) if keys != delivery.moods else delivery
 
-    def staging(self, asked: Staging = Staging()) -> Staging:  # noqa: B008 # a frozen value
-        """Return how a drawn face is shown: as is asked for, and where nothing is, as these edits set it."""
-        return replace(asked, **self._set(asked, Staging()))
+    def staging(self, requested: Staging = Staging()) -> Staging:  # noqa: B008 # a frozen value
+        """Return how a drawn face is shown; a requested value that is not the default wins over these edits."""
+        return replace(requested, **self._settings(requested, Staging()))
 
-    def _set(self, asked: Delivery | Staging, usual: Delivery | Staging) -> dict[str, Any]:
-        """Return what is set of the fields that are as usual, by name."""
-        found = {step.name: step.parsed_value for step in self.steps if isinstance(step, SetStep)}
-        names = (field.name for field in fields(usual))
-        free = (name for name in names if getattr(asked, name) == getattr(usual, name))
-        return {name: found[name] for name in free if name in found}
+    def _settings(self, requested: Delivery | Staging, default: Delivery | Staging) -> dict[str, Any]:
+        """Return what these edits set of the fields whose requested value is the default, by name."""
+        values = {step.name: step.parsed_value for step in self.steps if isinstance(step, SetStep)}
+        names = [field.name for field in fields(default) if field.name in values]
+        return {name: values[name] for name in names if getattr(requested, name) == getattr(default, name)}

@@ -10,13 +10,12 @@ import numpy as np
 
 from lipmotion.motion.closure import clip_at_zero
 from lipmotion.motion.network_steps import STEP
-from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
+from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Constraints,
     Features,
     Generation,
-    Motion,
     Pin,
     PriorOutput,
     Speech,
@@ -26,43 +25,36 @@ from lipmotion.types import (
 )
 
 MARGIN_S = 2.5
-"""So far before and after an edit the motion is computed; motion a second from an edit hardly depends on it."""
+"""Motion is computed so far before and after an edit; a second from an edit it hardly depends on it."""
 GRID_S = 2.0
 """Excerpts begin and end at multiples of this, so that those of edits that are near to one another are the same."""
 LONGEST_S = 40.0
-"""Motion whose edits lie further apart is made whole."""
+"""If edits lie further apart, the full motion is computed."""
 
 
 @dataclass(frozen=True)
 class Excerpt:
     """What has changed between two sets of edits of one recording.
 
-    frames : in which motion may differ
-    kept   : how many phones are the same at the beginning, and at the end
+    frames    : in which motion may differ
+    unchanged : number of phones that are the same at the beginning, and at the end
     """
 
     frames: slice
-    kept: tuple[int, int]
+    unchanged: tuple[int, int]
 
-    @property
-    def _times_s(self) -> tuple[float, float]:
-        """The times of the first and the last frame."""
-        return self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ
-
-    def within(self, units: Timeline[Unit]) -> Timeline[Unit]:
+    def units_in(self, units: Timeline[Unit]) -> Timeline[Unit]:
         """Return the phones in these frames, cut at the ends, with times from the first of them."""
-        return units.between(*self._times_s)
+        return units.between(self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ)
 
-    def pinned(self, pins: Collection[Pin]) -> Constraints:
+    def pins_in(self, pins: Collection[Pin]) -> Constraints:
         """Return the pins in these frames, with times from the first of them."""
-        first_s, last_s = self._times_s
+        first_s, last_s = self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ
         inside = [pin for pin in pins if first_s <= pin.time_s <= last_s]
         return Constraints(tuple(replace(pin, time_s=pin.time_s - first_s) for pin in inside))
 
 
-def excerpt_of_change(
-    before: Timeline[Unit], after: Timeline[Unit], pins: Collection[Pin], frames: int
-) -> Excerpt | None:
+def find_excerpt(before: Timeline[Unit], after: Timeline[Unit], pins: Collection[Pin], frames: int) -> Excerpt | None:
     """Return the excerpt outside of which motion is the same; None: it is too long, outside, or nothing has changed.
 
     pins   : that are there before or after, but not both
@@ -82,24 +74,23 @@ def excerpt_of_change(
     return Excerpt(slice(round(start * FRAME_RATE_HZ), min(round(end * FRAME_RATE_HZ) + 1, frames)), (first, last))
 
 
-def speech_within(understood: UnderstoodSpeech, frames: slice) -> UnderstoodSpeech:
-    """Return understood speech of some frames alone, without phones; its first frame is a multiple of 4."""
-    return replace(understood, speech=_within(understood.speech, frames), tags=(), events=())
+def cut_analysis(analysis: SpeechAnalysis, frames: slice) -> SpeechAnalysis:
+    """Return analysed speech of some frames alone, without phones; its first frame is a multiple of 4."""
+    return replace(analysis, speech=_cut_speech(analysis.speech, frames), tags=(), events=())
 
 
-def _within(speech: Speech, frames: slice) -> Speech:
-    """Return the speech of some frames, and of the passages in them."""
-    some = Features(speech.features.values[frames], (frames.stop - 1 - frames.start) / FRAME_RATE_HZ)
+def _cut_speech(speech: Speech, frames: slice) -> Speech:
+    features = Features(speech.features.values[frames], (frames.stop - 1 - frames.start) / FRAME_RATE_HZ)
     steps, halves = (slice(frames.start // each, -(-frames.stop // each)) for each in (STEP, 2))
     posteriors, prior, confidence, parts = speech.posteriors, speech.prior, speech.confidence, None
     if speech.parts is not None:
         parts = tuple(
-            _part_within(part, frames)
+            _cut_part(part, frames)
             for part in speech.parts
             if max(part.inside.start, frames.start) < min(part.inside.stop, frames.stop)
         )
     return Speech(
-        some,
+        features,
         Timeline(()),
         log_f0=None if speech.log_f0 is None else speech.log_f0[frames],
         units_known=speech.units_known,
@@ -110,34 +101,33 @@ def _within(speech: Speech, frames: slice) -> Speech:
         else PriorOutput(prior.articulators[steps], prior.hidden[steps], prior.distortion[steps]),
         voice=speech.voice,
         posteriors=None if posteriors is None else replace(posteriors, values=posteriors.values[halves]),
+        encoding=None if speech.encoding is None else speech.encoding[frames],
         times_given=True,
         parts=parts,
     )
 
 
-def _part_within(part: SpeechPart, frames: slice) -> SpeechPart:
-    """Return a passage without what lies outside of some frames of the recording, in which its time is counted."""
+def _cut_part(part: SpeechPart, frames: slice) -> SpeechPart:
     first = max(frames.start - part.first, 0) // STEP * STEP
-    inside = _within(part.speech, slice(first, min(frames.stop - part.first, part.frames)))
+    inside = _cut_speech(part.speech, slice(first, min(frames.stop - part.first, part.frames)))
     own = slice(max(part.own.start - frames.start, 0), min(part.own.stop, frames.stop) - frames.start)
     return SpeechPart(part.first + first - frames.start, own, inside)
 
 
-def with_excerpt(
-    whole: Generation, before: Generation, after: Generation, excerpt: Excerpt, units: Timeline[Unit]
+def apply_excerpt(
+    full: Generation, before: Generation, after: Generation, excerpt: Excerpt, units: Timeline[Unit]
 ) -> Generation:
     """Return motion with what an excerpt changes.
 
-    whole, before, after : the motion before the change; in the excerpt alone, before and after it
+    full, before, after : the motion before the change; in the excerpt alone, before and after it
     units : the phones in time after the change
-    What an excerpt knows otherwise than the whole, as the mean pose at rest, is in both of its motions and cancels out.
-    Deviations and states stay those of before.
+    What differs between excerpt and recording, as the mean pose at rest, is in both motions of the excerpt and cancels.
+    Deviations and states stay as they were.
     """
-    values, frames, (first, last) = whole.motion.values.copy(), excerpt.frames, excerpt.kept
+    values, frames, (first, last) = full.motion.values.copy(), excerpt.frames, excerpt.unchanged
     changed = values[frames] + (after.motion.values - before.motion.values)
-    clip_at_zero(Motion(changed, whole.motion.rate_hz, whole.motion.channels))
+    clip_at_zero(replace(full.motion, values=changed))
     values[frames] = changed
-    named = whole.units.spans
+    named = full.units.spans
     spans = (*named[:first], *units.spans[first : len(units) - last], *named[len(named) - last :])
-    motion = Motion(values, whole.motion.rate_hz, whole.motion.channels)
-    return replace(whole, motion=motion, units=Timeline(spans))
+    return replace(full, motion=replace(full.motion, values=values), units=Timeline(spans))

@@ -1,4 +1,4 @@
-"""Motion of understood speech: of one of several people, in this person's own units, and what to expect of it."""
+"""Motion of analysed speech: of one of several people, in this person's own units, and what to expect of it."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.curve_edits import bend_through_pins, find_pinned_frame
-from lipmotion.articulation.pauses import rest_in_pauses
-from lipmotion.articulation.symmetry import make_symmetrical
+from lipmotion.articulation.lip_points import make_symmetrical
+from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
-from lipmotion.extensions import provided
+from lipmotion.extensions import load_provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, measure_restfulness, weigh_visemes
+from lipmotion.pipeline.analysis.language import weigh_words
+from lipmotion.pipeline.analysis.read_request import read_lexicon
+from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
+from lipmotion.pipeline.analysis.transcribe import is_other_language
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import lexicon_of
-from lipmotion.pipeline.understand.spoken_language import confidence_of
-from lipmotion.pipeline.understand.transcribe import is_other_language
-from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB, joined_units, placed_units
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
@@ -71,16 +71,16 @@ REACH_FRAMES = 10
 """Frames on both sides of a pin over which a value is reached that motion does not take by itself."""
 
 
-def generation_of(
+def generate_motion(
     request: Request,
     person: SpeakerMap | None,
     model: Model,
-    understood: UnderstoodSpeech,
+    analysis: SpeechAnalysis,
     constraints: Constraints | None = None,
 ) -> Generation:
-    """Return the motion of understood speech, with pauses and asymmetry as asked for, and what to expect of it.
+    """Return the motion of analysed speech, with the pauses and asymmetry of the request, and its outlook.
 
-    person : of ``person_of``
+    person : of ``find_person``
     Raises InputError: a constraint is not usable.
     """
 
@@ -88,16 +88,20 @@ def generation_of(
         pinned_s = [pin.time_s - start_s for pin in constraints.pins] if constraints else []
         if request.onto is None:
             generation = replace(generation, motion=make_symmetrical(generation.motion, request.asymmetry))
-        events = [event.shifted(-start_s) for event in understood.events]
+        events = [event.shifted(-start_s) for event in analysis.events]
         return rest_in_pauses(generation, request.pauses, pinned_s, events)
 
-    paused = generate_for(person, model.engine, model.learned, understood.speech, constraints, finish)
-    speech, fit = understood.speech, understood.fit
+    speech, fit = analysis.speech, analysis.fit
+    generation = generate_for(person, model.engine, model.learned, speech, constraints, finish)
     fits = fit.of_frames(len(speech.features.values)) if fit else 1.0
-    knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits)
-    moods = time_moods(understood.tags, speech.units)
-    told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
-    return replace(told, outlook=outlook_of(request, understood))
+    return replace(
+        generation,
+        moods=time_moods(analysis.tags, speech.units),
+        events=analysis.events,
+        about=model.about,
+        knowledge=SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits),
+        outlook=predict_outlook(request, analysis),
+    )
 
 
 def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
@@ -117,7 +121,7 @@ def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
     return maps.of(speaker)
 
 
-def person_of(model: Model, request: Request) -> SpeakerMap | None:
+def find_person(model: Model, request: Request) -> SpeakerMap | None:
     """Return the map of the motion that a model generates to that of the person of a request; None: it is not mapped.
 
     Raises as ``speaker_map`` and ``map_onto``.
@@ -132,7 +136,7 @@ def person_of(model: Model, request: Request) -> SpeakerMap | None:
         return person
     from lipmotion.motion.transfer_map import compose_maps
 
-    onto = provided("map_onto")(
+    onto = load_provided("map_onto")(
         model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request
     )
     return compose_maps(person, onto)
@@ -173,7 +177,17 @@ def _generate_one(
         return engine.generate(learned, speech, constraints)
     restful = measure_restfulness(speech.units, len(speech.features.values))
     pins = constraints.pins if constraints is not None else ()
-    mean = engine.generate(learned, speech, Constraints(tuple(_mean_pin(person, restful, pin) for pin in pins)))
+
+    def to_mean_person(pin: Pin) -> Pin:
+        """Return a pin in the mean person's units; one that is not possible as it is, for the engine to refuse."""
+        frame = frame_of(pin.time_s, len(restful), FRAME_RATE_HZ)
+        channel = next((channel for channel in person.channels if channel.name == pin.channel), None)
+        if frame is None or channel is None or (is_never_negative(channel) and pin.value < 0):
+            return pin
+        value = float(person.ordered([channel]).to_mean(np.array([[pin.value]]), restful[frame : frame + 1])[0, 0])
+        return replace(pin, value=max(value, 0.0) if is_never_negative(channel) else value)
+
+    mean = engine.generate(learned, speech, Constraints(tuple(map(to_mean_person, pins))))
     fitted = person.ordered(mean.motion.channels)
     visemes = weigh_visemes(speech.units, len(restful))
     values = np.empty_like(mean.motion.values)
@@ -182,14 +196,20 @@ def _generate_one(
         poses = mean.motion.values[block]
         values[block] = fitted.to_person(poses + fitted.shift(poses, visemes[block]), restful[block])
     motion = replace(mean.motion, values=values)
-    held = [(frame_of(pin.time_s, len(values), FRAME_RATE_HZ), motion.column(pin.channel), pin.value) for pin in pins]
-    inside = [(frame, column, value) for frame, column, value in held if frame is not None]
-    bend_through_pins(values, inside, REACH_FRAMES)
+    places = [(frame_of(pin.time_s, len(values), FRAME_RATE_HZ), motion.column(pin.channel), pin.value) for pin in pins]
+    bend_through_pins(
+        values, [(frame, column, value) for frame, column, value in places if frame is not None], REACH_FRAMES
+    )
     clip_at_zero(motion)
-    return replace(mean, motion=motion, spread=_spread(mean.spread, np.square(fitted.gain)))
+    factors, spread = np.square(fitted.gain), mean.spread
+    if isinstance(spread, ReducedVariance):
+        spread = replace(spread, mixing=(spread.mixing * factors).astype(spread.mixing.dtype))
+    else:
+        spread = spread * factors
+    return replace(mean, motion=motion, spread=spread)
 
 
-def explanation_for(person: SpeakerMap | None, explanation: Explanation, speech: Speech) -> Explanation:
+def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech: Speech) -> Explanation:
     """Return an explanation of the mean person's motion with all channels in one person's units.
 
     person : from ``speaker_map``
@@ -204,77 +224,53 @@ def explanation_for(person: SpeakerMap | None, explanation: Explanation, speech:
     added = fitted.to_person(shift, measure_restfulness(speech.units, frames)[frame])[0]
     numbers = {channel.name: number for number, channel in enumerate(channels)}
 
-    def mapped(values: Mapping[str, ChannelValue]) -> dict[str, ChannelValue]:
-        return {name: _value(fitted, added, numbers[name], value) for name, value in values.items()}
+    def map_values(values: Mapping[str, ChannelValue]) -> dict[str, ChannelValue]:
+        result = {}
+        for name, value in values.items():
+            gain = float(fitted.gain[numbers[name]])
+            result[name] = ChannelValue(float(added[numbers[name]]) + gain * value.value, gain * value.deviation)
+        return result
 
     return replace(
         explanation,
-        motion=mapped(explanation.motion),
-        gaussians=tuple(replace(each, channels=mapped(each.channels)) for each in explanation.gaussians),
-        regressions=tuple(replace(each, channels=mapped(each.channels)) for each in explanation.regressions),
+        motion=map_values(explanation.motion),
+        gaussians=tuple(replace(each, channels=map_values(each.channels)) for each in explanation.gaussians),
+        regressions=tuple(replace(each, channels=map_values(each.channels)) for each in explanation.regressions),
     )
 
 
-def _value(person: SpeakerMap, added: NDArray[np.float64], number: int, mean: ChannelValue) -> ChannelValue:
-    gain = float(person.gain[number])
-    return ChannelValue(float(added[number]) + gain * mean.value, gain * mean.deviation)
-
-
-def _mean_pin(person: SpeakerMap, restful: NDArray[np.float64], pin: Pin) -> Pin:
-    """Return a pin in the mean person's units; one that is not possible as it is, for the engine to refuse."""
-    frame = frame_of(pin.time_s, len(restful), FRAME_RATE_HZ)
-    channel = next((channel for channel in person.channels if channel.name == pin.channel), None)
-    if frame is None or channel is None or (is_never_negative(channel) and pin.value < 0):
-        return pin
-    value = float(person.ordered([channel]).to_mean(np.array([[pin.value]]), restful[frame : frame + 1])[0, 0])
-    return replace(pin, value=max(value, 0.0) if is_never_negative(channel) else value)
-
-
-def _spread(
-    spread: NDArray[np.floating[Any]] | ReducedVariance, factors: NDArray[np.float64]
-) -> NDArray[np.floating[Any]] | ReducedVariance:
-    """Return variances of the channels times a factor each."""
-    if isinstance(spread, ReducedVariance):
-        return replace(spread, mixing=(spread.mixing * factors).astype(spread.mixing.dtype))
-    return spread * factors
-
-
-def outlook_of(request: Request, understood: UnderstoodSpeech) -> Outlook:
+def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     """Return what to expect of the motion of some speech."""
-    found, speech = understood.recognition, understood.speech
-    if understood.is_without_speech:
-        return Outlook("no speech", 0.0, None, understood.range_db, ())
-    if found is None:
-        is_used = speech.units_known if understood.fit is None else not understood.fit.is_doubtful
-        words = "given units" if request.units is not None else "transcript" if is_used else "own model"
-        share = understood.fit.share if understood.fit else 1.0
-        if words == "transcript" and (known := _known_share(request, understood)) < 1:
-            words, share = "mapped transcript", share * known
-        return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
-    words = "words" if found.word_s > found.phone_s else "phones"
-    voice = own_model_weight(found.similarity) if found.similarity is not None else None
-    return Outlook(words, confidence_of(found), voice, understood.range_db, _advice(understood))
+    recognition, speech, fit, advice = analysis.recognition, analysis.speech, analysis.fit, _advise(analysis)
+    if analysis.is_without_speech:
+        return Outlook("no speech", 0.0, None, analysis.range_db, ())
+    if recognition is not None:
+        words = "words" if recognition.word_s > recognition.phone_s else "phones"
+        voice = own_model_weight(recognition.similarity) if recognition.similarity is not None else None
+        return Outlook(words, weigh_words(recognition), voice, analysis.range_db, advice)
+    is_used = speech.units_known if fit is None else not fit.is_doubtful
+    words = "given units" if request.units is not None else "transcript" if is_used else "own model"
+    share, known = fit.share if fit else 1.0, 1.0
+    if words == "transcript" and request.language != ENGLISH:
+        known = MAPPED_CONFIDENCE
+    elif words == "transcript":
+        lexicon, labels = read_lexicon(request), [span.label for span in group_words(speech.units) if span.label]
+        known = sum(map(lexicon.known, labels)) / len(labels) if is_other_language(labels, lexicon) else 1.0
+    if known < 1:
+        words, share = "mapped transcript", share * known
+    return Outlook(words, share, 1.0 if words == "own model" else None, analysis.range_db, advice)
 
 
-def _known_share(request: Request, understood: UnderstoodSpeech) -> float:
-    """Return how sure the phones of a transcript are, 0 to 1: 1 for English, less for what is mapped to English."""
-    if request.language != ENGLISH:
-        return MAPPED_CONFIDENCE
-    said, lexicon = [span.label for span in group_words(understood.speech.units)], lexicon_of(request)
-    words = [word for word in said if word]
-    return sum(map(lexicon.known, words)) / len(words) if is_other_language(words, lexicon) else 1.0
-
-
-def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
+def _advise(analysis: SpeechAnalysis) -> tuple[str, ...]:
     """Return what would help, the most helpful first: before all else the words, where they are not sure."""
-    found, advice = understood.recognition, []
-    if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
+    recognition, advice = analysis.recognition, []
+    if analysis.fit is not None and analysis.fit.share < LEAST_FITTING_SHARE:
         advice.append(WHOLE_TRANSCRIPT)
-    if found is not None and confidence_of(found) < SURE_CONFIDENCE:
+    if recognition is not None and weigh_words(recognition) < SURE_CONFIDENCE:
         advice.append(TRANSCRIPT)
-    if understood.range_db < NOISY_DB:
+    if analysis.range_db < NOISY_DB:
         advice.append(LESS_NOISE)
-    if found is not None and (found.similarity is None or found.similarity < FULL_WEIGHT_SCORE):
+    if recognition is not None and (recognition.similarity is None or recognition.similarity < FULL_WEIGHT_SCORE):
         advice.append(OWN_MODEL)
     return tuple(advice)
 
@@ -293,12 +289,29 @@ def generate_passages(
     Raises InputError: as ``generate``, with the time of the passage.
     """
     frames, parts = len(speech.features.values), speech.parts or ()
-    rest = finish(generate(_silent_speech(speech), Constraints()), -NOWHERE_S)
-    made = [_generate_passage(generate, part, speech.times_given, pins, finish) for part in parts]
+    rest, made = finish(generate(_silent_speech(speech), Constraints()), -NOWHERE_S), []
+    for part in parts:
+        start_s = part.first / FRAME_RATE_HZ
+        inside = [pin for pin in pins if part.inside.start <= round(pin.time_s * FRAME_RATE_HZ) < part.inside.stop]
+        shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - start_s) for pin in inside))
+        try:
+            generation = generate(replace(part.speech, times_given=speech.times_given), shifted)
+        except InputError as error:
+            raise InputError(f"{error} (in the passage that begins at {start_s:.2f} s)") from error
+        spans = list(generation.units)
+        spans[0] = replace(spans[0], start_s=-LONG_SILENCE_S)
+        spans[-1] = replace(spans[-1], end_s=spans[-1].end_s + LONG_SILENCE_S)
+        finished = finish(replace(generation, units=Timeline(tuple(spans))), start_s)
+        made.append(replace(finished, units=generation.units))
     dtype = np.dtype(np.float32) if frames > DOUBLE_FRAMES else rest.motion.values.dtype
-    values = _join_rows(parts, [each.motion.values for each in made], rest.motion.values, np.empty((frames, 0), dtype))
-    values = np.require(values, None, "W")
-    spread = _join_spread(parts, made, rest, np.empty((frames, 0), dtype))
+    like = np.empty((frames, 0), dtype)
+    values = np.require(_join_rows(parts, [each.motion.values for each in made], rest.motion.values, like), None, "W")
+    spread: Any
+    if isinstance(rest.spread, ReducedVariance):
+        rows = [each.spread.reduced for each in made if isinstance(each.spread, ReducedVariance)]
+        spread = replace(rest.spread, reduced=_join_rows(parts, rows, rest.spread.reduced, like))
+    else:
+        spread = _join_rows(parts, [each.variance for each in made], rest.variance, like)
     motion = replace(rest.motion, values=values)
     held = [(find_pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
     bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest
@@ -321,28 +334,8 @@ def _silent_speech(speech: Speech) -> Speech:
         None if speech.log_f0 is None else np.full(REST_FRAMES, np.nan, np.float32),
         spectrum=None if speech.spectrum is None else np.zeros((REST_FRAMES, speech.spectrum.shape[1]), np.float32),
         posteriors=None if said is None else replace(said, values=np.repeat(said.values[:1], REST_FRAMES // 2, axis=0)),
+        encoding=None if speech.encoding is None else np.zeros((REST_FRAMES, speech.encoding.shape[1]), np.float16),
     )
-
-
-def _generate_passage(
-    generate: Callable[[Speech, Constraints], Generation],
-    part: SpeechPart,
-    times_given: bool,
-    pins: Sequence[Pin],
-    finish: Callable[[Generation, float], Generation],
-) -> Generation:
-    """Return the motion of a passage, with the pins that lie in it."""
-    start_s = part.first / FRAME_RATE_HZ
-    inside = [pin for pin in pins if part.inside.start <= round(pin.time_s * FRAME_RATE_HZ) < part.inside.stop]
-    shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - start_s) for pin in inside))
-    try:
-        generation = generate(replace(part.speech, times_given=times_given), shifted)
-    except InputError as error:
-        raise InputError(f"{error} (in the passage that begins at {start_s:.2f} s)") from error
-    spans = list(generation.units)
-    spans[0] = replace(spans[0], start_s=-LONG_SILENCE_S)
-    spans[-1] = replace(spans[-1], end_s=spans[-1].end_s + LONG_SILENCE_S)
-    return replace(finish(replace(generation, units=Timeline(tuple(spans))), start_s), units=generation.units)
 
 
 def _join_rows(
@@ -361,8 +354,8 @@ def _join_rows(
     still = rest.mean(axis=0)
     if not parts:
         return np.broadcast_to(still.astype(like.dtype), (len(like), len(still)))
-    whole = np.empty((len(like), len(still)), like.dtype)
-    whole[:] = still
+    joined = np.empty((len(like), len(still)), like.dtype)
+    joined[:] = still
     ramp = (1 - np.cos(np.pi * np.arange(1, RAMP_FRAMES + 1) / (RAMP_FRAMES + 1))) / 2
     edges = [-NOWHERE_S, *(edge for part in parts for edge in (part.first, part.first + part.frames)), NOWHERE_S]
     rooms = [after - before >= 2 * RAMP_FRAMES for before, after in zip(edges[::2], edges[1::2], strict=True)]
@@ -373,18 +366,8 @@ def _join_rows(
         moved[-RAMP_FRAMES:] *= ramp[::-1, None]
         start = part.first - lead
         first, end = max(start, 0), min(start + len(moved), len(like))
-        whole[first:end] += moved[first - start : end - start]
-    return whole
-
-
-def _join_spread(
-    parts: Sequence[SpeechPart], made: Sequence[Generation], rest: Generation, like: NDArray[np.floating[Any]]
-) -> Any:
-    """Return the variances of all passages in their places; they are kept reduced where those of the rest are."""
-    if not isinstance(rest.spread, ReducedVariance):
-        return _join_rows(parts, [each.variance for each in made], rest.variance, like)
-    reduced = [each.spread.reduced for each in made if isinstance(each.spread, ReducedVariance)]
-    return replace(rest.spread, reduced=_join_rows(parts, reduced, rest.spread.reduced, like))
+        joined[first:end] += moved[first - start : end - start]
+    return joined
 
 
 def _join_traces(parts: Sequence[SpeechPart], made: Sequence[Generation], rest: Generation, frames: int) -> StateTrace:

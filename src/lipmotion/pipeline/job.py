@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError
-from lipmotion.extensions import provided
-from lipmotion.pipeline.request import Outputs, Request, located
+from lipmotion.extensions import load_provided
+from lipmotion.pipeline.request import Outputs, Request, locate_paths
 from lipmotion.storage.json_text import read_toml
 from lipmotion.types.configuration import Configuration, option
 from lipmotion.types.delivery import Delivery
@@ -66,8 +66,8 @@ class Job(Configuration):
     def at(self, folder: Path) -> Job:
         """Return the same job with paths that begin at a folder."""
         files = [file if file == "-" else f"{folder / file}{'/' * file.endswith('/')}" for file in self.outputs.files]
-        outputs = replace(located(self.outputs, folder), files=tuple(files))
-        return replace(self, request=located(self.request, folder), outputs=outputs)
+        outputs = replace(locate_paths(self.outputs, folder), files=tuple(files))
+        return replace(self, request=locate_paths(self.request, folder), outputs=outputs)
 
     def run(self, *, workers: int = 1) -> Generation:
         """Animate the recording and write the files, as ``lipmotion animate``; return the motion. As ``run``."""
@@ -78,9 +78,7 @@ DETAILS = {
     "film": Job(),
     "game": Job(outputs=Outputs(rate_hz=30.0), delivery=Delivery(key_tolerance=0.01)),
     "mobile": Job(
-        outputs=Outputs(rate_hz=30.0),
-        delivery=Delivery(key_tolerance=0.04),
-        staging=Staging(gaze=False, brows=False),
+        outputs=Outputs(rate_hz=30.0), delivery=Delivery(key_tolerance=0.04), staging=Staging(gaze=False, brows=False)
     ),
 }
 """Levels of detail, and the options that each sets; what each loses: docs/controls.md."""
@@ -106,12 +104,12 @@ def run(  # noqa: PLR0913
     workers      : as of ``animate``
     Raises InputError, ExportError and more: as ``animate`` and ``write``, or there is no recording.
     """
+    from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import edit_file
     from lipmotion.pipeline.generate.explain import chain_posteriors
     from lipmotion.pipeline.generate.posteriors import check_picture, write_posteriors
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.curve_sets import curve_names
-    from lipmotion.pipeline.understand.read_request import read_request
 
     # What cannot be written is refused before the long work.
     edits, recording, picture = edit_file(job.request.edits), job.request.recording, job.outputs.posteriors
@@ -126,18 +124,18 @@ def run(  # noqa: PLR0913
     if request.onto is None:
         request = replace(request, onto=face.other_person(model, job.request.speaker))
 
-    curves = curves_of(job.outputs, face)
+    curves = choose_curves(job.outputs, face)
     session = edits.session(
         request,
         model=model,
         workers=workers,
         monitor=sub_monitor(monitor, 0.0, RECOGNITION if draws else 1.0),
-        meanwhile=face.load if draws else None,
+        background=face.load if draws else None,
         curves=curve_names(curves) if curves else (),
     )
     if picture:
         write_posteriors(picture, *chain_posteriors(session, edits.edits))
-    generation = session.generated(edits.edits)
+    generation = session.generate(edits.edits)
 
     of_writing = sub_monitor(monitor, RECOGNITION, 1.0)
     write_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=of_writing)
@@ -155,7 +153,9 @@ def open_face(outputs: Outputs) -> ShownFace:
         check_curve_set(outputs.curves)
     if outputs.character is None and (outputs.lip_points or outputs.binding or outputs.control_points):
         raise InputError("lip points and bindings belong to a character; name it: --character FILE")
-    face: ShownFace = provided("shown_face")(outputs.face if outputs.character is None else open_character(outputs))
+    face: ShownFace = load_provided("shown_face")(
+        outputs.face if outputs.character is None else open_character(outputs)
+    )
     return face
 
 
@@ -171,7 +171,7 @@ def open_character(outputs: Outputs) -> DrivenCharacter:
     )
 
 
-def curves_of(outputs: Outputs, face: ShownFace) -> str | DrivenCharacter | None:
+def choose_curves(outputs: Outputs, face: ShownFace) -> str | DrivenCharacter | None:
     """Return what motion files hold instead of the motion: a set, or a character with blendshapes; None: nothing."""
     character = face.character if outputs.character is not None else None
     return outputs.curves or (character if character is not None and character.shapes is not None else None)
@@ -188,7 +188,7 @@ def output_settings(job: Job, face: ShownFace, speech: str | Path | Audio | None
     if outputs.background and not face.has_own_background:
         staging, outputs = replace(staging, background=str(outputs.background)), replace(outputs, background=None)
     recording = Path(speech) if isinstance(speech, str | Path) else None
-    curves = curves_of(outputs, face)
+    curves = choose_curves(outputs, face)
     return OutputSettings(face, recording, recording is None, outputs, curves, staging, job.delivery)
 
 
@@ -197,9 +197,9 @@ def check_outputs(job: Job, face: ShownFace, speech: str | Path | Audio | None =
 
     speech : as of ``output_settings``
     """
-    from lipmotion.pipeline.outputs.output import checked_outputs
+    from lipmotion.pipeline.outputs.output import create_outputs
 
-    return checked_outputs(job.outputs.files, output_settings(job, face, speech))
+    return create_outputs(job.outputs.files, output_settings(job, face, speech))
 
 
 def write_outputs(
@@ -217,7 +217,7 @@ def write_outputs(
     speech, model, temporary : as of ``write``
     """
     from lipmotion.pipeline.outputs.motion_files import with_articulation
-    from lipmotion.pipeline.outputs.output import checked_outputs
+    from lipmotion.pipeline.outputs.output import create_outputs
     from lipmotion.pipeline.outputs.write import write_planned
     from lipmotion.types import Audio
 
@@ -226,7 +226,7 @@ def write_outputs(
     settings = replace(output_settings(job, face, speech), sounded=isinstance(speech, Audio))
     write_planned(
         generation,
-        checked_outputs(job.outputs.files, settings),
+        create_outputs(job.outputs.files, settings),
         settings,
         sound=speech if isinstance(speech, Audio) else None,
         model=model,

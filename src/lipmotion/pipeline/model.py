@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -53,14 +53,18 @@ class Model:
     ('trajectory', 'geometry', True)
     """
 
-    phones: UnitHmm = field(repr=False)
+    phones: UnitHmm
     engine: Engine[Any]
-    learned: Any = field(repr=False)
+    learned: Any
     about: Mapping[str, Any]
-    adaptation: Adaptation | None = field(default=None, repr=False)
-    eigenlips: Eigenlips | None = field(default=None, repr=False)
-    prior: Model | None = field(default=None, repr=False)
-    speakers: SpeakerMaps | None = field(default=None, repr=False)
+    adaptation: Adaptation | None = None
+    eigenlips: Eigenlips | None = None
+    prior: Model | None = None
+    speakers: SpeakerMaps | None = None
+
+    def __repr__(self) -> str:
+        size = f"{self.about.get('utterances', '?')} utterances, {self.about.get('minutes', '?')} minutes"
+        return f"Model({self.engine.name}, {self.visual}, {size}, format version {VERSION})"
 
     @property
     def visual(self) -> str:
@@ -80,23 +84,19 @@ def save_model(model: Model, path: str | Path) -> None:
     ...     lipmotion.load_model(Path(folder) / "copy.lipmotion").engine.name
     'trajectory'
     """
-    arrays = {f"phones/{key}": array for key, array in hmm_to_arrays(model.phones).items()}
-    arrays |= {f"engine/{key}": array for key, array in model.engine.to_arrays(model.learned).items()}
-    if model.adaptation is not None:
-        arrays |= {f"adaptation/{key}": array for key, array in adaptation_arrays(model.adaptation).items()}
-    if model.eigenlips is not None:
-        arrays |= {f"eigenlips/{key}": array for key, array in eigenlips_to_arrays(model.eigenlips).items()}
-    if model.speakers is not None:
-        arrays |= {f"speakers/{key}": array for key, array in speakers_to_arrays(model.speakers).items()}
-    header = {
-        "format": FORMAT,
-        "version": VERSION,
-        **_engine_header(model),
-        "recogniser": model.phones.config.as_mapping(),
+    parts: dict[str, Mapping[str, NDArray[Any]]] = {
+        "phones": hmm_to_arrays(model.phones),
+        "engine": model.engine.to_arrays(model.learned),
+        "adaptation": adaptation_arrays(model.adaptation) if model.adaptation is not None else {},
+        "eigenlips": eigenlips_to_arrays(model.eigenlips) if model.eigenlips is not None else {},
+        "speakers": speakers_to_arrays(model.speakers) if model.speakers is not None else {},
+        "prior": model.prior.engine.to_arrays(model.prior.learned) if model.prior is not None else {},
     }
+    config = model.phones.config.as_mapping()
+    header = {"format": FORMAT, "version": VERSION, **_engine_header(model), "recogniser": config}
     if model.prior is not None:
         header["prior"] = _engine_header(model.prior)
-        arrays |= {f"prior/{key}": array for key, array in model.prior.engine.to_arrays(model.prior.learned).items()}
+    arrays = {f"{part}/{key}": array for part, inner in parts.items() for key, array in inner.items()}
     write_archive(Path(path), header, arrays)
 
 
@@ -116,8 +116,10 @@ def load_model(path: str | Path | None = None) -> Model:
     >>> lipmotion.load_model().about["licence"]
     ['CC BY 4.0']
     """
+    if path is None and not shipped_path().is_file():
+        raise ModelFormatError("the package holds no model; install it again, or give one with --model")
     if path is None:
-        return _shipped()
+        return _read_shipped()
     path = Path(path)
     if not path.is_file():
         raise InputError(
@@ -153,9 +155,7 @@ def shipped_path() -> Path:
 
 
 @cache
-def _shipped() -> Model:
-    if not shipped_path().is_file():
-        raise ModelFormatError("the package holds no model; install it again, or give one with --model")
+def _read_shipped() -> Model:
     return _read(shipped_path())
 
 
@@ -172,7 +172,7 @@ def _read(path: Path) -> Model:
         for folder in _FOLDERS:
             arrays[folder] = arrays_under(stored, f"{folder}/")
         refuse_undeclared(stored, (f"{folder}/{key}" for folder, inner in arrays.items() for key in inner))
-        engine = _engine(header)
+        engine = engine_named(header["engine"], _options(header, "configuration"), stored=True)
         config = HmmConfig.parsed(_options(header, "recogniser"))
         phones = hmm_from_arrays(arrays["phones"], config)
         if phones.mixtures.size[2] != FEATURES:
@@ -180,7 +180,14 @@ def _read(path: Path) -> Model:
         learned = engine.from_arrays(arrays["engine"])
         adaptation = adaptation_from_arrays(arrays["adaptation"]) if arrays["adaptation"] else None
         eigenlips = eigenlips_from_arrays(arrays["eigenlips"]) if arrays["eigenlips"] else None
-        prior = _prior(header, phones, arrays["prior"])
+        if arrays["prior"] and "prior" not in header:
+            raise ValueError("arrays of another model, which the header does not name")
+        prior = None
+        if "prior" in header:
+            inner = _options(header, "prior")
+            below = engine_named(inner["engine"], _options(inner, "configuration"), stored=True)
+            about = {key: value for key, value in inner.items() if key not in _OWN_KEYS}
+            prior = Model(phones, below, below.from_arrays(arrays["prior"]), about)
         speakers = speakers_from_arrays(arrays["speakers"]) if arrays["speakers"] else None
     except ModelFormatError as error:
         raise ModelFormatError(f"{path}: {error}") from error
@@ -192,27 +199,7 @@ def _read(path: Path) -> Model:
     return Model(phones, engine, learned, about, adaptation, eigenlips, prior, speakers)
 
 
-def _engine(header: Mapping[str, Any]) -> Engine[Any]:
-    """Return the engine that a header names. Raises KeyError, TypeError, InputError: it names none."""
-    return engine_named(header["engine"], _options(header, "configuration"), stored=True)
-
-
-def _prior(header: Mapping[str, Any], phones: UnitHmm, arrays: Mapping[str, NDArray[Any]]) -> Model | None:
-    """Return the model on which a model stands, or None. Raises as ``_engine`` and the engine's ``from_arrays``."""
-    if "prior" not in header:
-        if arrays:
-            raise ValueError("arrays of another model, which the header does not name")
-        return None
-    inner = header["prior"]
-    if not isinstance(inner, dict):
-        raise TypeError(f"prior is {inner!r}, required a header")
-    engine = _engine(inner)
-    about = {key: value for key, value in inner.items() if key not in _OWN_KEYS}
-    return Model(phones, engine, engine.from_arrays(arrays), about)
-
-
 def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    """Return the options of a configuration in a header. Raises KeyError, TypeError: the header has none."""
     options: Any = header[key]
     if not isinstance(options, dict):
         raise TypeError(f"{key} is {options!r}, required options by name")
@@ -263,12 +250,12 @@ def with_prior(prior: Model | None, speech: Speech) -> Speech:
     if speech.parts is not None:
         parts = tuple(part._replace(speech=with_prior(prior, part.speech)) for part in speech.parts)
         speech = replace(speech, parts=parts)
-    whole = speech.with_arrays()
-    motion = prior.engine.without_closures().generate(prior.learned, whole).motion
+    speech_arrays = speech.with_arrays()
+    motion = prior.engine.without_closures().generate(prior.learned, speech_arrays).motion
     measured = measure_articulators(motion.values, motion.names)
     chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]
     steps = len(motion.values[::STEP])
     nothing = np.zeros((steps, 0), np.float32), np.zeros(steps)
-    hidden, distortion = prior.engine.hidden(prior.learned, whole) or nothing
+    hidden, distortion = prior.engine.hidden(prior.learned, speech_arrays) or nothing
     articulators = np.stack(chosen, axis=1) if chosen else np.zeros((steps, 0))
     return replace(speech, prior=PriorOutput(articulators, hidden, distortion))

@@ -11,8 +11,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
 
-from lipmotion.errors import InputError, shortened
-from lipmotion.extensions import provided
+from lipmotion.errors import InputError, shorten
+from lipmotion.extensions import load_provided
 from lipmotion.storage.sources import is_file
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
@@ -38,10 +38,10 @@ RATE = Rule(1, most=1000, unit=" a second")
 """Frame rates of a file; a mistyped rate must not fill the memory."""
 
 
-def _file(reads: str, metavar: str, says: str, **told: Any) -> Any:
+def _file(reads: str, metavar: str, help: str, **more: Any) -> Any:
     """Return the option of a file that is read, None where there is none; ``reads``: what it is, in messages."""
-    told |= {"metavar": metavar} if metavar else {}
-    return option(None, kind=Path, reads=reads, help=says, **told)
+    more |= {"metavar": metavar} if metavar else {}
+    return option(None, kind=Path, reads=reads, help=help, **more)
 
 
 def _shipped() -> Path:
@@ -191,14 +191,14 @@ class Request(Configuration):
 
             for span in self.units:
                 if not isinstance(span.label, Unit):
-                    raise InputError(f"a unit is {shortened(repr(span.label))}, required a Unit: Unit('p')")
+                    raise InputError(f"a unit is {shorten(repr(span.label))}, required a Unit: Unit('p')")
 
 
 SpeechInput: TypeAlias = "str | Path | Audio | Request"
 """A recording alone, or a request."""
 
 
-def request_of(
+def as_request(
     speech: SpeechInput, transcript: str | Path | TimedTranscript | None = None, language: str | None = None
 ) -> Request:
     """Return a request for a recording, or the given request; with the transcript and the language that are given.
@@ -317,14 +317,15 @@ class Outputs(Configuration):
         return self.fps if self.rate_hz is None else self.rate_hz
 
 
-def located(part: PartT, folder: Path) -> PartT:
+def locate_paths(part: PartT, folder: Path) -> PartT:
     """Return a part with paths that begin at a folder; a text that is no file there, or folder of drawings, stays."""
-    found: dict[str, Any] = {}
+    changed: dict[str, Any] = {}
     for each in fields(part):
         value = getattr(part, each.name)
         if isinstance(value, Path) and str(value) != "-":
-            found[each.name] = folder / value
-        elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves"):
-            is_read = is_file(folder / value) or (each.name == "face" and provided("is_drawings")(value, folder))
-            found |= {each.name: str(folder / value)} if is_read else {}
-    return replace(part, **found)
+            changed[each.name] = folder / value
+        elif not isinstance(value, str) or ("reads" not in each.metadata and each.name != "curves"):
+            continue
+        elif is_file(folder / value) or (each.name == "face" and load_provided("is_drawings")(value, folder)):
+            changed[each.name] = str(folder / value)
+    return replace(part, **changed)

@@ -26,11 +26,11 @@ ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 
 
-def process_count(given: int | None) -> int:
+def process_count(count: int | None) -> int:
     """Return how many processes share the work; None: one a core. Raises InputError: fewer than one."""
-    if given is not None and given < 1:
-        raise InputError(f"{given} processes, required 1 or more; leave the number out for one a core")
-    return given or os.cpu_count() or 1
+    if count is not None and count < 1:
+        raise InputError(f"{count} processes, required 1 or more; leave the number out for one a core")
+    return count or os.cpu_count() or 1
 
 
 class Workers:
@@ -48,7 +48,18 @@ class Workers:
 
         Raises CorpusError: a process died.
         """
-        return _ordered(self._numbered(function, items))
+        numbered = self._numbered(function, items)
+
+        def in_order() -> Iterator[ResultT]:
+            waiting: dict[int, ResultT] = {}
+            following = 0
+            for number, result in numbered:
+                waiting[number] = result
+                while following in waiting:
+                    yield waiting.pop(following)
+                    following += 1
+
+        return in_order()
 
     def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
         """Yield the results in the order in which they are ready. Raises CorpusError: a process died."""
@@ -61,14 +72,21 @@ class Workers:
 
         def send_next(end: Any) -> None:
             for number, item in islice(remaining, 1):
-                _send(end, (function, item))
+                try:
+                    end.send((function, item))
+                except OSError as error:
+                    raise CorpusError(DIED) from error
                 busy[end] = number
 
         def results() -> Iterator[tuple[int, ResultT]]:
             while busy:
+                end: Any
                 for end in pipes.wait(list(busy)):
                     number = busy.pop(end)
-                    succeeded, result = _received(end)
+                    try:
+                        succeeded, result = end.recv()
+                    except (EOFError, OSError) as error:
+                        raise CorpusError(DIED) from error
                     send_next(end)
                     if not succeeded:
                         raise result
@@ -79,62 +97,65 @@ class Workers:
         return results()
 
 
-def _ordered(numbered: Iterator[tuple[int, ResultT]]) -> Iterator[ResultT]:
-    waiting: dict[int, ResultT] = {}
-    following = 0
-    for number, result in numbered:
-        waiting[number] = result
-        while following in waiting:
-            yield waiting.pop(following)
-            following += 1
-
-
 @contextmanager
 def worker_pool(count: int) -> Iterator[Workers]:
     """Provide ``count`` workers; their processes end when the block is left, immediately if by an exception.
 
     Matrix products use one thread inside the block and in every worker, so that results do not depend on ``count``.
     """
+    context = multiprocessing.get_context("spawn")
+
+    @contextmanager
+    def start_worker() -> Iterator[Any]:
+        here, there = context.Pipe()
+        process = context.Process(target=_work, args=(there,), daemon=True)
+        try:
+            with _signals_delayed():
+                process.start()
+            there.close()  # the process alone has it: when it ends, so does the pipe
+            yield here
+        except BaseException:
+            if process.pid is not None:
+                process.kill()
+            raise
+        finally:
+            here.close()  # tells the worker to end
+            if process.pid is not None:
+                process.join()
+
     with one_thread(), ExitStack() as stack:
-        if count <= 1:
-            yield Workers(())
-            return
-        yield Workers([stack.enter_context(_worker()) for _ in range(count)])
+        yield Workers([stack.enter_context(start_worker()) for _ in range(count if count > 1 else 0)])
 
 
-def map_in_processes(count: int, meanwhile: Callable[[], None] | None = None) -> ParallelMap:
+def map_in_processes(count: int, background: Callable[[], None] | None = None) -> ParallelMap:
     """Return a map whose calls start up to ``count`` processes, and end them; of one item or none, no process.
 
     The processes begin with the first items when the map is called: the caller can work beside them, and then take the
     results.
-    meanwhile : is called once, where processes have begun, before the first result is waited for
+    background : is called once, where processes work, before the first result is waited for
     """
-
     count = process_count(count)
+
+    def start(processes: int, function: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
+        """Yield None when the processes have begun with the first items, then the results."""
+        with worker_pool(processes) as team:
+            results = team.ordered_map(function, items)
+            yield None
+            if background is not None and processes > 1:
+                background()
+            yield from results
 
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         waiting = iter(items)
         first = list(islice(waiting, count))
-        results = _begun(len(first), function, chain(first, waiting), meanwhile)
+        results = start(len(first), function, chain(first, waiting))
         next(results)
         return results
 
     return each
 
 
-def _begun(
-    count: int, function: Callable[[Any], Any], items: Iterable[Any], meanwhile: Callable[[], None] | None
-) -> Iterator[Any]:
-    """Yield None when ``count`` processes have begun with the first items, then the results."""
-    with worker_pool(count) as team:
-        results = team.ordered_map(function, items)
-        yield None
-        if meanwhile is not None and count > 1:
-            meanwhile()
-        yield from results
-
-
-def begun_apart(
+def start_process(
     function: Callable[[ItemT, Callable[[Any], None]], None], item: ItemT
 ) -> tuple[BaseProcess, pipes.Connection[Any, Any]]:
     """Begin work in a process of its own, which may start workers; return the process, and the end of its pipe.
@@ -157,50 +178,10 @@ def _apart(end: Any, function: Callable[[Any, Callable[[Any], None]], None], ite
     function(item, end.send)
 
 
-@contextmanager
-def _worker() -> Iterator[Any]:
-    """Start a worker process; provide this process's end of the pipe to it."""
-    context = multiprocessing.get_context("spawn")
-    here, there = context.Pipe()
-    process = context.Process(target=_work, args=(there,), daemon=True)
-    try:
-        with _signals_delayed():
-            process.start()
-        there.close()  # the process alone has it: when it ends, so does the pipe
-        yield here
-    except BaseException:
-        _kill(process)
-        raise
-    finally:
-        here.close()  # tells the worker to end
-        if process.pid is not None:
-            process.join()
-
-
-def _kill(process: BaseProcess) -> None:
-    if process.pid is not None:
-        process.kill()
-
-
-def _send(end: Any, work: Any) -> None:
-    try:
-        end.send(work)
-    except OSError as error:
-        raise _died() from error
-
-
-def _received(end: Any) -> Any:
-    try:
-        return end.recv()
-    except (EOFError, OSError) as error:
-        raise _died() from error
-
-
-def _died() -> CorpusError:
-    return CorpusError(
-        "a worker process died (out of memory? or a script that does this outside of "
-        '`if __name__ == "__main__":`); what is finished is kept: run it again, with fewer workers'
-    )
+DIED = (
+    "a worker process died (out of memory? or a script that does this outside of "
+    '`if __name__ == "__main__":`); what is finished is kept: run it again, with fewer workers'
+)
 
 
 @contextmanager
@@ -219,7 +200,12 @@ def _signals_delayed() -> Iterator[None]:
     resource_tracker.ensure_running()  # else it starts with the first process, and unblocks the signals
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     received: list[int] = []
-    handlers = _handled_by(lambda number, _: received.append(number))
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():  # no other thread may set handlers
+        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        handlers = {number: handler for number, handler in handlers.items() if handler not in (None, signal.SIG_IGN)}
+    for number in handlers:
+        signal.signal(number, lambda received_number, _: received.append(received_number))
     try:
         yield
     finally:
@@ -228,20 +214,6 @@ def _signals_delayed() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         for number in received[:1]:
             signal.raise_signal(number)
-
-
-def _handled_by(handler: Callable[[int, Any], None]) -> dict[int, Any]:
-    """Set the handler of the signals that are not ignored, and return the previous handlers.
-
-    Only the main thread may do so; in other threads, nothing changes.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        return {}
-    old: dict[int, Any] = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    old = {number: previous for number, previous in old.items() if previous not in (None, signal.SIG_IGN)}
-    for number in old:
-        signal.signal(number, handler)
-    return old
 
 
 def _work(end: Any) -> None:
@@ -263,12 +235,11 @@ def _work(end: Any) -> None:
 def _begin_below() -> None:
     """Leave Ctrl-C to the process that started this one, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be delayed
-    threading.Thread(target=_end_with_parent, daemon=True).start()
 
+    def end_with_parent() -> None:
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            parent.join()
+        os._exit(1)
 
-def _end_with_parent() -> None:
-    """Wait until the parent process ends, and end this process."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-    os._exit(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.printable import printable
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 
 Context = tuple[str, ...]
 """The names that a state depends on, one for each position: left neighbour, unit, right neighbour."""
@@ -240,7 +240,7 @@ TREES = {
 
 def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
     """Deserialise trees, by name. Raises KeyError, ValueError: something is missing or inconsistent."""
-    stored = checked_arrays(arrays, TREES)
+    stored = check_arrays(arrays, TREES)
     questions = tuple(
         Question(_STORED_POSITIONS.index(position), name, frozenset(members.split()))
         for position, name, members in stored["questions"].tolist()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 
 HEADER, ARRAY = "header.json", ".npy"
@@ -40,7 +40,7 @@ def write_archive(
 ) -> None:
     """Write an archive, whole or not at all. Raises ExportError: it cannot be written."""
     method = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
-    with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
+    with atomic_file(path) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
         file.writestr(_member(HEADER, method), as_json(header, indent=1, ensure_ascii=False).encode())
         for name, array in sorted(arrays.items()):
             with file.open(_member(f"{name}{ARRAY}", method), "w", force_zip64=array.nbytes >= ZIP64_BYTES) as member:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -15,8 +14,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.frame_groups import FrameGroups
-from lipmotion.storage.media import MOST_PIXELS, bound_allocations, x264_instructions
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.media import MAX_PIXELS, bound_allocations, x264_instructions
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 
 Pictures = NDArray[np.uint8]
 Stream = NDArray[np.uint8]
@@ -29,9 +28,9 @@ GROUP = 8
 """Frames of a stored video that are decoded together."""
 PICTURE_GROUP = 250
 """Pictures of a stack, all of which are decoded at once, that are coded together at most."""
-MOST_FRAMES = 100_000
+MAX_FRAMES = 100_000
 """Most frames of a stored video: an hour."""
-MOST_PICTURE_BYTES = 1 << 29
+MAX_PICTURE_BYTES = 1 << 29
 """Most bytes of a stack of decoded pictures."""
 _BT601, _LIMITED_RANGE = 5, 1
 _DELIMITER, _PARAMETERS = 9, 7
@@ -58,8 +57,8 @@ class StoredVideo:
     def __post_init__(self) -> None:
         with format_errors("the stored video", _REMEDY):
             found = len(self._layout[0]) - 1
-            if found != self.count or not 1 <= self.count <= MOST_FRAMES:
-                raise ValueError(f"{found} frames, required {self.count}, at least 1 and at most {MOST_FRAMES}")
+            if found != self.count or not 1 <= self.count <= MAX_FRAMES:
+                raise ValueError(f"{found} frames, required {self.count}, at least 1 and at most {MAX_FRAMES}")
 
     def __len__(self) -> int:
         return self.count
@@ -124,8 +123,8 @@ def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
     """
     if pictures.ndim != 4 or not len(pictures):
         raise InputError(f"pictures of shape {pictures.shape}, required (N, H, W, 3), at least one")
-    if pictures.nbytes > MOST_PICTURE_BYTES:
-        raise InputError(f"pictures of {pictures.nbytes} bytes, required at most {MOST_PICTURE_BYTES}; give fewer")
+    if pictures.nbytes > MAX_PICTURE_BYTES:
+        raise InputError(f"pictures of {pictures.nbytes} bytes, required at most {MAX_PICTURE_BYTES}; give fewer")
     return np.frombuffer(b"".join(_encode(pictures, crf, PICTURE_GROUP, "yuv444p")), np.uint8)
 
 
@@ -136,7 +135,7 @@ def decode_pictures(data: Stream) -> Pictures:
         decoded = _decode(data, begins, None)
         first = next(decoded, None)
         count = len(begins) - 1
-        if first is None or count * first.nbytes > MOST_PICTURE_BYTES:
+        if first is None or count * first.nbytes > MAX_PICTURE_BYTES:
             raise ValueError(f"{count} pictures of {first.nbytes if first is not None else 0} bytes")
         pictures = np.empty((count, *first.shape), np.uint8)
         found = 0
@@ -150,7 +149,7 @@ def decode_pictures(data: Stream) -> Pictures:
         return pictures
 
 
-def stored_video_arrays(video: StoredVideo) -> dict[str, NDArray[Any]]:
+def stored_video_to_arrays(video: StoredVideo) -> dict[str, NDArray[Any]]:
     """Serialise a video."""
     return {
         "data": video.data,
@@ -164,10 +163,10 @@ def stored_video_from_arrays(arrays: Arrays) -> StoredVideo:
     """Deserialise a video. Raises ModelFormatError: an array is missing, unknown, or has a wrong shape or range."""
     with format_errors("the stored video", _REMEDY):
         refuse_undeclared(arrays, STORED_VIDEO)
-        stored = checked_arrays(arrays, STORED_VIDEO)
+        stored = check_arrays(arrays, STORED_VIDEO)
         height, width = stored["size"].tolist()
-        if height * width > MOST_PIXELS:
-            raise ValueError(f"frames of {width} × {height} pixels, required at most {MOST_PIXELS} in all")
+        if height * width > MAX_PIXELS:
+            raise ValueError(f"frames of {width} × {height} pixels, required at most {MAX_PIXELS} in all")
         return StoredVideo(stored["data"], float(stored["rate_hz"]), (height, width), int(stored["count"]))
 
 
@@ -175,7 +174,7 @@ STORED_VIDEO = {
     "data": ArraySpec(np.uint8, "B", 0, 255),
     "rate_hz": ArraySpec(np.float64, "", 1, 1000),
     "size": ArraySpec(np.intp, "2", 1, 10_000),
-    "count": ArraySpec(np.intp, "", 1, MOST_FRAMES),
+    "count": ArraySpec(np.intp, "", 1, MAX_FRAMES),
 }
 """The arrays of a stored video."""
 
@@ -193,22 +192,20 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
     for n, frame in enumerate(frames):
         if context is None:
             shape = frame.shape
-            _check_picture(frame)
+            if frame.ndim != 3 or shape[2] != 3 or not frame.size:
+                raise InputError(f"a picture of shape {shape}, required (H, W, 3)")
+            if shape[0] * shape[1] > MAX_PIXELS:
+                raise InputError(f"a picture of shape {shape}, required at most {MAX_PIXELS} pixels; scale the video")
             context = _encoder(shape, crf, group, pixel_format)
         if frame.shape != shape or frame.dtype != np.uint8:
             raise InputError(f"frame {n} is {frame.dtype} {frame.shape}, required uint8 {shape} as the first")
-        picture = av.VideoFrame.from_ndarray(_padded(frame, context.height, context.width), format="rgb24")
+        rest = (context.height - shape[0], context.width - shape[1])
+        padded = np.pad(frame, ((0, rest[0]), (0, rest[1]), (0, 0)), mode="edge") if any(rest) else frame
+        picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(padded), format="rgb24")
         picture = picture.reformat(format=pixel_format, dst_colorspace=_BT601, dst_color_range=_LIMITED_RANGE)
         picture.pts = n
         yield from map(bytes, context.encode(picture))
     yield from map(bytes, context.encode(None))
-
-
-def _check_picture(frame: Pictures) -> None:
-    if frame.ndim != 3 or frame.shape[2] != 3 or not frame.size:
-        raise InputError(f"a picture of shape {frame.shape}, required (H, W, 3)")
-    if frame.shape[0] * frame.shape[1] > MOST_PIXELS:
-        raise InputError(f"a picture of shape {frame.shape}, required at most {MOST_PIXELS} pixels; scale the video")
 
 
 def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) -> Any:
@@ -227,14 +224,6 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
         + x264_instructions(),
     }
     return context
-
-
-def _padded(frame: Pictures, height: int, width: int) -> Pictures:
-    """Return a picture of some size; its outermost row and column are repeated."""
-    rest = (height - frame.shape[0], width - frame.shape[1])
-    if any(rest):
-        frame = np.pad(frame, ((0, rest[0]), (0, rest[1]), (0, 0)), mode="edge")
-    return np.ascontiguousarray(frame)
 
 
 def _layout(data: Stream) -> tuple[list[int], list[int]]:
@@ -261,22 +250,12 @@ def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -
 
     bound_allocations()
     context: Any = av.CodecContext.create("h264", "r")
-    context.options = {"max_pixels": str(MOST_PIXELS), "err_detect": "explode"}
+    context.options = {"max_pixels": str(MAX_PIXELS), "err_detect": "explode"}
     context.thread_count = 1
-    with _decoding_errors():
-        for start, stop in pairwise(begins):
-            for picture in context.decode(av.Packet(data[start:stop].tobytes())):
-                yield _as_rgb(picture, size)
-        for picture in context.decode(None):
-            yield _as_rgb(picture, size)
-
-
-@contextmanager
-def _decoding_errors() -> Iterator[None]:
-    import av
-
     try:
-        yield
+        for packet in chain((av.Packet(data[start:stop].tobytes()) for start, stop in pairwise(begins)), [None]):
+            for picture in context.decode(packet):
+                yield _as_rgb(picture, size)
     except (av.FFmpegError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ModelFormatError(f"the stored pictures are damaged ({reason}); {_REMEDY}") from error

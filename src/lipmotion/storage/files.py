@@ -177,7 +177,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 
 @contextmanager
-def confined(folder: Path) -> Iterator[None]:
+def confine(folder: Path) -> Iterator[None]:
     """Follow no link inside a folder that strangers may have filled, whatever writes there while the block lasts.
 
     This holds for all functions of this module, in all threads of the process. The folder itself may be a link, which
@@ -344,21 +344,19 @@ def _sweep(target: Path) -> None:
     prefix = _prefix(target)
     with suppress(OSError):  # a folder that may be written to, but not listed
         for left in target.parent.glob(f"{prefix}*"):
-            if not _is_alive(left.name[len(prefix) :].split("-")[0]):
+            process = left.name[len(prefix) :].split("-")[0]
+            if sys.platform == "win32" or not process.isdigit():
+                is_left = sys.platform == "win32"  # which deletes no file that is open
+            else:
+                is_left = False
+                try:
+                    os.kill(int(process), 0)
+                except ProcessLookupError:
+                    is_left = True
+                except OSError:  # a process of another user
+                    continue
+            if is_left:
                 remove(left)
-
-
-def _is_alive(process: str) -> bool:
-    """Return whether a process may still be running; on Windows False, as it deletes no file that is open."""
-    if sys.platform == "win32" or not process.isdigit():
-        return sys.platform != "win32"
-    try:
-        os.kill(int(process), 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True  # a process of another user
-    return True
 
 
 def _place(target: Path) -> Path:
@@ -379,7 +377,7 @@ def _place(target: Path) -> Path:
 
 
 @contextmanager
-def whole_file(target: Path) -> Iterator[Path]:
+def atomic_file(target: Path) -> Iterator[Path]:
     """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
 
     Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
@@ -400,7 +398,7 @@ def whole_file(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_folder(target: Path) -> Iterator[Path]:
+def atomic_folder(target: Path) -> Iterator[Path]:
     """Give a temporary folder to fill; rename it to ``target``, which must not exist, on success.
 
     Raises ExportError: the parent does not exist, or something cannot be written.
@@ -418,7 +416,7 @@ def whole_folder(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def made_folders(folders: Iterable[Path]) -> Iterator[None]:
+def create_folders(folders: Iterable[Path]) -> Iterator[None]:
     """Create folders, with those that hold them; if the block fails, remove those that were not there before.
 
     Raises ExportError: a folder cannot be created.
@@ -440,16 +438,14 @@ def made_folders(folders: Iterable[Path]) -> Iterator[None]:
 
 
 def _refused(target: Path, error: OSError) -> ExportError:
-    full = (
-        error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or error.errno is None
-    )  # None: NumPy, on a short write
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, None)  # None: NumPy, on a short write
     reason = error.strerror or ("No space left on device" if full else str(error))
     return ExportError(f"{target}: cannot be written: {reason}{'; make room, then run it again' if full else ''}")
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, created if needed, for this process, and confine it (``confined``).
+def lock_folder(folder: Path) -> Iterator[None]:
+    """Lock a folder, created if needed, for this process, and confine it (``confine``).
 
     The system releases the lock when the process ends in any way: no lock is left behind.
     Raises ExportError: another process has locked it, it cannot be created, or its lock is a link.
@@ -458,22 +454,18 @@ def locked(folder: Path) -> Iterator[None]:
     file = None
     try:
         try:
-            with confined(folder):
-                file = _lock_in(folder)
+            with confine(folder):
+                make_folder(folder)
+                try:
+                    file = _open_lock(folder / LOCK)
+                except OSError as error:
+                    raise _refused(folder, error) from error
                 yield
         finally:
             _release(path, file)
     except BaseException:  # an interrupt may have come during the release; a second one does not follow at once
         _release(path, file)
         raise
-
-
-def _lock_in(folder: Path) -> IO[bytes]:
-    make_folder(folder)
-    try:
-        return _open_lock(folder / LOCK)
-    except OSError as error:
-        raise _refused(folder, error) from error
 
 
 def _release(path: Path, file: IO[bytes] | None) -> None:
@@ -555,8 +547,8 @@ def temporary_folder() -> Iterator[Path]:
     """
     place = Path(tempfile.gettempdir())
     for left in place.glob(f"{BRIEF}*/{LOCK}"):
-        with suppress(ExportError, OSError), confined(place):  # it is in use, or another user's
-            with locked(left.parent):
+        with suppress(ExportError, OSError), confine(place):  # it is in use, or another user's
+            with lock_folder(left.parent):
                 for path in left.parent.iterdir():
                     if path != left:
                         remove(path)
@@ -566,7 +558,7 @@ def temporary_folder() -> Iterator[Path]:
             folder = Path(tempfile.mkdtemp(prefix=BRIEF))
             kept.callback(shutil.rmtree, folder, ignore_errors=True)
             try:
-                kept.enter_context(locked(folder))
+                kept.enter_context(lock_folder(folder))
                 break
             except ExportError:  # another process took it for one that was left, before it was locked
                 if is_last:
@@ -588,7 +580,7 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     if is_link(folder):
         raise ExportError(f"{folder}: is a link, required a folder of unfinished work; remove it")
     try:
-        with locked(folder):
+        with lock_folder(folder):
             remove_unfinished(folder)
             _sweep(target)
             try:

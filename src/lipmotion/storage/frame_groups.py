@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Frame = NDArray[np.uint8]
 ReadFrames = Callable[[int, int], Iterable[Frame]]
 
-MOST_DECODED_BYTES = 160 * 2**20
+MAX_DECODED_BYTES = 160 * 2**20
 """Decoded frames that are kept, bytes; those of two groups are kept however large they are."""
 
 
@@ -25,7 +25,7 @@ class FrameGroups:
     Not for several threads.
     """
 
-    def __init__(self, read: ReadFrames, starts: Sequence[int], most_bytes: int = MOST_DECODED_BYTES) -> None:
+    def __init__(self, read: ReadFrames, starts: Sequence[int], most_bytes: int = MAX_DECODED_BYTES) -> None:
         self._read = read
         self._starts = list(starts)
         self._most_bytes = most_bytes

@@ -21,9 +21,9 @@ MEDIA_FORMATS = (
 open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp),
 devices."""
 LARGEST_BLOCK_BYTES = 1 << 28
-"""Most bytes that FFmpeg may allocate at a time: three pictures of ``MOST_PIXELS`` with four channels of 16 bits."""
+"""Most bytes that FFmpeg may allocate at a time: three pictures of ``MAX_PIXELS`` with four channels of 16 bits."""
 DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
-MOST_PIXELS = 4096 * 2304
+MAX_PIXELS = 4096 * 2304
 """Most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures."""
 
 
@@ -55,7 +55,7 @@ def open_media(path: Path, *, content: Any = None) -> Any:
         "protocol_whitelist": "file",
         "format_whitelist": ",".join(MEDIA_FORMATS),
         "enable_drefs": "0",
-        "max_pixels": str(MOST_PIXELS),
+        "max_pixels": str(MAX_PIXELS),
     }
     try:
         return av.open(f"file:{path}" if content is None else content, options=options)

@@ -32,15 +32,15 @@ class ArraySpec:
 
     dtype    : its type after reading; it may be stored in another precision, but not as another kind of number
     shape    : sizes, as "L 3 Q": a letter is one size throughout a table; a lower-case letter may be 0; "" is one value
-    least, most : range, limits included; values are infinite only if a limit is
+    minimum, maximum : limits, included; values are infinite only if a limit is
     optional : whether it may be missing
     whole    : whether fractions may be stored as whole numbers
     """
 
     dtype: type[Any]
     shape: str
-    least: float = -LARGEST_NUMBER
-    most: float = LARGEST_NUMBER
+    minimum: float = -LARGEST_NUMBER
+    maximum: float = LARGEST_NUMBER
     optional: bool = False
     whole: bool = False
 
@@ -49,12 +49,6 @@ class ArraySpec:
         """The kinds of NumPy types that it may be stored as."""
         kind = np.dtype(self.dtype).kind
         return kind + "iu" if kind == "f" and self.whole else "iu" if kind == "i" else kind
-
-    @property
-    def range(self) -> str:
-        """The range in words."""
-        low, high = (_SPELLED.get(end, f"{end:g}") for end in (self.least, self.most))
-        return f"{low} to {high}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,29 +76,57 @@ def format_errors(what: str, remedy: str = "train or download it again", *, verb
         raise ModelFormatError(f"{what} {verb} damaged ({error}); {remedy}") from error
 
 
-def checked_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:
+def check_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:
     """Return the arrays of a table, in its types; other arrays are ignored (see ``refuse_undeclared``).
 
     sizes : of letters that are known before
     Raises ValueError: an array of another kind of number, of another shape or out of its range. KeyError: one is
     missing.
     """
-    sizes = checked_sizes(arrays, table, **sizes)
+    sizes = check_sizes(arrays, table, **sizes)
     with np.errstate(over="ignore"):
         values = {name: arrays[name].astype(member.dtype) for name, member in table.items() if name in arrays}
     return CheckedArrays(values, sizes)
 
 
-def checked_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> dict[str, int]:
-    """Return the size of each letter of a table. Raises as ``checked_arrays``."""
+def check_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> dict[str, int]:
+    """Return the size of each letter of a table. Raises as ``check_arrays``."""
     for name, member in table.items():
-        if name in arrays:
-            _check_kind(name, arrays[name], member)
-            _check_shape(name, arrays[name], member, sizes)
-            _check_range(name, arrays[name], member)
-        elif not member.optional:
+        if name not in arrays and not member.optional:
             raise KeyError(f"{name} is missing")
+        if name in arrays:
+            array = arrays[name]
+            if array.dtype.kind not in member.kinds or (array.dtype.kind != "U" and array.dtype.itemsize > 8):
+                raise ValueError(f"{name} holds {array.dtype}, required {_KINDS[np.dtype(member.dtype).kind]}")
+            sizes |= _check_shape(name, array, member, sizes)
+            _check_range(name, array, member)
     return sizes
+
+
+def _check_shape(name: str, array: NDArray[Any], member: ArraySpec, sizes: Mapping[str, int]) -> dict[str, int]:
+    """Return the size of each letter of an array."""
+    letters = member.shape.split()
+    known = dict(zip(letters, array.shape, strict=False))
+    known |= {letter: size for letter, size in sizes.items() if letter in known}
+    known |= {letter: int(letter) for letter in letters if letter.isdigit()}
+    if array.shape != tuple(known.get(letter, 0) for letter in letters):
+        required = ", ".join(str(sizes.get(letter, letter)) for letter in letters) + "," * (len(letters) == 1)
+        raise ValueError(f"{name} of shape {array.shape}, required ({required})")
+    if any(not size and letter.isupper() for letter, size in known.items()):
+        raise ValueError(f"{name} of shape {array.shape}, required at least one of each")
+    return {letter: size for letter, size in known.items() if not letter.isdigit()}
+
+
+def _check_range(name: str, array: NDArray[Any], member: ArraySpec) -> None:
+    if not array.size or array.dtype.kind in "Ub":
+        return
+    values = array.astype(np.float32) if array.dtype == np.float16 else array  # half precision is slow to compare
+    low, high = float(values.min()), float(values.max())
+    if not (member.minimum == -math.inf or math.isfinite(low)) or not math.isfinite(high):
+        raise ValueError(f"{name} holds values that are not finite")
+    if not member.minimum <= low <= high <= member.maximum:
+        least, most = (_SPELLED.get(end, f"{end:g}") for end in (member.minimum, member.maximum))
+        raise ValueError(f"{name} holds {low:g} to {high:g}, required {least} to {most}")
 
 
 def refuse_undeclared(arrays: Iterable[str], *names: Iterable[str]) -> None:
@@ -123,38 +145,3 @@ def check_index(name: str, numbers: NDArray[Any], count: int) -> None:
 def arrays_under(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
     """Return the arrays whose names begin with a prefix, by their names without it."""
     return {name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)}
-
-
-def _check_kind(name: str, array: NDArray[Any], member: ArraySpec) -> None:
-    if array.dtype.kind not in member.kinds or (array.dtype.kind != "U" and array.dtype.itemsize > 8):
-        required = _KINDS[np.dtype(member.dtype).kind]
-        raise ValueError(f"{name} holds {array.dtype}, required {required}")
-
-
-def _check_shape(name: str, array: NDArray[Any], member: ArraySpec, sizes: dict[str, int]) -> None:
-    letters = member.shape.split()
-    known = dict(zip(letters, array.shape, strict=False))
-    known |= {letter: size for letter, size in sizes.items() if letter in known}
-    known |= {letter: int(letter) for letter in letters if letter.isdigit()}
-    required = tuple(known.get(letter, 0) for letter in letters)
-    if array.shape != required:
-        raise ValueError(f"{name} of shape {array.shape}, required {_spelled(letters, sizes)}")
-    if any(not size and letter.isupper() for letter, size in known.items()):
-        raise ValueError(f"{name} of shape {array.shape}, required at least one of each")
-    sizes |= {letter: size for letter, size in known.items() if not letter.isdigit()}
-
-
-def _spelled(letters: list[str], sizes: Mapping[str, int]) -> str:
-    spelled = [str(sizes.get(letter, letter)) for letter in letters]
-    return f"({', '.join(spelled)}{',' if len(spelled) == 1 else ''})"
-
-
-def _check_range(name: str, array: NDArray[Any], member: ArraySpec) -> None:
-    if not array.size or array.dtype.kind in "Ub":
-        return
-    values = array.astype(np.float32) if array.dtype == np.float16 else array  # half precision is slow to compare
-    low, high = float(values.min()), float(values.max())
-    if not (member.least == -math.inf or math.isfinite(low)) or not math.isfinite(high):
-        raise ValueError(f"{name} holds values that are not finite")
-    if not member.least <= low <= high <= member.most:
-        raise ValueError(f"{name} holds {low:g} to {high:g}, required {member.range}")

@@ -40,7 +40,7 @@ def check_apart(
     files, folders = list(targets), list(folders)
     for source in sources:
         for target in [*files, *folders]:
-            clash = _clash(target, source.path, holds=target in folders)
+            clash = _find_clash(target, source.path, holds=target in folders)
             if clash == "is" and source.replaceable and force:
                 continue
             if clash:
@@ -49,7 +49,7 @@ def check_apart(
                 raise ExportError(f"{target}: {clash} the {source.kind}{itself}; give another name{way_out}")
 
 
-def _clash(target: Path, source: Path, *, holds: bool) -> str:
+def _find_clash(target: Path, source: Path, *, holds: bool) -> str:
     """Return how an output and an input clash: ``is``, ``lies in``, ``belongs to`` or ``holds``; "" where they do not.
 
     holds : whether the output is a folder, which may contain the input
@@ -60,15 +60,11 @@ def _clash(target: Path, source: Path, *, holds: bool) -> str:
     if is_folder(source):
         if any(is_same(folder, source) for folder in place.parents):
             return "lies in"
-        if _status(place) and not is_folder(place) and _is_in(source, place):
+        inside = (Path(root) / name for root, _, names in os.walk(source) for name in names)  # or a link to it
+        if _status(place) and not is_folder(place) and any(is_same(file, place) for file in inside):
             return "belongs to"
-    return (
-        "holds"
-        if holds
-        and _status(source)
-        and any(is_same(place, parent) for parent in Path(os.path.realpath(source)).parents)
-        else ""
-    )
+    parents = Path(os.path.realpath(source)).parents if holds and _status(source) else ()
+    return "holds" if any(is_same(place, parent) for parent in parents) else ""
 
 
 def is_folder(path: Path) -> bool:
@@ -87,11 +83,6 @@ def is_same(path: str | Path, other: str | Path) -> bool:
     """Return whether two names, links followed, are of one existing file or folder."""
     one, two = _status(path), _status(other)
     return one is not None and two is not None and os.path.samestat(one, two)
-
-
-def _is_in(folder: Path, file: Path) -> bool:
-    """Return whether a file lies in a folder or its subfolders, or a link there points to it."""
-    return any(is_same(Path(root) / name, file) for root, _, names in os.walk(folder) for name in names)
 
 
 def _status(path: str | Path) -> os.stat_result | None:

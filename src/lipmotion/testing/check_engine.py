@@ -28,7 +28,7 @@ from lipmotion.types import (
 from lipmotion.units import PHONES
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
-LEAST_CORRELATION = 0.5
+MIN_CORRELATION = 0.5
 """Between generated and recorded opening, in a sentence of the kind trained on."""
 
 
@@ -95,7 +95,7 @@ def motion_is_learned(trained: TrainedEngine) -> None:
     generated = trained.generate(spoken).motion["opening"]
     require(float(np.ptp(generated)) > 1e-6, "the opening does not move")
     found = float(np.corrcoef(generated, recorded)[0, 1])
-    require(found > LEAST_CORRELATION, f"the opening correlates by {found:.2f}, required {LEAST_CORRELATION}")
+    require(found > MIN_CORRELATION, f"the opening correlates by {found:.2f}, required {MIN_CORRELATION}")
 
 
 def every_frame_has_a_state(trained: TrainedEngine) -> None:

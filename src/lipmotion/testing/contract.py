@@ -13,7 +13,7 @@ from lipmotion.errors import LipMotionError
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.fap import FAP
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, CLOSED
-from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.testing.examples import example
 from lipmotion.types import Generation, StateTrace
 from lipmotion.types.motion import RADIAN
@@ -30,7 +30,7 @@ def check_exporter(exporter: MotionFormat) -> None:
     >>> check_exporter(MOTION_FORMATS.load("csv"))
     """
     one = example(("m", "aa"))
-    given = curves_of(one.motion, one.speech.units, exporter.curves) if exporter.curves else one.motion
+    given = make_curves(one.motion, one.speech.units, exporter.curves) if exporter.curves else one.motion
     if all(channel.unit == FAP for channel in given.channels):
         given = replace(given, values=np.rint(given.values))
     if exporter.fixed_rate and exporter.rate_hz:

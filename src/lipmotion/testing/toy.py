@@ -33,21 +33,16 @@ def toy_mouths(motion: Motion) -> NDArray[np.uint8]:
     opening, width, outer = (
         motion[name][:, None, None] * EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
     )
+    x = np.arange(WIDTH)[None, None, :] + 0.5 - WIDTH / 2
+    y = np.arange(HEIGHT)[None, :, None] + 0.5 - HEIGHT / 2
     shade = 1 - SHADE * np.arange(HEIGHT)[:, None, None] / HEIGHT
     picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), HEIGHT, WIDTH, 3))
     for colour, across, down in ((LIPS, width, outer), (INSIDE, INNER_WIDTH * width, opening)):
-        share = _ellipse(across, down)[..., None]
+        across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)  # noqa: PLW2901
+        radius = np.hypot(x / across, y / down)
+        share = np.clip(0.5 + (1 - radius) * np.minimum(across, down), 0, 1)[..., None]  # of the pixel in the ellipse
         picture = (1 - share) * picture + share * np.array(colour)
     return np.rint(picture).astype(np.uint8)
-
-
-def _ellipse(across: NDArray[np.float64], down: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the share of each pixel inside a centred ellipse [shape=(T, 56, 72)] of half axes [shape=(T, 1, 1)]."""
-    x = np.arange(WIDTH)[None, None, :] + 0.5 - WIDTH / 2
-    y = np.arange(HEIGHT)[None, :, None] + 0.5 - HEIGHT / 2
-    across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)
-    radius = np.hypot(x / across, y / down)
-    return np.clip(0.5 + (1 - radius) * np.minimum(across, down), 0, 1)
 
 
 WORDS: dict[str, tuple[str, ...]] = {
@@ -141,18 +136,23 @@ def toy_sentences(count: int, seed: int = 0) -> list[ToySentence]:
     same ones first.
     Raises InputError: fewer than three, so that a split would be empty.
     """
-    return list(_toy_sentences(count, seed))
+    if count < 3:
+        raise InputError(f"{count} toy sentences asked for, required at least 3: one each to train, validate and test")
+    return list(_speak_sentences(count, seed))
 
 
 @lru_cache(maxsize=16)
-def _toy_sentences(count: int, seed: int) -> tuple[ToySentence, ...]:
-    if count < 3:
-        raise InputError(f"{count} toy sentences asked for, required at least 3: one each to train, validate and test")
+def _speak_sentences(count: int, seed: int) -> tuple[ToySentence, ...]:
     held_out = max(1, count // 6)
     splits = ["train"] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
     rng = np.random.default_rng(seed)
-    vocabulary = _shuffled_words(rng)
-    return tuple(_sentence(f"toy{number:02d}", split, vocabulary, rng) for number, split in enumerate(splits))
+
+    def shuffle_words() -> Iterator[str]:
+        while True:
+            yield from rng.permutation(sorted(WORDS)).tolist()
+
+    vocabulary = shuffle_words()
+    return tuple(_speak_sentence(f"toy{number:02d}", split, vocabulary, rng) for number, split in enumerate(splits))
 
 
 def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:
@@ -163,13 +163,24 @@ def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:
     (``LIP_LEAD_S`` early) and in silence more than 0.1 s away from speech.
     Raises InputError: no units, a phone that is not in the inventory, or a rate that is not positive.
     """
-    _check_units(units, rate_hz)
+    if not len(units):
+        raise InputError("there are no phones to move the lips to; give at least one")
+    if not rate_hz > 0:
+        raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
+    for span in units:
+        if span.label.phone not in LIP_TARGETS:
+            raise InputError(f"phone {span.label.phone!r} is not in the inventory: {' '.join(sorted(LIP_TARGETS))}")
     end_s = units.spans[-1].end_s
     margin_s = BLEND_S + LIP_LEAD_S
     grid_s = np.arange(-margin_s, end_s + 2 * margin_s, 1 / _GRID_HZ)
     kernel = np.hanning(round(BLEND_S * _GRID_HZ) + 1)
+    separation = np.ones(len(grid_s))
     opening, width = (np.convolve(target, kernel / kernel.sum(), "same") for target in _targets(units, grid_s))
-    opening *= _lip_separation(units, grid_s)
+    for span in units:  # the opening is 0 where the lips touch, and goes there on a raised cosine
+        if span.label.phone in LIPS_TOUCH:
+            away_s = np.maximum(0, np.maximum(span.start_s - grid_s, grid_s - span.end_s))
+            separation = np.minimum(separation, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / CLOSING_S)))
+    opening *= separation
     time_s = np.arange(int(end_s * rate_hz + 1e-9) + 1) / rate_hz + LIP_LEAD_S
     opening, width = np.interp(time_s, grid_s, opening), np.interp(time_s, grid_s, width)
     return Motion(np.stack([opening, width, LIP_THICKNESS + opening], axis=1), rate_hz, CHANNELS)
@@ -184,13 +195,7 @@ def toy_utterances(count: int, seed: int = 0) -> list[Utterance]:
     return [_utterance(sentence) for sentence in toy_sentences(count, seed)]
 
 
-def _shuffled_words(rng: np.random.Generator) -> Iterator[str]:
-    """Yield the words endlessly, shuffled again each time that all have been used."""
-    while True:
-        yield from rng.permutation(sorted(WORDS)).tolist()
-
-
-def _sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.random.Generator) -> ToySentence:
+def _speak_sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.random.Generator) -> ToySentence:
     words: list[str] = []
     labels, durations_s = [Unit("sil")], [rng.uniform(*SILENCE_S)]
     while sum(durations_s[1:]) < SPEECH_S:
@@ -216,16 +221,6 @@ def _utterance(sentence: ToySentence) -> Utterance:
     )
 
 
-def _check_units(units: Timeline[Unit], rate_hz: float) -> None:
-    if not len(units):
-        raise InputError("there are no phones to move the lips to; give at least one")
-    if not rate_hz > 0:
-        raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
-    for span in units:
-        if span.label.phone not in LIP_TARGETS:
-            raise InputError(f"phone {span.label.phone!r} is not in the inventory: {' '.join(sorted(LIP_TARGETS))}")
-
-
 def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return target opening and width, constant within phones; at rest outside the units [shape=(2, len(grid_s))]."""
     targets = np.repeat(np.array(LIP_TARGETS["sil"]).T, len(grid_s), axis=1)
@@ -235,13 +230,3 @@ def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.f
         for shape, start_s, end_s in zip(shapes, edges_s, edges_s[1:], strict=False):
             targets[:, (grid_s >= start_s) & (grid_s < end_s)] = np.array(shape)[:, None]
     return targets
-
-
-def _lip_separation(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return 0 where the lips touch, 1 far from there, a raised cosine between [shape=(len(grid_s),)]."""
-    separation = np.ones(len(grid_s))
-    for span in units:
-        if span.label.phone in LIPS_TOUCH:
-            away_s = np.maximum(0, np.maximum(span.start_s - grid_s, grid_s - span.end_s))
-            separation = np.minimum(separation, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / CLOSING_S)))
-    return separation

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.types.audio import Audio
 from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
@@ -53,9 +53,10 @@ class Speech:
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     voice       : 0 to 1, how well the model's training knows the voice
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
+    encoding    : float16 array [shape=(T, 64)], of the speech encoder (None: the engine does not use it)
     kept        : what was computed of the sound alone (``once``); speech with other units shares it
     parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
-                  empty: nothing is said. Beside it, features, spectrum and posteriors may be ``JoinedRows``
+                  empty: nothing is said. Beside it, features, spectrum, posteriors and encoding may be ``JoinedRows``
     """
 
     features: Features
@@ -67,6 +68,7 @@ class Speech:
     prior: PriorOutput | None = None
     voice: float = 1.0
     posteriors: TokenPosteriors | None = None
+    encoding: NDArray[np.float16] | None = None
     times_given: bool = False
     kept: dict[Any, Any] = field(default_factory=dict, repr=False)
     parts: tuple[SpeechPart, ...] | None = None
@@ -76,7 +78,7 @@ class Speech:
 
         of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
         """
-        sound = (self.features, self.log_f0, self.spectrum, self.posteriors)
+        sound = (self.features, self.log_f0, self.spectrum, self.posteriors, self.encoding)
         found = self.kept.get(of)
         if found is None or any(ours is not theirs for ours, theirs in zip(sound, found[0], strict=True)):
             found = self.kept[of] = (sound, make())
@@ -88,7 +90,8 @@ class Speech:
         features = replace(self.features, values=np.asarray(self.features.values))
         spectrum = None if self.spectrum is None else np.asarray(self.spectrum)
         said = self.posteriors and replace(self.posteriors, values=np.asarray(self.posteriors.values))
-        return replace(self, features=features, spectrum=spectrum, posteriors=said)
+        encoding = None if self.encoding is None else np.asarray(self.encoding)
+        return replace(self, features=features, spectrum=spectrum, posteriors=said, encoding=encoding)
 
     @property
     def units_decide(self) -> bool:
@@ -178,7 +181,7 @@ class Pin:
     def __post_init__(self) -> None:
         for name, number in (("time", self.time_s), ("value", self.value)):
             if not _is_number(number):
-                raise InputError(f"the {name} of a pin is {shortened(repr(number))}, required a number")
+                raise InputError(f"the {name} of a pin is {shorten(repr(number))}, required a number")
 
 
 @dataclass(frozen=True)
@@ -281,7 +284,7 @@ class Constraints:
 
     def __post_init__(self) -> None:
         if not isinstance(self.pins, Collection) or not all(isinstance(pin, Pin) for pin in self.pins):
-            found = shortened(repr(self.pins))
+            found = shorten(repr(self.pins))
             raise InputError(f"constraints of {found}, required pins: Constraints((Pin(0.5, 'opening', 0.02),))")
 
 

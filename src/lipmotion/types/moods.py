@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 
 NEUTRAL = "neutral"
 MOODS = ("happy", "sad", "angry", "afraid", "disgusted", "surprised", "tense", "tired")
@@ -41,7 +41,7 @@ class MoodKey:
         if self.mood not in _NAMES:
             near = get_close_matches(self.mood, _NAMES, 1)
             hint = f" (is it {near[0]}?)" if near else ""
-            raise InputError(f"the mood is {shortened(repr(self.mood))}{hint}, required one of: {', '.join(_NAMES)}")
+            raise InputError(f"the mood is {shorten(repr(self.mood))}{hint}, required one of: {', '.join(_NAMES)}")
         if not 0 <= self.strength <= 1:
             raise InputError(f"the strength of the mood {self.mood} is {self.strength:g}, required 0 to 1")
         if not 0 <= self.time_s < float("inf"):
@@ -88,7 +88,7 @@ def parse_moods(text: str) -> tuple[MoodKey, ...]:
         key = _KEY.fullmatch(part)
         if key is None:
             raise InputError(
-                f"the mood is {shortened(repr(part))}, required MOOD, MOOD:STRENGTH or MOOD:STRENGTH at SECONDS, "
+                f"the mood is {shorten(repr(part))}, required MOOD, MOOD:STRENGTH or MOOD:STRENGTH at SECONDS, "
                 "as happy:0.7 at 2.5; several with commas"
             )
         found.append(MoodKey(float(key[3] or 0.0), key[1].lower(), float(key[2] or 1.0)))

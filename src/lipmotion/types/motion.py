@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_formula
 
 EYE_DISTANCE = "eye_distance"
@@ -39,7 +39,7 @@ class Channel:
     def __post_init__(self) -> None:
         if is_formula(self.name):
             raise InputError(
-                f"the channel name {shortened(self.name)!r} begins as a spreadsheet's formula, required another "
+                f"the channel name {shorten(self.name)!r} begins as a spreadsheet's formula, required another "
                 "beginning than = + - @; rename it"
             )
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.types.configuration import Configuration, Rule, option
 
 SCENE, TRANSPARENT = "scene", "transparent"
@@ -49,7 +49,7 @@ class Staging(Configuration):
             )
         if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
             raise InputError(
-                f"the background is {shortened(self.background)!r}, required scene, transparent, or a colour as "
+                f"the background is {shorten(self.background)!r}, required scene, transparent, or a colour as "
                 "#40a0ff; a video is for filmed faces; give one: --face FILE.face"
             )
 

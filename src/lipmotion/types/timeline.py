@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 
 LabelT = TypeVar("LabelT")
 
@@ -109,7 +109,7 @@ def _check_times(span: Span[LabelT]) -> None:
     try:
         _ = span.start_s + 0.0 <= span.end_s + 0.0
     except (TypeError, ValueError, OverflowError) as error:
-        first, last = (shortened(repr(time_s)) for time_s in (span.start_s, span.end_s))
+        first, last = (shorten(repr(time_s)) for time_s in (span.start_s, span.end_s))
         raise InputError(f"{_described(span)} lasts from {first} to {last}, required seconds") from error
 
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 
 Schema = Callable[[Any], Any]
 NAME_BYTES, PATH_BYTES = 255, 4096
@@ -29,7 +29,7 @@ class SchemaError(InputError):
     """A value has another type or range; says where it stands, and what is required there."""
 
     def __init__(self, found: str, required: str, place: str = "") -> None:
-        super().__init__(f"{shortened(place.removeprefix('.')) or 'the document'} is {found}, required {required}")
+        super().__init__(f"{shorten(place.removeprefix('.')) or 'the document'} is {found}, required {required}")
         self.found, self.required, self.place = found, required, place
 
     def within(self, step: str) -> SchemaError:
@@ -190,7 +190,7 @@ def members(table: Mapping[str, Schema], needed: Collection[str] = (), *, alone:
             if name not in value:
                 raise SchemaError("missing", "a value", f".{name}")
         if alone and (others := value.keys() - table.keys()):
-            raise SchemaError("a member that is not known", ", ".join(table), f".{shortened(min(others))}")
+            raise SchemaError("a member that is not known", ", ".join(table), f".{shorten(min(others))}")
         names = value.keys() & table.keys() if len(value) > len(table) else [name for name in value if name in table]
         return _checked({name: value[name] for name in names}, table.__getitem__)
 
@@ -242,7 +242,7 @@ def _checked(content: Mapping[str, Any], schema_of: Callable[[str], Schema]) -> 
         try:
             one = schema_of(name)(member)
         except SchemaError as error:
-            raise error.within(f".{shortened(name)}") from None
+            raise error.within(f".{shorten(name)}") from None
         if one is not _LEFT_OUT:
             kept[name] = one
     return kept
@@ -256,4 +256,4 @@ def describe_value(value: Any) -> str:
         return {None: "null", True: "true", False: "false"}[value]
     if type(value) is int and value.bit_length() > 10_000:  # which Python does not spell
         return "a whole number of thousands of digits"
-    return shortened(repr(value[:100] if type(value) is str else value))
+    return shorten(repr(value[:100] if type(value) is str else value))

@@ -11,7 +11,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import InputError, MissingDependencyError, shortened
+from lipmotion.errors import InputError, MissingDependencyError, shorten
 from lipmotion.storage.files import read_text_file
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
@@ -51,7 +51,7 @@ SpokenForm = tuple[tuple[str, str], ...]
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
 """Monosyllables that are unstressed in running speech."""
-LARGEST_LEXICON_BYTES, MOST_LINES = 1 << 25, 1 << 20
+LARGEST_LEXICON_BYTES, MAX_LINES = 1 << 25, 1 << 20
 """Most bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
 LONGEST_LINE = 2000
 """Most characters of a line: a word, its phones and a comment."""
@@ -100,7 +100,7 @@ class Lexicon:
         """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` starts a comment.
 
         Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
-        Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MOST_LINES``,
+        Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MAX_LINES``,
         ``LONGEST_LINE``, ``MOST_VARIANTS``), no phones after a word, or an unknown phone (with its line).
         """
         user: dict[str, list[Pronunciation]] = {}
@@ -199,7 +199,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
     word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
     variants = user.setdefault(word, [])
     if len(variants) == MOST_VARIANTS:
-        raise InputError(f"more than {MOST_VARIANTS} pronunciations of {shortened(word)!r}; keep those that are said")
+        raise InputError(f"more than {MOST_VARIANTS} pronunciations of {shorten(word)!r}; keep those that are said")
     variants.append(_user_phones(phones))
 
 
@@ -207,8 +207,8 @@ def _lines(path: Path) -> Iterator[str]:
     """Yield the lines of a lexicon file. Raises InputError: not a text, or more than a lexicon holds."""
     text = read_text_file(path, "lexicon", LARGEST_LEXICON_BYTES)
     count = text.count("\n") + 1
-    if count > MOST_LINES:
-        raise InputError(f"{path}: {count} lines, required at most {MOST_LINES}; keep the words that are said")
+    if count > MAX_LINES:
+        raise InputError(f"{path}: {count} lines, required at most {MAX_LINES}; keep the words that are said")
     start = 0
     for number in range(1, count + 1):
         end = text.find("\n", start) if number < count else len(text)
@@ -222,7 +222,7 @@ def _user_phones(phones: list[str]) -> Pronunciation:
     names = tuple([name for name in map(_spoken_phone, phones) if name])
     if len(names) < len(phones):
         wrong = next(phone for phone in phones if not _spoken_phone(phone))
-        raise InputError(f"unknown phone {shortened(wrong)!r}; the phones are: {' '.join(PHONES)}")
+        raise InputError(f"unknown phone {shorten(wrong)!r}; the phones are: {' '.join(PHONES)}")
     return names
 
 

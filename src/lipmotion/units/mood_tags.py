@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from lipmotion.errors import shortened
+from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.moods import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
 from lipmotion.units.spoken_text import find_speaker_names, remove_speakers
@@ -86,7 +86,7 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
     if not found and not unknown:
         return TaggedText(text, ())
     if unknown:
-        named = ", ".join(map(shortened, dict.fromkeys(unknown)))
+        named = ", ".join(map(shorten, dict.fromkeys(unknown)))
         LOG.warning("not known, and not spoken: %s; known tags are [happy], [sad:0.5], ... (docs/expression.md)", named)
     count = max(len(words(spoken)), 1)
     return TaggedText(spoken, tuple(MoodTag(before / count, mood, strength) for before, mood, strength in found))

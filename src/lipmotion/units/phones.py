@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from lipmotion.errors import shortened
+from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
@@ -134,7 +134,7 @@ def describe_unknown_phone(phone: str, where: str = "") -> str:
     """
     if not phone:
         return f"a unit without a phone{where}: only the model that recognised it can use it; give phones instead"
-    return f"unknown phone {shortened(repr(phone))}{where}; the phones: {' '.join(PHONES)}"
+    return f"unknown phone {shorten(repr(phone))}{where}; the phones: {' '.join(PHONES)}"
 
 
 def find_similar_phone(phone: str, known: Collection[str]) -> str:

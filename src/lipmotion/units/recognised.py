@@ -71,12 +71,12 @@ def restore_confidences(units: Timeline[Unit], recognised: Iterable[RecognisedPh
 
     recognised : of ``list_recognised_phones``, when the phones were written
     """
-    confidence_of = {phone[:3]: phone.confidence for phone in recognised}
+    score_words = {phone[:3]: phone.confidence for phone in recognised}
     return Timeline(
         tuple(
             replace(
                 span,
-                label=replace(span.label, confidence=confidence_of.get((span.start_s, span.end_s, _name(span.label)))),
+                label=replace(span.label, confidence=score_words.get((span.start_s, span.end_s, _name(span.label)))),
             )
             for span in units
         )

@@ -6,7 +6,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.units.text_normalisation import find_words
 
 MOST_CHARACTERS = 50_000
@@ -54,12 +54,12 @@ def split_sentences(text: str) -> list[str]:
     longest = max(plain.split(), key=len, default="")
     if len(longest) > LONGEST_WORD and longest.isascii():
         raise InputError(
-            f"a word of {len(longest)} characters ({shortened(longest)!r}), required at most {LONGEST_WORD}; "
+            f"a word of {len(longest)} characters ({shorten(longest)!r}), required at most {LONGEST_WORD}; "
             "write words with blanks between them"
         )
     found = [part for sentence in _ended(plain) for part in _short(sentence) if find_words(part)]
     if not found:
-        raise InputError(f"the text {shortened(plain)!r} holds no word; give the words to be spoken")
+        raise InputError(f"the text {shorten(plain)!r} holds no word; give the words to be spoken")
     return found
 
 

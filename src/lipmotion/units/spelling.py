@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 
 
 def parse_table(rows: str) -> dict[str, str]:
@@ -86,7 +86,7 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
     foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", remove_accents(letter)))
     if foreign or not plain.strip("'"):
         raise InputError(
-            f"cannot guess how {shortened(word)!r} is said ({shortened(' '.join(foreign)) or 'no letters'}): "
+            f"cannot guess how {shorten(word)!r} is said ({shorten(' '.join(foreign)) or 'no letters'}): "
             "give the language of the words (--language), or add it to a lexicon file"
         )
     phones: list[str] = []

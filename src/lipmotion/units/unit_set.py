@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Unit
 from lipmotion.units.classes import list_phone_classes
@@ -45,10 +45,10 @@ class UnitSet:
             phone for phone, unit in self.unit_of_phone.items() if len(unit.split()) != 1 or unit != unit.strip()
         ]
         if nameless:
-            unit = shortened(self.unit_of_phone[nameless[0]])
+            unit = shorten(self.unit_of_phone[nameless[0]])
             raise InputError(f"unit set {self.name}: the unit of {nameless[0]} is {unit!r}, not a word")
         for unit in _mixed(self.unit_of_phone):
-            raise InputError(f"unit set {self.name}: {_ADVICE.format(shortened(unit))}")
+            raise InputError(f"unit set {self.name}: {_ADVICE.format(shorten(unit))}")
 
     @cached_property
     def units(self) -> tuple[str, ...]:
@@ -141,20 +141,20 @@ def read_unit_table(path: Path) -> UnitSet:
             continue
         where = f"{path}, line {number}"
         if not phones:
-            raise InputError(f"{where}: unit {shortened(unit)!r} without phones; write the unit, then its phones")
+            raise InputError(f"{where}: unit {shorten(unit)!r} without phones; write the unit, then its phones")
         if unit in unit_line:
             raise InputError(
-                f"{where}: unit {shortened(unit)!r} stands in line {unit_line[unit]} already; write it in one line"
+                f"{where}: unit {shorten(unit)!r} stands in line {unit_line[unit]} already; write it in one line"
             )
         unit_line[unit] = number
         for phone in phones:
             if phone not in PHONES:
-                raise InputError(f"{where}: unknown phone {shortened(phone)!r}; the phones are: {' '.join(PHONES)}")
+                raise InputError(f"{where}: unknown phone {shorten(phone)!r}; the phones are: {' '.join(PHONES)}")
             if phone in phone_line:
                 raise InputError(f"{where}: phone {phone!r} has a unit in line {phone_line[phone]} already; keep one")
             phone_line[phone], unit_of_phone[phone] = number, unit
     for unit in _mixed(unit_of_phone):
-        raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(shortened(unit))}")
+        raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(shorten(unit))}")
     try:
         return UnitSet(path.stem, unit_of_phone)
     except InputError as error:

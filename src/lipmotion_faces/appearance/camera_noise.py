@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 
 Pictures = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ WHITE = 255
 """The largest level of a colour."""
 LARGEST_SPREAD_PX = 3.0
 """Noise is taken to be spread over no more: what is smoother is movement."""
-LEAST_CORRELATION = 0.02
+MIN_CORRELATION = 0.02
 """Neighbouring pixels that are correlated less are taken as independent."""
 
 
@@ -58,8 +58,8 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
     products, down, across, pixels = np.zeros((3, 3)), np.zeros(2), np.zeros(2), 0
     for pictures in clips:
         if pictures.ndim != 4 or pictures.shape[3] != 3 or pictures.dtype != np.uint8:
-            found = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
-            raise InputError(f"{found}, required (T, H, W, 3), uint8")
+            received = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
+            raise InputError(f"{received}, required (T, H, W, 3), uint8")
         if len(pictures) < 3 or not pictures.size:
             continue
         steps = np.diff(pictures.astype(np.float32), axis=0)
@@ -102,8 +102,8 @@ class NoiseSource:
         """
         height, width = self.size
         if pictures.ndim != 4 or pictures.shape[1:] != (height, width, 3) or pictures.dtype != np.uint8:
-            found = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
-            raise InputError(f"{found}, required (T, {height}, {width}, 3), uint8")
+            received = f"pictures of shape {pictures.shape} and type {pictures.dtype}"
+            raise InputError(f"{received}, required (T, {height}, {width}, 3), uint8")
         result = np.empty_like(pictures)
         for number, picture in enumerate(pictures):
             draw = np.random.default_rng([self.seed, first_frame + number])
@@ -140,7 +140,7 @@ def camera_noise_from_arrays(arrays: Arrays) -> CameraNoise:
     """Deserialise noise. Raises ModelFormatError: an array is missing, unknown, out of range, or no covariance."""
     with format_errors("the noise of the camera", "build it again from the corpus"):
         refuse_undeclared(arrays, NOISE_ARRAYS)
-        stored = checked_arrays(arrays, NOISE_ARRAYS)
+        stored = check_arrays(arrays, NOISE_ARRAYS)
         covariance = stored["noise_covariance"]
         if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -EIGENVALUE_TOLERANCE:
             required = "required a symmetric one without negative eigenvalues"
@@ -167,6 +167,6 @@ def _neighbours(values: NDArray[np.float32], axis: int) -> Array:
 def _spread(sums: Array) -> float:
     """Return the deviation of the Gaussian window after which neighbours are correlated so: ρ = exp(−1 / 4s²)."""
     correlation = sums[0] / sums[1] if sums[1] > 0 else 0.0
-    if correlation < LEAST_CORRELATION:
+    if correlation < MIN_CORRELATION:
         return 0.0
-    return float(min(np.sqrt(-1 / (4 * np.log(min(correlation, 1 - LEAST_CORRELATION)))), LARGEST_SPREAD_PX))
+    return float(min(np.sqrt(-1 / (4 * np.log(min(correlation, 1 - MIN_CORRELATION)))), LARGEST_SPREAD_PX))

@@ -123,14 +123,14 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
     if coefficients is None:
         coefficients = eigenlips.project(pictures)
     details, deepest = recorded_details(eigenlips, pictures, coefficients)
-    whole = deepest <= LARGEST_DETAIL
-    if not whole.any():
+    undamaged = deepest <= LARGEST_DETAIL
+    if not undamaged.any():
         raise InputError(
             f"{len(pictures)} pictures, all of which differ from their eigenlips by more than {LARGEST_DETAIL} grey "
             "levels; required at least one that does not: are they pictures of the person whom the eigenlips were "
             "trained on?"
         )
-    return Candidates(coefficients[whole], details[whole])
+    return Candidates(coefficients[undamaged], details[undamaged])
 
 
 def recorded_details(

@@ -349,10 +349,7 @@ class _Plan:
         return stop - 1 - at if way > 0 else at - start
 
     def _find_jumps(self, distance: Array, way: int) -> tuple[Numbers, Array]:
-        """Return the frame of each scene to which each frame is best followed by a jump, -1 for none, and the cost.
-
-        distance : of frames [shape=(T, T)];  way : 1 or -1. Both results have the shape (T, S).
-        """
+        """Return the best frame of each scene to jump to, -1 for none, and the cost [both shape=(T, S)]."""
         count = len(distance)
         frames = np.arange(count)
         power = np.zeros((count, count))
@@ -418,10 +415,7 @@ def _measure_restlessness(descriptors: FrameDescriptors, scenes: Sequence[tuple[
 
 
 def _make_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], count: int, fade: int) -> LoopOrder:
-    """Return the order of some runs (first frame, direction, number of frames), of which ``count`` frames are shown.
-
-    fade : frames over which a jump is cross-faded, smoothly (3s² − 2s³)
-    """
+    """Return the order of runs (first frame, way, length), ``count`` frames of it; jumps fade smoothly (3s² − 2s³)."""
     first = np.concatenate([at + way * np.arange(length) for at, way, length in runs])[:count]
     second, weight = first.copy(), np.zeros(count)
     for join, (before, after) in zip(joins, pairwise(runs), strict=False):

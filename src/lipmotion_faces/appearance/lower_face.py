@@ -191,8 +191,7 @@ A = -0.5
 
 def moved_part(scale: int) -> Mask:
     """Return where pictures of the lower face may differ from the footage: bool array [shape=(H, W)]."""
-    rows, columns = np.mgrid[: HEIGHT * scale, : WIDTH * scale]
-    x, y = (columns + 0.5) / scale + CORNER[0], (rows + 0.5) / scale + CORNER[1]
+    x, y = _positions(scale)
     top, bottom = CORNER[1] + 14.0, CORNER[1] + HEIGHT - 2.0
     middle = (top + bottom) / 2
     return (np.abs(x) / SIDE_PX[1]) ** 4 + (np.abs(y - middle) / (bottom - middle)) ** 4 <= 1

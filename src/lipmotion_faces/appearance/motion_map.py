@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.stats.tree_regression import ridge, zero_statistics
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance.candidates import choose_candidates, squared_distances
 
@@ -133,7 +133,7 @@ def motion_map_from_arrays(arrays: Arrays, values: int) -> MotionMap:
     """
     with format_errors("the map from motion to pictures", "build the face again"):
         refuse_undeclared(arrays, MOTION_MAP)
-        stored = checked_arrays(arrays, MOTION_MAP, V=values)
+        stored = check_arrays(arrays, MOTION_MAP, V=values)
         names = tuple(stored["names"].tolist())
         rows = 1 + stored["basis"].shape[1] + len(stored["centres"])
         if len(stored["coefficients"]) != rows or stored["centres"].shape[1] > stored["basis"].shape[1]:

@@ -26,7 +26,7 @@ from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.coded_video import decode_pictures, encode_pictures
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
@@ -208,9 +208,7 @@ class Appearance:
         return FaceCodes(mouth, values[:, count:-1], values[:, -1])
 
     def _mix_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
-        """Return mixtures of recorded mouths [shape=(T, 90)] that look as predicted and are as open and as wide as the
-        motion, as far as this person has been; in closures, recorded mouths that are closed.
-        """
+        """Return recorded mouths, mixed to look as predicted and be as open and wide as the motion [shape=(T, 90)]."""
         measured = self.mouth_distances
         if measured is None:
             return draw_to_recorded(predicted, self.mouth_codes)
@@ -406,14 +404,14 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
     Raises ModelFormatError: an array is missing, unknown, out of range, or the parts do not fit together.
     """
     inner = {part: arrays_under(arrays, f"{part}/") for part in PARTS}
-    own = {name: array for name, array in arrays.items() if name.partition("/")[0] not in PARTS or "/" not in name}
+    named = {name: array for name, array in arrays.items() if name.partition("/")[0] not in PARTS or "/" not in name}
     with format_errors("the appearance of the person", REMEDY):
-        refuse_undeclared(own, APPEARANCE)
+        refuse_undeclared(named, APPEARANCE)
         mouth, jaw = (eigenlips_from_arrays(inner[part], REMEDY) for part in ("mouth", "jaw"))
         _check_size("mouth", mouth, (MOUTH_HEIGHT, MOUTH_WIDTH))
         _check_size("jaw", jaw, (HEIGHT, WIDTH))
         codes, jaw_codes = len(mouth.channels), len(jaw.channels)
-        stored = checked_arrays(own, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
+        stored = check_arrays(named, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
         scale = int(stored["scale"])
         half_width_px, bottom_px = stored["shape"].tolist()
         if not NARROWEST_PX <= half_width_px <= WIDEST_PX or not CORNER[1] < bottom_px < CORNER[1] + HEIGHT:

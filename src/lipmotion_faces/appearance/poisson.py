@@ -289,10 +289,10 @@ def cloning_system(mask: Mask) -> CloningSystem:
     rows, columns = (np.flatnonzero(inner.any(axis=axis)) for axis in (1, 0))
     box = slice(int(rows[0]) - 1, int(rows[-1]) + 2), slice(int(columns[0]) - 1, int(columns[-1]) + 2)
     region = inner[box]
-    beside = np.zeros_like(region)
+    neighbours = np.zeros_like(region)
     for axis in (0, 1):
-        beside |= np.roll(region, 1, axis) | np.roll(region, -1, axis)
-    edge = np.flatnonzero(beside & ~region)
+        neighbours |= np.roll(region, 1, axis) | np.roll(region, -1, axis)
+    edge = np.flatnonzero(neighbours & ~region)
     if len(edge) > LARGEST_EDGE:
         raise InputError(
             f"region with {len(edge)} pixels on its edge, at most {LARGEST_EDGE} are possible; "
@@ -303,10 +303,7 @@ def cloning_system(mask: Mask) -> CloningSystem:
 
 
 def _solve_response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
-    """Return the membrane at the nodes for a difference of 1 at each pixel of the edge [shape=(K, B)].
-
-    Of all functions that the grids can interpolate, it is the one of the least energy (Galerkin's method).
-    """
+    """Return the membrane at the nodes for 1 at each pixel of the edge [shape=(K, B)], by Galerkin's method."""
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import splu
 

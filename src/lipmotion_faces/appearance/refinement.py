@@ -110,11 +110,11 @@ class Refiner:
     options: RefinementOptions = STEADY
 
     def __post_init__(self) -> None:
-        wanted, found = (len(self.eigenlips.channels), self.eigenlips.size), self.candidates
-        if (found.coefficients.shape[1], found.size) != wanted:
+        wanted, candidates = (len(self.eigenlips.channels), self.eigenlips.size), self.candidates
+        if (candidates.coefficients.shape[1], candidates.size) != wanted:
+            counts = f"{candidates.coefficients.shape[1]} coefficients and {candidates.size} px"
             raise InputError(
-                f"candidates of {found.coefficients.shape[1]} coefficients and {found.size} px, required {wanted[0]} "
-                f"and {wanted[1]} px; make them with the same eigenlips"
+                f"candidates of {counts}, required {wanted[0]} and {wanted[1]} px; make them with the same eigenlips"
             )
 
     def refine(self, coefficients: Values) -> Pictures:
@@ -167,10 +167,7 @@ class Refiner:
         return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
 
     def _nearest(self, wanted: Costs) -> tuple[Index, Costs]:
-        """Return the nearest candidates of each frame, nearest first, and their costs [each shape=(C, T, n)].
-
-        C is 1 if all colours have one candidate, otherwise 3; n is the number of neighbours.
-        """
+        """Return the nearest candidates of each frame, in order, and their costs [shape=(1 or 3, T, n), both]."""
         count = min(self.options.neighbours, len(self.candidates))
         frames = wanted.shape[1]
         rows = 1 if self.options.together else len(COLOURS)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.pipeline.training.phone_sequences import pronounced_sentences, recorded_phones
+from lipmotion.pipeline.training.prompts import pronounce_sentences, read_corpus_phones
 from lipmotion.printable import printable
 from lipmotion.units import PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, Lexicon, find_similar_lips
 from lipmotion.units.classes import CLASSES
@@ -94,8 +94,8 @@ def coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon: Lexicon
     phones.
     """
     lexicon = lexicon or Lexicon()
-    usable, left_out = pronounced_sentences(text, lexicon)
-    utterances = list(recorded_phones(corpus, lexicon))
+    usable, left_out = pronounce_sentences(text, lexicon)
+    utterances = list(read_corpus_phones(corpus, lexicon))
     runs = [run for utterance in utterances for run in utterance]
     if not runs:
         raise CorpusError(

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import VIDEO_KINDS
 from lipmotion.corpora.layouts import LRS
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
-from lipmotion.corpora.splits import LISTS
+from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio

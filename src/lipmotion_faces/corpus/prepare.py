@@ -13,8 +13,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantise, read_entry, write_utterance
+from lipmotion.corpora.folder import discover
 from lipmotion.corpora.separate_sounds import add_separate_sounds
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
@@ -23,7 +23,7 @@ from lipmotion.extensions import installed_version
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import confined, locked, portable_name, remove_unfinished, sha256_of
+from lipmotion.storage.files import confine, lock_folder, portable_name, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
@@ -39,7 +39,7 @@ from lipmotion_faces.corpus.supplied import (
 )
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.trackers import MEDIAPIPE, tracker_named
+from lipmotion_faces.tracking.trackers import MEDIAPIPE, make_tracker
 
 LOG = logging.getLogger("lipmotion")
 RECIPE = "5"
@@ -153,10 +153,10 @@ def prepare(
         folder, place = discover(directory), directory
     offset_s = None if offset_ms is None else offset_ms / 1000
     folder = add_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
-    chosen = tracker_named(tracker)
+    chosen = make_tracker(tracker)
     packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
-    with locked(output):
+    with lock_folder(output):
         corpus = Corpus.create(output)
         folder, parts = divide_long_videos(folder, place, monitor, tracker)
         collection = "/".join(place.resolve().parts[-2:]).strip("/")
@@ -265,7 +265,7 @@ def _process(job: _Job) -> _Outcome:
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _make_utterance(job, source)
-        with confined(job.folder.parent.parent):  # the corpus, in this worker
+        with confine(job.folder.parent.parent):  # the corpus, in this worker
             write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
         raise  # all other recordings would fail in the same way

@@ -15,7 +15,7 @@ from lipmotion.corpora.vocaset import MESH, mesh_files, read_mesh_motion
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
 from lipmotion.formats.tables import is_live_link_file, read_curve_table, speech_curves
-from lipmotion.pipeline.outputs.motion_input import in_step
+from lipmotion.pipeline.outputs.motion_input import correct_rate
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.sound_offset import sound_offset
@@ -72,7 +72,7 @@ def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
     else:
         motion = read_bare_motion(curves) if curves.channels else read_motion(curves.file)[0]
     if duration_s is not None:
-        motion = in_step(motion, duration_s, f" ({curves.file})")
+        motion = correct_rate(motion, duration_s, f" ({curves.file})")
     length_s = len(motion.values) / motion.rate_hz
     if duration_s is not None and abs(length_s - duration_s) > max(CURVES_MARGIN_S, CURVES_MARGIN_SHARE * duration_s):
         raise InputError(
@@ -149,8 +149,8 @@ class SeparateSound:
     @property
     def note(self) -> str:
         """What was done, for the user."""
-        found = self.how if self.how == GIVEN else f"found by the {self.how.removeprefix('the ')}"
-        return f"sound {abs(self.late_s) * 1000:.1f} ms {'late' if self.late_s >= 0 else 'early'}, {found}"
+        description = self.how if self.how == GIVEN else f"found by the {self.how.removeprefix('the ')}"
+        return f"sound {abs(self.late_s) * 1000:.1f} ms {'late' if self.late_s >= 0 else 'early'}, {description}"
 
 
 def separate_sound(recording: SourceRecording) -> SeparateSound | None:

@@ -16,7 +16,7 @@ from lipmotion.motion.resample import resample_to_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.lip_speed import measured_opening_speed, predicted_opening_speed
 from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.storage.files import locked
+from lipmotion.storage.files import lock_folder
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 
 REACH_S = 0.4
@@ -116,7 +116,7 @@ def sync(corpus: Corpus) -> dict[str, float]:
     Raises CorpusError: an utterance is damaged. Raises ExportError: it cannot be written, or another process
     is changing the corpus.
     """
-    with locked(corpus.path):
+    with lock_folder(corpus.path):
         measured = offsets(corpus)
         moved = {name: pooled.late_s for name, pooled in measured.collections.items() if _is_worth_moving(pooled)}
         for collection, late_s in moved.items():

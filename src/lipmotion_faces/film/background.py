@@ -93,8 +93,8 @@ class BackgroundSequence:
         """The part of the frames in which the face is at any time: left, top, right and bottom, px."""
         corners = np.array([[x, y, 1.0] for x in HEAD_PX[::2] for y in HEAD_PX[1::2]])
         places = (self.face_to_frame @ corners.T).swapaxes(1, 2).reshape(-1, 2)
-        least, most = places.min(axis=0), places.max(axis=0)
-        return float(least[0]), float(least[1]), float(most[0]), float(most[1])
+        low, high = places.min(axis=0), places.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def enlarge(self, zoom: float) -> BackgroundSequence:
         """Return the same background, on which a mouth is ``zoom`` times as large, in the same place."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import read_entry
+from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
 from lipmotion.corpora.store import MANIFEST, Corpus
 from lipmotion.errors import CorpusError, InputError
@@ -72,20 +72,21 @@ class Take:
 
 
 def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
-    """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly.
+    """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened first.
 
     source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
                  training list
     recordings : of a corpus, the folder of the videos that it was prepared from
     speaker    : whose, where there are several people
+    A take that cannot be read may be among them: where it is tracked, the reason is reported.
     Raises InputError: no such file, several people, no such person, no videos, or a corpus without ``recordings``.
     """
     if not source.exists():
         raise InputError(f"{source}: no such file or folder; give a video of the person, or a folder of videos")
     if source.is_file():
         check_source(source, "video")
-        whole = SourceRecording(source.stem, source, None, speaker=speaker)
-        return [_make_take(whole, source.parent, seconds=MOST_FOOTAGE_S)]
+        recording = SourceRecording(source.stem, source, None, speaker=speaker)
+        return [_make_take(recording, source.parent, seconds=MOST_FOOTAGE_S)]
     if (source / MANIFEST).is_file():
         takes = _list_corpus(Corpus.open(source), recordings, speaker)
     else:
@@ -94,14 +95,6 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
         takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
     if not takes:
         raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
-    return _select_evenly(takes)
-
-
-def _select_evenly(takes: Sequence[Take]) -> list[Take]:
-    """Return takes of about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened before any is left out.
-
-    A take that cannot be read may be among them: where it is tracked, the reason is reported.
-    """
     durations_s = [_duration_s(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
     longest_s = left_s = MOST_FOOTAGE_S
     for number, duration_s in enumerate(sorted(durations_s)):
@@ -123,9 +116,9 @@ def _select_person(items: Sequence[SourceRecording], speaker: str, where: str) -
     """Return the recordings of one person. Raises InputError: there are several people, or no such person."""
     people = sorted({item.speaker for item in items})
     if (speaker and speaker not in people) or (not speaker and len(people) > 1):
-        found = f"no speaker {speaker!r}" if speaker else f"{len(people)} speakers"
+        problem = f"no speaker {speaker!r}" if speaker else f"{len(people)} speakers"
         known = ", ".join(name or "one without a name" for name in people)
-        raise InputError(f"{where}: {found}, a face is that of one person; name it (--speaker): {known}")
+        raise InputError(f"{where}: {problem}, a face is that of one person; name it (--speaker): {known}")
     return [item for item in items if not speaker or item.speaker == speaker]
 
 
@@ -159,10 +152,7 @@ def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[
 
 
 def _find_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
-    """Return the file from which an utterance was prepared, of those of its name; None: it is not among them.
-
-    People of a corpus may share names of files: size and, of several files, content tell which one is meant.
-    """
+    """Return the file of an utterance, of those of its name: people of a corpus may share names of files."""
     size = stated.get("bytes")
     same = [file for file in files if size is None or str(file.stat().st_size) == str(size)]
     if len(same) > 1 and "sha256" in stated:
@@ -204,7 +194,7 @@ MOST_PICTURES_HZ = 30.0
 """Every second frame, or fewer, of faster video is learned from."""
 SPOKEN_TAKES_S = 20.0
 """Seconds of speech that are kept, for motion of other people's models."""
-LEAST_SPOKEN_S = 0.5
+MIN_SPOKEN_S = 0.5
 """Shorter parts of a take are not kept for that."""
 JAW_ENDS = ("x_150", "x_379")
 """The ends of the tracked jaw line, right and left."""
@@ -406,7 +396,7 @@ def select_speech(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:
     takes: list[SpokenTake] = []
     left_s = SPOKEN_TAKES_S
     for take in filmed:
-        if take.sound is None or min(left_s, take.sound.duration_s) < LEAST_SPOKEN_S:
+        if take.sound is None or min(left_s, take.sound.duration_s) < MIN_SPOKEN_S:
             continue
         footage = take.footage
         count = min(len(footage), round(left_s * footage.rate_hz))

@@ -194,7 +194,7 @@ def face_codes(
 ) -> FaceCodes:
     """Return what the lower face is like in ``count`` frames at the rate of a video.
 
-    units : the phones in time; in every p, b and m the lips touch (``contact.closed_lips``)
+    units : the phones in time; in every p, b and m the lips touch (``contact.close_lips``)
     Raises InputError: motion without the channels that the face needs.
     """
     time_s = np.arange(count) / rate_hz
@@ -284,9 +284,9 @@ def refuse_film(options: Outputs) -> None:
         "another refinement": options.refinement if options.refinement != FILM.refinement else None,
         "a visible mark": options.mark if options.mark == "visible" else None,
     }
-    given = next((name for name, value in filmed.items() if value is not None), None)
-    if given is not None:
-        raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
+    option = next((name for name, value in filmed.items() if value is not None), None)
+    if option is not None:
+        raise InputError(f"{option} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
 
 
 def check_film(options: Outputs, speech: str | Path | None = None) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.storage.coded_video import STORED_VIDEO, StoredVideo, stored_video_arrays, stored_video_from_arrays
+from lipmotion.storage.coded_video import STORED_VIDEO, StoredVideo, stored_video_from_arrays, stored_video_to_arrays
 from lipmotion.storage.files import check_source
 from lipmotion.storage.schema import (
     LARGEST_NUMBER,
@@ -20,7 +20,7 @@ from lipmotion.storage.schema import (
     Arrays,
     ArraySpec,
     arrays_under,
-    checked_arrays,
+    check_arrays,
     format_errors,
     refuse_undeclared,
 )
@@ -117,7 +117,7 @@ def save_face(face: FilmedFace, path: str | Path) -> None:
     background, takes = face.background, face.takes
     channels = takes[0].motion.channels if takes else ()
     arrays = {f"appearance/{name}": array for name, array in appearance_arrays(face.appearance).items()}
-    arrays |= {f"background/{name}": array for name, array in stored_video_arrays(background.video).items()}
+    arrays |= {f"background/{name}": array for name, array in stored_video_to_arrays(background.video).items()}
     arrays |= {"background/face_to_frame": background.face_to_frame, "background/chin_px": background.chin_px}
     arrays |= {"background/cuts": np.array(background.cuts, np.intp)}
     for number, take in enumerate(takes):
@@ -205,7 +205,7 @@ TAKE = {
 def _background(arrays: Arrays) -> StoredBackground:
     refuse_undeclared(arrays, BACKGROUND, STORED_VIDEO)
     video = stored_video_from_arrays({name: array for name, array in arrays.items() if name not in BACKGROUND})
-    stored = checked_arrays(arrays, BACKGROUND, T=len(video))
+    stored = check_arrays(arrays, BACKGROUND, T=len(video))
     maps = stored["face_to_frame"]
     if (np.abs(np.linalg.det(maps[:, :, :2])) < LEAST_DETERMINANT).any() or any(length % 2 for length in video.size):
         raise ValueError("flat places of the face, or frames of odd sizes")
@@ -221,7 +221,7 @@ LEAST_DETERMINANT = 1e-6
 
 def _take(arrays: Arrays, channels: tuple[Channel, ...]) -> SpokenTake:
     refuse_undeclared(arrays, TAKE)
-    stored = checked_arrays(arrays, TAKE, C=len(channels))
+    stored = check_arrays(arrays, TAKE, C=len(channels))
     sound = Audio(stored["sound"].astype(np.float32) / np.float32(FULL_SCALE), int(stored["sound_rate_hz"]))
     motion = Motion(stored["motion"].astype(np.float64), float(stored["rate_hz"]), channels)
     return SpokenTake(sound, motion, stored["seen"])

@@ -124,8 +124,8 @@ class Stitcher:
             part = slice(first, first + size)
             batch = list(islice(iterator, len(codes.mouth[part])))
             if len(batch) < len(codes.mouth[part]):
-                found = first + len(batch)
-                raise InputError(f"{found} frames of background, required {len(codes)}; give longer footage")
+                count = first + len(batch)
+                raise InputError(f"{count} frames of background, required {len(codes)}; give longer footage")
             mouths = self._draw_mouths(codes.mouth[part], mouth_chosen[part], first)
             maps = region_map(np.stack([each.face_to_frame for each in batch]), scale)
             aligned = [

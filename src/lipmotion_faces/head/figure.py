@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion.meshes.model.textures import decode_srgb
+from lipmotion_faces.base import rotate_head
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
 from lipmotion_faces.head.forms import EYE
@@ -20,7 +21,6 @@ from lipmotion_faces.head.part import Part, grid_triangles, part, tube
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import AT_CORNER, REST, Skin, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
-from lipmotion_faces.turning import turned
 
 Real = NDArray[np.float64]
 
@@ -176,12 +176,12 @@ class Figure:
     """
 
     def __init__(self) -> None:
-        self.skin = Skin()
+        self.skin = skin = Skin()
         self._eye, self._light = eyeball(), catchlights()
         left_brow, left_ear, ring, tongue_at_rest = brow(), ear(), earring(), tongue(REST)
         lash = np.zeros((3 * LASHES, 3))
         parts = [
-            self.skin.as_part(skin_colours(self.skin)),
+            Part("skin", skin.rest, skin.triangles, skin_colours(skin), palette.SKIN_FINISH, skin.normals),
             part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
             lower_teeth(), upper_teeth(),
             self._eye, self._eye.mirror("right eye"), self._light, replace(self._light, name="right catchlights"),
@@ -227,7 +227,7 @@ class Figure:
         for name in ("brow", "right brow"):
             places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)
             places[self.rows[name], 1] += pose.brows
-        look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
+        look, half = rotate_head(*pose.gaze), rotate_head(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
         lid = places[self.skin.lid_rows(0)[1][:LASHES]]
         for side, name in _EYES:
             flip = np.array([side, 1.0, 1.0])
@@ -243,7 +243,7 @@ class Figure:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
         places, normals = self.place(pose)
         colours, arrives = self._shade(pose, places)
-        turn, moving, neck = turned(*pose.turn).T, self.head, self.rows["neck"]
+        turn, moving, neck = rotate_head(*pose.turn).T, self.head, self.rows["neck"]
         held, still = self._held[neck], (places[neck].copy(), normals[neck].copy())
         strands = self._strands.copy()
         places[moving] = (places[moving] - PIVOT) @ turn + PIVOT

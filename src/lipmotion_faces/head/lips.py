@@ -163,10 +163,7 @@ def _between(pose: CharacterPose) -> Real:
 
 
 def _opening(pose: CharacterPose) -> tuple[Real, Real]:
-    """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(..., COLUMNS), both].
-
-    A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
-    """
+    """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(..., COLUMNS), both]."""
     reach = 1 - 0.10 * pose.oval - 0.30 * pose.tuck
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)

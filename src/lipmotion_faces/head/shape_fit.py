@@ -68,8 +68,8 @@ class _MouthFit:
         weights = fit_bounded_curves(self._triangle.T, targets, COSTS)
         jaw, close = names.index("jawOpen"), names.index("mouthClose")
         weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
-        kept = [name for name in names if not name.startswith(PARTING)]
-        weights = with_gap(with_gap(weights, self._shapes, gap, kept), self._shapes, gap)
+        others = [name for name in names if not name.startswith(PARTING)]
+        weights = with_gap(with_gap(weights, self._shapes, gap, others), self._shapes, gap)
         return dict(zip(names, weights.T, strict=True)) | fixed
 
     def _wanted(self, poses: Sequence[CharacterPose]) -> tuple[Real, Real]:
@@ -101,11 +101,7 @@ def _edges(moved: Real) -> tuple[Real, Real]:
 
 
 def _rows(lips: Real, around: Real) -> Real:
-    """Return displacements of the skin as rows of a least squares problem: places around the mouth, and gaps.
-
-    lips   : of the rings [shape=(..., RINGS, COLUMNS, 3)]
-    around : of vertices around the mouth [shape=(..., N, 3)]
-    """
+    """Return displacements of lips and of the skin around them as rows of a least squares problem, with gaps."""
     upper, lower = _edges(lips)
     shape = (*lips.shape[:-3], -1)
     visible = lips[..., :VISIBLE_RINGS, :, :].reshape(shape)

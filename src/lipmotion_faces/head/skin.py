@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from lipmotion.meshes.model.surface import compute_normals
-from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion_faces.head.lips import (
@@ -23,7 +22,6 @@ from lipmotion_faces.head.lips import (
     lip_surface,
     section_points,
 )
-from lipmotion_faces.head.part import Part
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.rendering.lighting import unit
 
@@ -151,10 +149,6 @@ class Skin:
         inner = first + np.arange(LID_RINGS * LID_COLUMNS).reshape(LID_RINGS, LID_COLUMNS)
         return np.concatenate([inner, outer[None]])
 
-    def as_part(self, colours: Real) -> Part:
-        """Return the skin at rest with the diffuse reflection of its vertices, linear [shape=(V, 3)]."""
-        return Part("skin", self.rest, self.triangles, colours, palette.SKIN_FINISH, self.normals)
-
     def pose(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
         places = self.places(pose)
@@ -174,10 +168,7 @@ class Skin:
         return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
 
     def _bind(self, fill: Real) -> Binding:
-        """Return how every vertex of the face is bound to the columns of the lips, and to the jaw.
-
-        fill : the last of them, between mouth, eyes and the back of the head
-        """
+        """Return how vertices of the face, of which ``fill`` are the last, are bound to columns of the lips and jaw."""
         contour, face = self._contour, self.face
         away = face[:, None, :2] - contour[None, :, :2]
         nearest, across = cKDTree(contour[:, :2]).query(face[:, :2])[0], np.linalg.norm(away, axis=2)

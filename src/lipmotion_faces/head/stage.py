@@ -69,7 +69,7 @@ def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     shapes: list[Blendshape] = []
 
     def add(name: str, start: Real, end: Real) -> None:
-        shapes.append(Blendshape.between(name, start, end, least=LEAST_DISPLACEMENT))
+        shapes.append(Blendshape.between(name, start, end, smallest=LEAST_DISPLACEMENT))
 
     for name, pose in (POSES | MOOD_POSES if moods else POSES).items():
         start = figure.place(POSES["jawOpen"])[0] if name == "mouthClose" else rest
@@ -146,16 +146,3 @@ class Stage:
         """Return the picture of a pose without background, with straight alpha [shape=(H, W, 4)]."""
         drawn = self.figure.frame(pose, self.canvas.camera.place)
         return self._dark.cut_out(drawn.places, drawn.light, self.figure.triangles)
-
-    def parts_seen(self, pose: CharacterPose) -> dict[str, NDArray[np.bool_]]:
-        """Return which pixels show each part of the mouth: lips, wall, tongue, teeth (lower), upper teeth.
-
-        Every mask has the size of the picture [shape=(H, W)].
-        """
-        drawn = self.figure.frame(pose, self.canvas.camera.place)
-        seen = {}
-        for name, rows in self.figure.mouth_rows().items():
-            marked = np.zeros(len(drawn.places), bool)
-            marked[rows] = True
-            seen[name] = self.canvas.shown(drawn.places, marked, self.figure.triangles)
-        return seen

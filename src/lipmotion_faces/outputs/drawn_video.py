@@ -14,13 +14,13 @@ from lipmotion.errors import ExportError
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.outputs.prosody import measure_prosody
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
 from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion_faces.film.filmed_video import RENDERING
-from lipmotion_faces.registry import staged_face
+from lipmotion_faces.registry import stage_face
 
 OPAQUE_SUFFIX = ".mp4"
 VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
@@ -44,10 +44,8 @@ class VideoOutput(Output):
         settings = self.settings
         fps = settings.outputs.fps
         if fps is not None and fps > FASTEST_HZ:
-            raise ExportError(
-                f"{self.path}: {fps:g} pictures a second, required {FASTEST_HZ:g} or fewer in a video; the "
-                "rate of motion files alone is --rate"
-            )
+            required = f"required {FASTEST_HZ:g} or fewer in a video; the rate of motion files alone is --rate"
+            raise ExportError(f"{self.path}: {fps:g} pictures a second, {required}")
         if settings.delivery.offset_ms and self.has_sound:
             raise ExportError(
                 f"{self.path}: a video has its own sound, which begins with it; an offset is for files that are put "
@@ -57,7 +55,7 @@ class VideoOutput(Output):
         if settings.recording is None and not settings.sounded:
             raise ExportError(f"{self.path}: a video needs the recording: write(..., speech=FILE)")
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         face = self.settings.face
         face.check_drawable(self.path, performance.generation)
         return partial(face.write_video, self.path, performance)
@@ -97,18 +95,15 @@ def is_picture_sequence(path: Path) -> bool:
 def check_background(path: Path, staging: Staging) -> None:
     """Raise ExportError if a face is to be transparent in a file that cannot be."""
     if staging.background == TRANSPARENT and path.suffix.lower() == OPAQUE_SUFFIX:
-        raise ExportError(
-            f"{path}: {OPAQUE_SUFFIX} cannot be transparent; write .webm, .mov or %05d.png, or give a colour"
-        )
+        others = "write .webm, .mov or %05d.png, or give a colour"
+        raise ExportError(f"{path}: {OPAQUE_SUFFIX} cannot be transparent; {others}")
 
 
 def check_drawable(path: Path, motion: Motion) -> None:
     """Raise ExportError if motion has no channel from which a face can be drawn."""
     if "opening" not in motion.names and not is_of_blendshapes(motion):
-        raise ExportError(
-            f"{path}: the motion has no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'; write "
-            "motion files"
-        )
+        missing = "no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'"
+        raise ExportError(f"{path}: the motion has {missing}; write motion files")
 
 
 def write_drawn_face(  # noqa: PLR0913
@@ -127,7 +122,7 @@ def write_drawn_face(  # noqa: PLR0913
     monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
-    staged, drawn = staged_face(face, staging, prosody or prosody_of_speech(sound)), None
+    staged, drawn = stage_face(face, staging, prosody or measure_prosody(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:
@@ -157,6 +152,6 @@ def load_drawing(face: Face) -> None:
     """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
     if isinstance(face, DrawsPlanes) and numba_works():
         closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
-        smallest = staged_face(face, Staging(size=SMALLEST_PX))
+        smallest = stage_face(face, Staging(size=SMALLEST_PX))
         if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
             list(frames)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from lipmotion.articulation.contact import sample_pictures
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
-from lipmotion.articulation.mouth import SpokenMouth, frame_times, measure_mouth_at_rest, spoken_mouth
+from lipmotion.articulation.mouth import frame_times, measure_mouth_at_rest, spoken_mouth
 from lipmotion.articulation.rest import add_rest
 from lipmotion.meshes.files.gltf_writer import write_animated_gltf, write_gltf_scene
 from lipmotion.meshes.files.usd_writer import asset, write_usda
@@ -23,12 +24,12 @@ from lipmotion.meshes.model.bones import head_quaternions
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
-from lipmotion.pipeline.outputs.curve_sets import edited_weights, known_names
-from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_drawn_channels
+from lipmotion.pipeline.outputs.curve_sets import edit_weights, known_names
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import recorded_prosody
+from lipmotion.pipeline.outputs.prosody import measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
-from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT
 from lipmotion_faces.base import Staging, stage_liveliness
 from lipmotion_faces.outputs.drawn_video import check_drawable
@@ -51,10 +52,11 @@ class SceneOutput(Output):
         return SCENE_SUFFIXES
 
     def check(self) -> None:  # noqa: D102
-        if self.settings.recording is not None:
-            check_sound_name(self.path, self.settings.recording)
+        sound = self.settings.recording
+        if sound is not None and self.path.suffix.lower() == USD:
+            asset(sound_reference(sound, self.path))  # refuses names that such a file cannot hold
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         check_drawable(self.path, performance.generation.motion)
         return lambda: write_scene(self.path, performance.cached(delivered_scene), sound=performance.sound_file)
 
@@ -66,17 +68,17 @@ def delivered_scene(performance: Performance, frames: slice | None = None) -> Sc
              the whole; None: all
     """
     settings, delivery = performance.settings, performance.settings.delivery
-    moved = with_drawn_channels(delivered(performance.generation, delivery))
+    moved = with_drawn_channels(deliver(performance.generation, delivery))
     part = None if delivery.hold_ms else frames
-    scene = settings.face.scene(moved, settings, performance.cached(recorded_prosody), part)
+    scene = settings.face.scene(moved, settings, performance.cached(measure_recorded_prosody), part)
     thinning = Thinning(delivery.key_tolerance, tuple(find_closed_times(moved)) if delivery.key_tolerance else ())
     scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
     weights = scene.weights
     if weights is None or not delivery.hold_ms:
         return scene
     states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
-    whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
-    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
+    held = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
+    steps = hold_mouth(held, delivery.hold_frames(weights.rate_hz), find_closed_times(moved))
     return replace(scene, weights=steps.motion, stepped=steps.stepped)
 
 
@@ -88,27 +90,15 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     Raises ExportError: the file cannot be written.
     """
     with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))
-    if _keeps_original(path, with_sound):
-        return
+    original, weights = scene.original, scene.weights
     if path.suffix.lower() == USD:
         write_usda(path, with_sound)
-    else:
-        write_gltf_scene(path, with_sound)
-
-
-def _keeps_original(path: Path, scene: Scene) -> bool:
-    """Write the user's file with its animation, and return whether that was possible."""
-    if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
-        return False
-    return scene.weights is not None and write_animated_gltf(
-        path,
-        scene.original,
-        scene.weights,
-        scene.sound,
-        sound_s=scene.sound_s,
-        stepped=scene.stepped,
-        thinning=scene.thinning,
-    )
+        return
+    if path.suffix.lower() == GLTF and original is not None and original.suffix.lower() in KEPT and weights is not None:
+        write = partial(write_animated_gltf, sound_s=scene.sound_s, stepped=scene.stepped, thinning=scene.thinning)
+        if write(path, original, weights, with_sound.sound):
+            return
+    write_gltf_scene(path, with_sound)
 
 
 def head_scene(
@@ -133,24 +123,27 @@ def head_scene(
 
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
-    around, kept = _around(frames, MARGIN)
-    mouth = spoken_mouth(motion, units, hertz) if frames is None else _mouth_in(motion, units, around)
+    around, wanted = _around(frames, MARGIN)
+    if frames is None:
+        mouth = spoken_mouth(motion, units, hertz)
+    else:  # made of the frames around those that are wanted
+        wider, inner = _around(around, MOUTH_MARGIN)
+        part = replace(motion, values=motion.values[wider])
+        there = units.between(wider.start / motion.rate_hz, (wider.start + len(part.values)) / motion.rate_hz)
+        mouth = spoken_mouth(part, there, at_rest=measure_mouth_at_rest(motion, units)).within(inner)
     moved = stage_liveliness(times_s[around], motion, units, staging, prosody)
     poses = pose_head(mouth, moved)
-    character, mesh = (
-        figure(),
-        mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
-    )
-    curves = mouth_weights(character, mesh, poses)
-    curves |= eye_and_brow_weights(moved)
+    has_mood = any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)
+    character, mesh = figure(), mesh_of_figure(moods=has_mood)
+    curves = mouth_weights(character, mesh, poses) | eye_and_brow_weights(moved)
     names = [name for name in mesh.shape_names if name in curves]
     table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
-    weights = edited_weights(Motion(table, hertz, channels), units, generation.curve_edits)
-    weights = replace(weights, values=weights.values[around][kept])
+    weights = edit_weights(Motion(table, hertz, channels), units, generation.curve_edits)
+    weights = replace(weights, values=weights.values[around][wanted])
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
-    turns = head_quaternions(np.stack([pose.turn for pose in poses]))[kept]
+    turns = head_quaternions(np.stack([pose.turn for pose in poses]))[wanted]
     return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
 
 
@@ -160,14 +153,6 @@ def _around(frames: slice | None, margin: int) -> tuple[slice, slice]:
         return slice(None), slice(None)
     first = max(frames.start - margin, 0)
     return slice(first, frames.stop + margin), slice(frames.start - first, frames.stop - first)
-
-
-def _mouth_in(motion: Motion, units: Timeline[Unit], frames: slice) -> SpokenMouth:
-    """Return the mouth in some frames of a motion, made of those around them."""
-    around, kept = _around(frames, MOUTH_MARGIN)
-    part, rate_hz = replace(motion, values=motion.values[around]), motion.rate_hz
-    there = units.between(around.start / rate_hz, (around.start + len(part.values)) / rate_hz)
-    return spoken_mouth(part, there, at_rest=measure_mouth_at_rest(motion, units)).within(kept)
 
 
 def character_scene(
@@ -187,30 +172,21 @@ def character_scene(
     Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
     """
     motion, units, rate = generation.motion, generation.units, generation.motion.rate_hz
-    around, kept = _around(frames, MOUTH_MARGIN)
+    around, wanted = _around(frames, MOUTH_MARGIN)
     is_part = frames is not None and (around.start > 0 or around.stop < len(motion.values))
-    part, said, there = add_rest(motion, units, around) if is_part else (motion, units, slice(None))
-    solved, mouth = character.weights(part, said), spoken_mouth(with_mouth(part), said)
+    part, phones, there = add_rest(motion, units, around) if is_part else (motion, units, slice(None))
+    solved, mouth = character.weights(part, phones), spoken_mouth(with_mouth(part), phones)
     table = np.zeros((len(motion.values), len(solved.names)))
     table[around] = solved.values[there]
     known = known_names(character.mesh)
-    weights = edited_weights(replace(solved, values=table), units, generation.curve_edits, known)
+    weights = edit_weights(replace(solved, values=table), units, generation.curve_edits, known)
     living = compute_living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
-    beside = {
-        name: curve
-        for name, curve in character.weigh_others(others, len(living.values)).items()
-        if name not in weights.names
-    }
-    beside |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
-    rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in beside.values())], axis=1)
-    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
+    extra = character.weigh_others(others, len(living.values))
+    extra = {name: curve for name, curve in extra.items() if name not in weights.names}
+    extra |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
+    rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in extra.values())], axis=1)
+    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in extra)
     hertz = rate if frames is not None else rate_hz or rate
     shown = sample_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
-    return Scene(character.mesh, Motion(shown[kept], hertz, channels), original=character.file)
-
-
-def check_sound_name(path: Path, sound: Path) -> None:
-    """Raise ExportError if a scene cannot refer to a sound: its name holds what ``.usda`` cannot."""
-    if path.suffix.lower() == USD:
-        asset(sound_reference(sound, path))
+    return Scene(character.mesh, Motion(shown[wanted], hertz, channels), original=character.file)

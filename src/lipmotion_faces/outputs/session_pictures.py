@@ -9,13 +9,13 @@ from typing import Any
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.outputs.delivered import shown
-from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.pipeline.outputs.deliver import deliver_to_face
+from lipmotion.pipeline.outputs.prosody import measure_prosody, shift_prosody
 from lipmotion.pipeline.session import Cache, Session
 from lipmotion.types import Prosody, frame_of
 from lipmotion_faces.base import DrawnMotion, DrawsSingly, Face, Picture
 from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, read_sound
-from lipmotion_faces.registry import staged_face
+from lipmotion_faces.registry import stage_face
 
 
 class SessionPictures:
@@ -41,21 +41,21 @@ class SessionPictures:
 
         edits : of the motion, its delivery and its staging; None: there are none
         fps   : frames a second of the video
-        Raises InputError: as ``Session.generated``; a time outside the recording, or a face that cannot draw single
+        Raises InputError: as ``Session.generate``; a time outside the recording, or a face that cannot draw single
         pictures.
         """
         edits = edits or Edits()
         staging, delivery = edits.staging(), edits.delivery()
 
-        def make_face() -> DrawsSingly:
-            found = staged_face(face, staging, moved_prosody(self._prosody, delivery))
-            if not isinstance(found, DrawsSingly):
+        def make_drawing() -> DrawsSingly:
+            drawing = stage_face(face, staging, shift_prosody(self._prosody, delivery))
+            if not isinstance(drawing, DrawsSingly):
                 raise InputError(f"the face {face!r} draws no single pictures; write a video")
-            return found
+            return drawing
 
         def draw() -> DrawnMotion[Any]:
-            seen = shown(self._session.generated(edits), delivery, fps)
-            return self._cache.cached("face", (face, staging, delivery), make_face).drawn(
+            seen = deliver_to_face(self._session.generate(edits), delivery, fps)
+            return self._cache.cached("face", (face, staging, delivery), make_drawing).draw(
                 seen.motion, seen.units, fps=fps
             )
 
@@ -69,4 +69,4 @@ class SessionPictures:
     @cached_property
     def _prosody(self) -> Prosody:
         """Loudness and pitch of the sound of videos."""
-        return prosody_of_speech(read_sound(self._session.request.recording))
+        return measure_prosody(read_sound(self._session.request.recording))

@@ -11,9 +11,9 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
-from lipmotion.pipeline.outputs.delivered import shown
+from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
-from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.pipeline.outputs.prosody import measure_prosody, shift_prosody
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
 from lipmotion.types.moods import MOODS
@@ -44,7 +44,7 @@ from lipmotion_faces.outputs.drawn_video import (
     write_frames,
 )
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
-from lipmotion_faces.registry import FACES, face_named, is_drawings, staged_face
+from lipmotion_faces.registry import FACES, is_drawings, make_face, stage_face
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
@@ -75,7 +75,7 @@ class ShownDrawing(_WithHead):
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
         refuse_film(settings.outputs)
-        staged_face(self.face, settings.staging)
+        stage_face(self.face, settings.staging)
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
         check_background(path, settings.staging)
@@ -125,9 +125,8 @@ class ShownCutOut(_WithHead):
     def check_drawable(self, path: Path, generation: Generation) -> None:
         """Raise ExportError if a generation has no phones, from which shapes are chosen."""
         if not len(generation.units):
-            raise ExportError(
-                f"{path}: the motion has no phones, from which drawings are chosen; give them: --units FILE"
-            )
+            missing = "the motion has no phones, from which drawings are chosen"
+            raise ExportError(f"{path}: {missing}; give them: --units FILE")
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, generation, fps = performance.settings, performance.generation, _frame_rate(performance.settings)
@@ -158,9 +157,8 @@ class ShownPerson(_WithHead):
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
         if settings.delivery.hold_ms:
-            raise InputError(
-                "the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files"
-            )
+            instead = "hold those of a drawn face, or of motion files"
+            raise InputError(f"the poses of a filmed face cannot be held; {instead}")
         if any(key.mood in MOODS for key in settings.delivery.moods):
             raise InputError(
                 "a filmed face has the mood of its footage; leave the mood out, or show a drawn face or a character"
@@ -170,9 +168,9 @@ class ShownPerson(_WithHead):
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
         """Log a warning where tags in the words ask for a mood; ``make_film`` names the channels that are needed."""
-        asked = [key.label for key in generation.moods if key.mood in MOODS]
-        if asked:
-            LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
+        moods = [key.label for key in generation.moods if key.mood in MOODS]
+        if moods:
+            LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(moods))
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings = performance.settings
@@ -207,26 +205,24 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
         return face
     if isinstance(face, DrivenCharacter):
         return ShownCharacter(MeshFace(face))
-    opened = _opened(face)
+    opened: Face | FilmedFace | CutOut
+    if isinstance(face, Face | FilmedFace | CutOut):
+        opened = face
+    elif is_drawings(face):
+        opened = read_cut_out(Path(face))
+    elif Path(face).suffix.lower() == SUFFIX:
+        opened = load_face(face)
+    else:
+        check_kind(Path(face), "face")
+        sibling = Path(f"{face}{SUFFIX}")
+        if str(face) not in FACES.names and is_file(sibling):
+            raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {sibling}")
+        opened = make_face(str(face))
     if isinstance(opened, CutOut):
         return ShownCutOut(opened)
     if isinstance(opened, FilmedFace):
         return ShownPerson(opened)
     return ShownCharacter(opened) if isinstance(opened, MeshFace) else ShownDrawing(opened)
-
-
-def _opened(face: str | Path | Face | FilmedFace | CutOut) -> Face | FilmedFace | CutOut:
-    if isinstance(face, Face | FilmedFace | CutOut):
-        return face
-    if is_drawings(face):
-        return read_cut_out(Path(face))
-    if Path(face).suffix.lower() == SUFFIX:
-        return load_face(face)
-    check_kind(Path(face), "face")
-    beside = Path(f"{face}{SUFFIX}")
-    if str(face) not in FACES.names and is_file(beside):
-        raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")
-    return face_named(str(face))
 
 
 def _seen(performance: Performance) -> Generation:
@@ -235,12 +231,12 @@ def _seen(performance: Performance) -> Generation:
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
     if performance.generation.curve_edits:
         character = character or settings.face.character
-    return shown(performance.generation, settings.delivery, _frame_rate(settings), character)
+    return deliver_to_face(performance.generation, settings.delivery, _frame_rate(settings), character)
 
 
 def _played_prosody(performance: Performance) -> Prosody:
     """Return loudness and pitch of the sound track, in the time of the motion."""
-    return moved_prosody(prosody_of_speech(performance.cached(sound_track)), performance.settings.delivery)
+    return shift_prosody(measure_prosody(performance.cached(sound_track)), performance.settings.delivery)
 
 
 def _frame_rate(settings: OutputSettings) -> float:

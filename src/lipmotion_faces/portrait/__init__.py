@@ -45,17 +45,14 @@ class DrawnFace(Face):
     def design(self) -> Design:
         """The character."""
 
-    def staged(self, staging: Staging, prosody: Prosody | None = None) -> DrawnFace:
-        """Return the same character with other settings.
-
-        prosody : of the speech that will be rendered, for brows and head; None: not known
-        """
+    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> DrawnFace:
+        """Return the same character with other settings; ``prosody`` is of the speech that will be rendered."""
         return type(self)(staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return iter(self.drawn(motion, units, fps=fps))
+        return iter(self.draw(motion, units, fps=fps))
 
-    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[FacePose]:  # noqa: D102
+    def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[FacePose]:  # noqa: D102
         from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 
         poses = face_poses(motion, units, fps, self.staging, self.prosody)

@@ -103,14 +103,14 @@ class EyePainter:
         for side in (1, -1):
             flip, x = np.array([side, 1.0]), side * eyes.x
             top, bottom = open_curve(upper) * flip, open_curve(lower) * flip
-            whole = np.vstack([open_curve(highest) * flip, (open_curve(eyes.lower) * flip)[::-1]])
+            outline = np.vstack([open_curve(highest) * flip, (open_curve(eyes.lower) * flip)[::-1]])
             opening = np.vstack([top, bottom[::-1]])
             soft: tuple[Rim | Glow, ...] = ()
             ball: tuple[Rim | Glow, ...] = ()
             if not flat:
                 soft = Rim(0.03, colours.skin_shade, 0.6), Glow(x, 0.0, 0.1, 0.05, colours.skin_light, 0.5)
                 ball = Glow(x, -0.13, 0.2, 0.06, colours.eye_shade, 0.75), Rim(0.015, colours.skin_deep, 0.25)
-            under.fill(whole, colours.skin, *soft)
+            under.fill(outline, colours.skin, *soft)
             if shut < 0.92:
                 under.fill(opening, colours.eye_white, *ball)
                 almond.fill(opening, WHITE)

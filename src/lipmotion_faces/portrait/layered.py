@@ -11,7 +11,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.kernels.painting import warp_bytes
@@ -166,11 +166,11 @@ class LayeredFace(Face):
         unknown = sorted(name for name in names if name.startswith(MOUTH) and name[len(MOUTH) :] not in MOUTHS)
         if unknown:
             known = ", ".join(MOUTH + name for name in MOUTHS)
-            raise InputError(f"{path}: unknown layer {shortened(unknown[0])!r}; the mouths are: {known}")
+            raise InputError(f"{path}: unknown layer {shorten(unknown[0])!r}; the mouths are: {known}")
         if "rest" not in self.mouths:
             raise InputError(f"{path}: no layer {MOUTH}rest; name the group of the closed mouth so")
 
-    def staged(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
+    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
         """Return the same drawing with other settings; ``prosody`` is of the speech that will be rendered."""
         other = copy(self)
         other.__dict__.pop("_painter", None)
@@ -178,9 +178,9 @@ class LayeredFace(Face):
         return other
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return iter(self.drawn(motion, units, fps=fps))
+        return iter(self.draw(motion, units, fps=fps))
 
-    def drawn(  # noqa: D102
+    def draw(  # noqa: D102
         self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
     ) -> DrawnMotion[tuple[FacePose, str]]:
         poses = face_poses(motion, units, fps, self.staging, self.prosody)
@@ -260,11 +260,11 @@ class _LayeredPicture:
         right, down = (place.x + 0.5 * place.yaw) * unit, (place.y + 0.5 * place.pitch) * unit
         warp_bytes(head, place.roll * y - right, -place.roll * x - down, 16, moved)
         layer = moved.astype(np.float32) * np.array([1, 1, 1, 1 / 255], np.float32)
-        whole = lay_over(self._front, lay_over(layer, self._behind))
+        picture = lay_over(self._front, lay_over(layer, self._behind))
         if self._opaque:
-            return np.asarray(whole[..., :3] + 0.5, np.uint8)
-        alpha = whole[..., 3:]
-        straight = np.where(alpha > 0, whole[..., :3] / np.maximum(alpha, 1e-6), 0)
+            return np.asarray(picture[..., :3] + 0.5, np.uint8)
+        alpha = picture[..., 3:]
+        straight = np.where(alpha > 0, picture[..., :3] / np.maximum(alpha, 1e-6), 0)
         return np.asarray(np.clip(np.dstack([straight, alpha * 255]) + 0.5, 0, 255), np.uint8)
 
     def _paint_head(self, mouth: str, eyes: str, gaze_x: int, gaze_y: int, brows: int) -> NDArray[np.uint16]:

@@ -31,7 +31,8 @@ from lipmotion_faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter,
 from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter, MouthTextures, mouth_textures
 from lipmotion_faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
-from lipmotion_faces.portrait.portrait_rasteriser import FacePose, moving_parts, still_layers
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose, moving_parts
+from lipmotion_faces.portrait.still_parts import paint_still_layers
 
 Bytes = NDArray[np.uint8]
 Packed = NDArray[np.uint32]
@@ -68,7 +69,7 @@ class PlanarRasteriser:
     def __init__(self, design: Design, size: int, background: Colour | str = SCENE) -> None:
         view = View(size)
         self._parts = parts = moving_parts(view, design)
-        layers = still_layers(view.window(-9, -9, 9, 9), design, background)
+        layers = paint_still_layers(view.window(-9, -9, 9, 9), design, background)
         self._still = _bytes(_planes(layers.still)[:3])
         values = np.concatenate([_planes(layers.skin) * _COVER_AS_BYTE, layers.skin[None, ..., 4] * 255])
         planes, packed = _bytes(values), np.empty(values.shape, np.uint32)

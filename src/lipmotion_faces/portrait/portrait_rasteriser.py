@@ -18,17 +18,10 @@ from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
 from lipmotion_faces.portrait.design import Colour, Design
 from lipmotion_faces.portrait.eyes import EyePainter
 from lipmotion_faces.portrait.geometry import MouthPose
-from lipmotion_faces.portrait.layer import Layer, View, Window, lay_over
+from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter
 from lipmotion_faces.portrait.movement import STEP, BrowField, BrowPose, HeadField, HeadPlacement, SkinField, brow_pose
-from lipmotion_faces.portrait.still_parts import (
-    paint_behind_head,
-    paint_chin_shadow,
-    paint_hair,
-    paint_head,
-    paint_shaded_neck,
-    paint_wall,
-)
+from lipmotion_faces.portrait.still_parts import paint_still_layers
 
 CanvasT = TypeVar("CanvasT")
 Pixels = NDArray[np.float32]
@@ -113,7 +106,7 @@ class Rasteriser:
         whole = view.window(-9, -9, 9, 9)
         self._opaque = background is not None
         self._jaw, self._mouth, self._eyes, self._brow, self._below_brows, self._head = moving_parts(view, design)
-        self._skin, self._below, self._shade, self._front, still = still_layers(whole, design, background)
+        self._skin, self._below, self._shade, self._front, still = paint_still_layers(whole, design, background)
         self._eye_painter = EyePainter(design, self._eyes)
         self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
         self._frame = self._still[..., : 3 if self._opaque else 4].astype(np.uint8)
@@ -190,37 +183,3 @@ def moving_parts(view: View, design: Design) -> MovingParts:
         below_brows=Window(view, eyes.x0, brow.y1, eyes.x1, eyes.y1),
         head=view.window(-1.3, -9, 1.3, 1.9),
     )
-
-
-class PaintedLayers(NamedTuple):
-    """What is painted once: premultiplied colour 0..255, and cover 0..1 [shape=(h, w, 4)].
-
-    skin  : of the head, with the strength of its shadow on what is behind it as one more channel [shape=(h, w, 5)]
-    below : what is behind it
-    shade : is added to that where the shadow falls
-    front : what is in front of it
-    still : all of them over one another, at rest
-    """
-
-    skin: Pixels
-    below: Pixels
-    shade: Pixels
-    front: Pixels
-    still: Pixels
-
-
-def still_layers(whole: Window, design: Design, background: Colour | str | None) -> PaintedLayers:
-    """Return the layers of a character without eyes and mouth."""
-    behind, skin = paint_behind_head(whole, design), paint_head(whole, design).pixels
-    front = paint_hair(whole, design).pixels
-    if background == SCENE:
-        wall = paint_wall(whole, design).pixels
-    else:
-        wall = Layer(whole).pixels
-        if background is not None:
-            wall[...] = (*background, 1)
-    below = lay_over(behind.pixels, wall)
-    shade = lay_over(paint_shaded_neck(whole, design).pixels, below) - below
-    shadow = paint_chin_shadow(whole, design)
-    still = lay_over(front, lay_over(skin, below + shadow[..., None] * shade))
-    return PaintedLayers(np.dstack([skin, shadow]), below, shade, front, still)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from lipmotion_faces.base import SCENE
 from lipmotion_faces.portrait.design import (
     WHITE,
     Colour,
@@ -17,15 +20,46 @@ from lipmotion_faces.portrait.design import (
     path_points,
     stroke,
 )
-from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, Window
+from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, Window, lay_over
 
 
-def paint_wall(window: Window, design: Design) -> Layer:
-    """Return a layer with the background, opaque."""
-    layer, colours = Layer(window), design.palette
-    lit = () if design.flat else (Glow(-0.5, -0.5, 1.5, 1.6, colours.wall_light, 0.9),)
-    layer.fill(path_points("-9 -9, 9 -9, 9 9, -9 9"), colours.wall, *lit)
-    return layer
+class PaintedLayers(NamedTuple):
+    """What is painted once: premultiplied colour 0..255, and cover 0..1 [shape=(h, w, 4)].
+
+    skin  : of the head, with the strength of its shadow on what is behind it as one more channel [shape=(h, w, 5)]
+    below : what is behind it
+    shade : is added to that where the shadow falls
+    front : what is in front of it
+    still : all of them over one another, at rest
+    """
+
+    skin: Pixels
+    below: Pixels
+    shade: Pixels
+    front: Pixels
+    still: Pixels
+
+
+def paint_still_layers(whole: Window, design: Design, background: Colour | str | None) -> PaintedLayers:
+    """Return the layers of a character without eyes and mouth."""
+    colours, flat, wall = design.palette, design.flat, Layer(whole)
+    if background == SCENE:
+        lit = () if flat else (Glow(-0.5, -0.5, 1.5, 1.6, colours.wall_light, 0.9),)
+        wall.fill(path_points("-9 -9, 9 -9, 9 9, -9 9"), colours.wall, *lit)
+    elif background is not None:
+        wall.pixels[...] = (*background, 1)
+    below = lay_over(paint_behind_head(whole, design).pixels, wall.pixels)
+    dark_neck, shadow = Layer(whole), Layer(whole)
+    dark_neck.fill(design.neck, colours.skin_deep)
+    for part in (design.shoulders, *design.collar):
+        dark_neck.cut(part)
+    shade = lay_over(dark_neck.pixels, below) - below
+    soft, strength = (0.0, 0.45) if flat else (0.045, 0.55)  # of the head's shadow; the jaw is at rest
+    shadow.fill(move_down(design.skull, 0.12), colours.skin_deep, opacity=strength, blur=soft)
+    cover = shadow.pixels[..., 3]
+    skin, front = paint_head(whole, design).pixels, paint_hair(whole, design).pixels
+    still = lay_over(front, lay_over(skin, below + cover[..., None] * shade))
+    return PaintedLayers(np.dstack([skin, cover]), below, shade, front, still)
 
 
 def paint_behind_head(window: Window, design: Design) -> Layer:
@@ -74,23 +108,6 @@ def _paint_ears(layer: Layer, design: Design) -> None:
 def _fill_outlined(layer: Layer, design: Design, outline: Points, colour: Colour, *shades: Glow | Rim) -> None:
     layer.fill(outline, colour, *(() if design.flat else shades))
     layer.contour(outline, design.line, design.palette.line)
-
-
-def paint_shaded_neck(window: Window, design: Design) -> Layer:
-    """Return a layer with the neck in full shadow."""
-    layer = Layer(window)
-    layer.fill(design.neck, design.palette.skin_deep)
-    for part in (design.shoulders, *design.collar):
-        layer.cut(part)
-    return layer
-
-
-def paint_chin_shadow(window: Window, design: Design) -> Pixels:
-    """Return the shadow of the head on what is behind it, 0..1 [shape=(h, w)]; the jaw is at rest."""
-    layer = Layer(window)
-    soft, strength = (0.0, 0.45) if design.flat else (0.045, 0.55)
-    layer.fill(move_down(design.skull, 0.12), design.palette.skin_deep, opacity=strength, blur=soft)
-    return layer.pixels[..., 3]
 
 
 def paint_head(window: Window, design: Design) -> Layer:

@@ -18,7 +18,7 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.storage.files import check_regular
 from lipmotion_faces.portrait.svg_paths import (
     LARGEST_NUMBER,
@@ -171,19 +171,19 @@ class _DrawingReader:
         tag = _local(name)
         if self.box is None:
             if tag != "svg":
-                raise InputError(f"not an SVG: its root is {shortened(tag)!r}")
+                raise InputError(f"not an SVG: its root is {shorten(tag)!r}")
             self.box = _box(attributes)
             self.groups.append(_group(attributes, _Group((), np.eye(3), {}, 1.0)))
         elif tag in _PASSED_OVER:
             self.passed = self.depth
         elif len(self.groups) < self.depth - 1:
-            raise InputError(f"<{shortened(tag)}> in a shape is not read; remove it")
+            raise InputError(f"<{shorten(tag)}> in a shape is not read; remove it")
         elif tag in ("g", "svg"):
             self.groups.append(_group(attributes, self.groups[-1]))
         elif tag in _SHAPES:
             self._add(tag, attributes)
         else:
-            raise InputError(f"<{shortened(tag)}> is not read; convert it to paths with plain colours")
+            raise InputError(f"<{shorten(tag)}> is not read; convert it to paths with plain colours")
 
     def _end(self, _: str) -> None:
         if self.passed == self.depth:
@@ -243,7 +243,7 @@ def _box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
     if not numbers:
         numbers = [0, 0, *(_number(root.get(name, "0"), name) for name in ("width", "height"))]
     if len(numbers) != 4 or not (1e-3 <= numbers[2] < 1e6 and 1e-3 <= numbers[3] < 1e6):
-        raise InputError(f"the view box is {shortened(text)!r}, required four numbers, the last two 0.001 or more")
+        raise InputError(f"the view box is {shorten(text)!r}, required four numbers, the last two 0.001 or more")
     if not 1 / LARGEST_SIDE_RATIO <= numbers[2] / numbers[3] <= LARGEST_SIDE_RATIO:
         raise InputError(
             f"the picture is {numbers[2]:g} by {numbers[3]:g}, required at most {LARGEST_SIDE_RATIO:g} times as "
@@ -256,7 +256,7 @@ def _number(text: str, name: str) -> float:
     match = _UNIT.fullmatch(text.strip())
     numbers = read_numbers(match[1] if match else text, 1, name)
     if not numbers:
-        raise InputError(f"{name} is {shortened(text)!r}, required a number")
+        raise InputError(f"{name} is {shorten(text)!r}, required a number")
     return numbers[0]
 
 
@@ -265,11 +265,9 @@ def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     for key, value in attributes.items():
         name = _local(key)
         if name == "href" or "url(" in value:
-            raise InputError(
-                f"{shortened(name)}={shortened(value)!r} is a reference; required plain colours and shapes"
-            )
+            raise InputError(f"{shorten(name)}={shorten(value)!r} is a reference; required plain colours and shapes")
         if name.lower().startswith("on"):
-            raise InputError(f"a script, {shortened(name)!r}, is not allowed")
+            raise InputError(f"a script, {shorten(name)!r}, is not allowed")
     names = (*_INHERITED, "opacity")
     style = {name: attributes[name] for name in names if name in attributes}
     for part in attributes.get("style", "").split(";"):
@@ -278,7 +276,7 @@ def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
             style[name.strip()] = value.strip()
     for name, value in style.items():
         if len(value) > LONGEST_VALUE_CHARACTERS:
-            raise InputError(f"{name} is {shortened(value)!r}, required a number or a plain colour")
+            raise InputError(f"{name} is {shorten(value)!r}, required a number or a plain colour")
     opacity = around.opacity * float(np.clip(_number(style.pop("opacity", "1"), "opacity"), 0, 1))
     matrix = around.matrix
     if "transform" in attributes:
@@ -328,5 +326,5 @@ def _colour(text: str, name: str) -> Colour | None:
     try:
         red, green, blue, *_ = (min(max(part, 0), 255) for part in ImageColor.getrgb(text.strip()))
     except ValueError as error:
-        raise InputError(f"{name} is {shortened(text)!r}, required a plain colour as #40a0ff") from error
+        raise InputError(f"{name} is {shorten(text)!r}, required a plain colour as #40a0ff") from error
     return red, green, blue

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 
 Points = NDArray[np.float64]
 STEPS = 12
@@ -95,11 +95,11 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
         match = _LETTER.match(text, place)
         if match:
             if not letter and match[1] not in "Mm":
-                raise InputError(f"a path does not begin with M: {shortened(text)!r}")
+                raise InputError(f"a path does not begin with M: {shorten(text)!r}")
             letter, place = match[1], match.end()
         elif not letter or letter in "Zz":
             what = "a number without a command" if _NUMBER.match(text, place) else "what cannot be read"
-            raise InputError(f"a path has {what}: {shortened(text[place:])!r}")
+            raise InputError(f"a path has {what}: {shorten(text[place:])!r}")
         else:
             letter = {"M": "L", "m": "l"}.get(letter, letter)
         numbers = []
@@ -108,8 +108,8 @@ def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
             match = pattern.match(text, place)
             if not match:
                 rest = text[_end_of_blanks(text, place) :]
-                wrong = f"cannot be read at {shortened(rest)!r}" if rest and not _LETTER.match(rest) else ""
-                raise InputError(f"a path {wrong or f'ends within a command: {shortened(text)!r}'}")
+                wrong = f"cannot be read at {shorten(rest)!r}" if rest and not _LETTER.match(rest) else ""
+                raise InputError(f"a path {wrong or f'ends within a command: {shorten(text)!r}'}")
             numbers.append(check_number(float(match[1]), text))
             place = match.end()
         yield letter, numbers
@@ -155,7 +155,7 @@ def _arc(at: Points, end: Points, rx: float, ry: float, turned: float, large: fl
 def check_number(number: float, text: str) -> float:
     """Return the number. Raises InputError, with ``text``: it is larger than ``LARGEST_NUMBER``, or not finite."""
     if not abs(number) <= LARGEST_NUMBER:
-        raise InputError(f"{number:g} in {shortened(text)!r}, required numbers up to {LARGEST_NUMBER:g}")
+        raise InputError(f"{number:g} in {shorten(text)!r}, required numbers up to {LARGEST_NUMBER:g}")
     return number
 
 
@@ -165,11 +165,11 @@ def read_numbers(text: str, most: int, name: str) -> list[float]:
     place = 0
     while match := _NUMBER.match(text, place):
         if len(numbers) == most:
-            raise InputError(f"{name} is {shortened(text)!r}, required at most {most} numbers")
+            raise InputError(f"{name} is {shorten(text)!r}, required at most {most} numbers")
         numbers.append(check_number(float(match[1]), text))
         place = match.end()
     if _end_of_blanks(text, place) < len(text):
-        raise InputError(f"{name} is {shortened(text)!r}, required numbers")
+        raise InputError(f"{name} is {shorten(text)!r}, required numbers")
     return numbers
 
 
@@ -205,13 +205,26 @@ def read_transform(text: str) -> Points:
     matrix = np.eye(3)
     *calls, rest = text.split(")", MOST_TRANSFORMS)
     if rest.strip():
-        raise InputError(f"the transform {shortened(rest)!r} cannot be read, required at most {MOST_TRANSFORMS}")
+        raise InputError(f"the transform {shorten(rest)!r} cannot be read, required at most {MOST_TRANSFORMS}")
     for call in calls:
         name, _, inside = call.strip(", \t\r\n").partition("(")
         try:
-            one = _transform(name.rstrip(), read_numbers(inside, 6, name))
+            n = read_numbers(inside, 6, name)
+            name, one = name.rstrip(), np.eye(3)
+            if name == "matrix":
+                one[0, 0], one[1, 0], one[0, 1], one[1, 1], one[0, 2], one[1, 2] = n
+            elif name == "translate":
+                one[:2, 2] = n[0], n[1] if len(n) > 1 else 0
+            elif name == "scale":
+                one = np.diag([n[0], n[1] if len(n) > 1 else n[0], 1.0])
+            elif name == "rotate":
+                cos, sin = np.cos(np.radians(n[0])), np.sin(np.radians(n[0]))
+                x, y = n[1:3] if len(n) > 2 else (0.0, 0.0)
+                one = np.array([[cos, -sin, x - cos * x + sin * y], [sin, cos, y - sin * x - cos * y], [0, 0, 1]])
+            else:
+                one[{"skewX": (0, 1), "skewY": (1, 0)}[name]] = np.tan(np.radians(n[0]))
         except (ValueError, IndexError, KeyError) as error:
-            raise InputError(f"the transform {shortened(call + ')')!r} cannot be read") from error
+            raise InputError(f"the transform {shorten(call + ')')!r} cannot be read") from error
         matrix = check_matrix(matrix @ one)
     return matrix
 
@@ -220,22 +233,4 @@ def check_matrix(matrix: Points) -> Points:
     """Return a matrix of transforms. Raises InputError: it enlarges or moves beyond ``LARGEST_NUMBER``."""
     if not np.abs(matrix).max() <= LARGEST_NUMBER:
         raise InputError(f"transforms in one another enlarge beyond {LARGEST_NUMBER:g} times")
-    return matrix
-
-
-def _transform(name: str, n: list[float]) -> Points:
-    if name == "matrix":
-        a, b, c, d, e, f = n
-        return np.array([[a, c, e], [b, d, f], [0, 0, 1]])
-    if name == "translate":
-        return np.array([[1, 0, n[0]], [0, 1, n[1] if len(n) > 1 else 0], [0, 0, 1]])
-    if name == "scale":
-        return np.diag([n[0], n[1] if len(n) > 1 else n[0], 1.0])
-    if name == "rotate":
-        cos, sin = np.cos(np.radians(n[0])), np.sin(np.radians(n[0]))
-        x, y = n[1:3] if len(n) > 2 else (0.0, 0.0)
-        return np.array([[cos, -sin, x - cos * x + sin * y], [sin, cos, y - sin * x - cos * y], [0, 0, 1]])
-    skews = {"skewX": (0, 1), "skewY": (1, 0)}
-    matrix = np.eye(3)
-    matrix[skews[name]] = np.tan(np.radians(n[0]))
     return matrix

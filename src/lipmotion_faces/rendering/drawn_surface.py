@@ -18,8 +18,8 @@ from lipmotion_faces.kernels.textured import (
     TexturedTriangles,
     draw_textured,
 )
-from lipmotion_faces.rendering.lighting import LEVELS, Finish, Lighting, tone_table
-from lipmotion_faces.rendering.rasteriser import Camera, Canvas, Colours, flat
+from lipmotion_faces.rendering.lighting import Finish, Lighting, tone_table
+from lipmotion_faces.rendering.rasteriser import Camera, Canvas, Colours, add_alpha, flat
 
 Real = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -64,10 +64,7 @@ class TexturedCanvas:
         area = self.camera.box(points)
         if area is not None:
             draw_textured(points, light, shine, self.surface, area, self._black, self._tone, picture, opacity)
-        partly = (opacity > 0) & (opacity < 255)
-        level = np.searchsorted(self._tone, picture[partly]) / (opacity[partly, None] / 255)
-        picture[partly] = self._tone[np.minimum(level, LEVELS - 1).astype(int)]
-        return np.concatenate([picture, opacity[..., None]], axis=2)
+        return add_alpha(picture, opacity, self._tone)
 
 
 Array = NDArray[np.float64]
@@ -125,9 +122,9 @@ def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) 
         if material.texture is not None:
             textures.setdefault(material.texture, len(textures))
     looks = _looks(mesh, numbers, part_of[numbers], uv, texture_table(list(textures)), textures, pixels_per_unit)
-    kept = looks.looks[:, 1] != EMPTY
-    looks = looks._replace(uv=looks.uv[kept], looks=looks.looks[kept], alphas=looks.alphas[kept])
-    numbers, corners, behind = numbers[kept], corners[kept], behind[kept]
+    visible = looks.looks[:, 1] != EMPTY
+    looks = looks._replace(uv=looks.uv[visible], looks=looks.looks[visible], alphas=looks.alphas[visible])
+    numbers, corners, behind = numbers[visible], corners[visible], behind[visible]
     keys = (corners * len(materials) + part_of[numbers][:, None]) * 2 + behind[:, None]
     unique, inverse = np.unique(keys, return_inverse=True)
     kinds, rows = unique // 2 % len(materials), unique // 2 // len(materials)
@@ -171,30 +168,30 @@ def _looks(
             if kind != SOLID:
                 halvings = looks[mine, 0] - table.first[textures[material.texture]]
                 ends_uv, texels = downwards[mine], 2 * 2 ** halvings.astype(np.int64)
-                least, most = material.texture.range_of_opacity(ends_uv.min(axis=1), ends_uv.max(axis=1), texels)
-                least, most = least * material.opacity, most * material.opacity
+                lowest, highest = material.texture.range_of_opacity(ends_uv.min(axis=1), ends_uv.max(axis=1), texels)
+                lowest, highest = lowest * material.opacity, highest * material.opacity
                 hides, seen = (material.cutoff, material.cutoff) if kind == CUT else (HIDING_OPACITY, SEEN_OPACITY)
-                looks[mine, 1] = np.where(least >= hides, SOLID, np.where(most < seen, EMPTY, kind))
+                looks[mine, 1] = np.where(lowest >= hides, SOLID, np.where(highest < seen, EMPTY, kind))
         if mesh.tints is not None and material.alpha in (MASK, BLEND):
             opacity = mesh.tints[mesh.triangles[numbers[mine]], 3].mean(axis=1)
             is_cut = material.alpha == MASK
             kind, hides, seen = (
                 (CUT, material.cutoff, material.cutoff) if is_cut else (CLEAR, HIDING_OPACITY, SEEN_OPACITY)
             )
-            whole = material.opacity * opacity
+            cover = material.opacity * opacity
             kinds, bare = looks[mine, 1], looks[mine, 0] < 0
-            lowered = np.where(whole < seen, EMPTY, np.where((whole < hides) | ~bare & (opacity < 1), kind, kinds))
+            lowered = np.where(cover < seen, EMPTY, np.where((cover < hides) | ~bare & (opacity < 1), kind, kinds))
             looks[mine, 1] = np.where(kinds == EMPTY, EMPTY, lowered)
-            alphas[mine] = np.stack([np.full(len(whole), material.cutoff), whole], axis=1)
+            alphas[mine] = np.stack([np.full(len(cover), material.cutoff), cover], axis=1)
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
 
 
 def _colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> Array:
     """Return the reflection of drawn vertices; those of textures have the colour of the material alone."""
-    own = np.array([decode_srgb(material.colour) for material in materials])[kinds]
+    of_material = np.array([decode_srgb(material.colour) for material in materials])[kinds]
     textured = np.array([material.texture is not None for material in materials])[kinds]
     if mesh.tints is not None:
-        own = own * mesh.tints[rows, :3]
+        of_material = of_material * mesh.tints[rows, :3]
     if mesh.colours is None:
-        return own
-    return np.where(textured[:, None], own, decode_srgb(mesh.colours[rows]))
+        return of_material
+    return np.where(textured[:, None], of_material, decode_srgb(mesh.colours[rows]))

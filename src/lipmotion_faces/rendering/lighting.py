@@ -135,7 +135,9 @@ def reaches(
     directions : number of directions of the sky;  lamps : number of places on the key light, which is large and soft
     Cost: O(V · directions).
     """
-    towards = _sphere(directions)
+    y = 1 - (2 * np.arange(directions) + 1) / directions  # directions that are spread evenly over the sphere
+    angle, flat = 2.39996 * np.arange(directions), np.sqrt(1 - y * y)
+    towards = np.stack([flat * np.cos(angle), y, flat * np.sin(angle)], axis=1)
     total, seen = np.zeros(len(places)), np.zeros(len(places))
     for way in towards:
         weight = np.maximum(normals @ way + 0.1, 0) * (1.2 + way[1])
@@ -147,33 +149,22 @@ def reaches(
     above = np.cross(around, key)
     direct = np.zeros(len(places))
     for n in range(lamps):
-        radius, angle = 0.22 * np.sqrt((n + 0.5) / lamps), 2.39996 * n
-        direct += _visible(places, hiding, unit(key + radius * (np.cos(angle) * around + np.sin(angle) * above)))
-    return _smoothed(np.stack([sky, direct / lamps], axis=1), triangles)
+        radius, turn = 0.22 * np.sqrt((n + 0.5) / lamps), 2.39996 * n
+        direct += _visible(places, hiding, unit(key + radius * (np.cos(turn) * around + np.sin(turn) * above)))
+    return _smooth(np.stack([sky, direct / lamps], axis=1), triangles)
 
 
-def _smoothed(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:
+def _smooth(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:
     """Return values of vertices as means over the triangles around them [shape=(V, 2)]."""
     count = np.maximum(np.bincount(triangles.ravel(), minlength=len(values)), 1)[:, None]
     for _ in range(times):
         mean = values[triangles].mean(axis=1)
-        total = np.stack(
-            [
-                sum(np.bincount(triangles[:, corner], mean[:, k], minlength=len(values)) for corner in range(3))
-                for k in range(values.shape[1])
-            ],
-            axis=1,
-        )
-        values = total / count
+        totals = [
+            sum(np.bincount(triangles[:, corner], mean[:, k], minlength=len(values)) for corner in range(3))
+            for k in range(values.shape[1])
+        ]
+        values = np.stack(totals, axis=1) / count
     return values
-
-
-def _sphere(count: int) -> Real:
-    """Return directions that are spread evenly over the sphere [shape=(count, 3)]."""
-    y = 1 - (2 * np.arange(count) + 1) / count
-    angle = 2.39996 * np.arange(count)
-    flat = np.sqrt(1 - y * y)
-    return np.stack([flat * np.cos(angle), y, flat * np.sin(angle)], axis=1)
 
 
 def _visible(places: Real, hiding: NDArray[np.bool_], way: Real) -> Real:

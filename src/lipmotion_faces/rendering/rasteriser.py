@@ -111,10 +111,7 @@ class Canvas:
         """
         picture = self.picture(places, colours, triangles)
         alpha = self._coverage(places, np.ones(len(places), bool), triangles)
-        partly = (alpha > 0) & (alpha < LARGEST_GREY)
-        level = np.searchsorted(self._tone, picture[partly]) / (alpha[partly, None] / LARGEST_GREY)
-        picture[partly] = self._tone[np.minimum(level, LEVELS - 1).astype(int)]
-        return np.concatenate([picture, alpha[..., None]], axis=2)
+        return add_alpha(picture, alpha, self._tone)
 
     def shown(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Return the pixels of which at least half shows marked vertices [shape=(H, W)].
@@ -132,6 +129,17 @@ class Canvas:
         tone = np.arange(256).astype(np.uint8)
         draw(self.camera.on_screen(places), light, triangles, area, np.zeros(size, np.float32), tone, picture)
         return picture[..., 0]
+
+
+def add_alpha(picture: NDArray[np.uint8], alpha: NDArray[np.uint8], tone: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a picture before black [shape=(H, W, 3)] with its cover as straight alpha; the picture is changed.
+
+    tone : of ``tone_table``
+    """
+    partly = (alpha > 0) & (alpha < LARGEST_GREY)
+    level = np.searchsorted(tone, picture[partly]) / (alpha[partly, None] / LARGEST_GREY)
+    picture[partly] = tone[np.minimum(level, LEVELS - 1).astype(int)]
+    return np.concatenate([picture, alpha[..., None]], axis=2)
 
 
 def flat(camera: Camera, colour: tuple[int, int, int]) -> Colours:

@@ -19,7 +19,7 @@ from lipmotion_faces.tracking.trackers import (
     FaceBox,
     LandmarkTracker,
     PointFinder,
-    tracker_named,
+    make_tracker,
 )
 
 Image = NDArray[np.uint8]
@@ -131,7 +131,7 @@ class FaceFollower:
 
     def __init__(self, person: Sequence[Array] = (), tracker: str = MEDIAPIPE) -> None:
         self._wanted = list(person)
-        self._tracker = tracker_named(tracker)
+        self._tracker = make_tracker(tracker)
         self._finder = self._tracker.boxes()
         self._scenes = [_Scene(self._wanted, self._finder, self._tracker)]
         self._picture: Array | None = None
@@ -195,10 +195,7 @@ class FaceFollower:
         self._scenes.append(_Scene(known, self._finder, self._tracker))
 
     def _scenes_of_person(self) -> set[int]:
-        """Return the scene with the most frames, and all whose face resembles one of a scene returned.
-
-        If a person is wanted, these are the scenes whose face resembles hers, and all whose face resembles one of them.
-        """
+        """Return the scenes of the wanted person, else the longest one, and all whose face resembles one of theirs."""
         counts = np.bincount([n for n in self._scene_of_frame if n is not None], minlength=len(self._scenes))
         of_person = set() if self._wanted else {int(np.argmax(counts))}
         while True:
@@ -261,11 +258,6 @@ class _Scene:
         self._last, self.missing_frames = face, 0
         return face
 
-    def _keep_thumbnail(self, thumbnail: Array) -> None:
-        is_early = len(self.thumbnails) < MOST_THUMBNAILS
-        if is_early or _best_correlation([thumbnail], self.thumbnails) < NEW_LOOK_CORRELATION:
-            self.thumbnails.append(thumbnail)
-
     def is_near(self, before: _Scene) -> bool:
         """Return whether this scene's face begins where the one before ended."""
         return self._first is not None and before._last is not None and before._could_be(self._first, before._last)
@@ -286,10 +278,7 @@ class _Scene:
         return max(faces, key=lambda face: self._priority(image, face))
 
     def _search(self, image: Image, last: Array | None = None) -> Array | None:
-        """Return the face that the detector finds, and follow it in a window from now on; None if there is none.
-
-        last : the face followed so far, which it must be; None: the one of the highest priority is taken
-        """
+        """Return the face that the detector finds, ``last`` if given, and follow it in a window from now on."""
         boxes = self._finder.boxes(image, thorough=self._searches % THOROUGH_STEP == 0)
         self._searches += 1
         faces: list[tuple[Array, WindowedMesh]] = []

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.frame_groups import MOST_DECODED_BYTES, FrameGroups
+from lipmotion.storage.frame_groups import MAX_DECODED_BYTES, FrameGroups
 from lipmotion.types import Track
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan, nearest_indices, open_video, resample_to_constant_rate
 from lipmotion_faces.tracking.head_pose import face_to_image
@@ -94,7 +94,7 @@ def footage_frames(footage: Footage, start: int = 0, stop: int | None = None) ->
     return _frames_between(footage, start, stop)
 
 
-def footage_groups(footage: Footage, most_bytes: int = MOST_DECODED_BYTES) -> FrameGroups:
+def footage_groups(footage: Footage, most_bytes: int = MAX_DECODED_BYTES) -> FrameGroups:
     """Return access to the frames of a tracked video in any order, also backwards, in bounded memory.
 
     most_bytes : decoded frames that are kept

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import check_source
-from lipmotion.storage.media import MOST_PIXELS, open_media, stated_duration_s, video_streams
+from lipmotion.storage.media import MAX_PIXELS, open_media, stated_duration_s, video_streams
 from lipmotion_faces.tracking.packages import import_opencv
 
 
@@ -91,7 +91,7 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
         if stream.codec_context is None:
             raise InputError(f"{path}: its pictures are coded in an unknown way; export the video again")
         _check_size(path, stream.width, stream.height, float(stream.sample_aspect_ratio or 1))
-        stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+        stream.codec_context.options = {"max_pixels": str(MAX_PIXELS)}
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         damage: list[str] = []
         stated_s = stated_duration_s(container, stream)
@@ -139,10 +139,7 @@ def _frames(
 
 
 def _pictures_from(container: Any, stream: Any, first_s: float, damage: list[str]) -> Iterator[Any]:
-    """Yield the pictures from a time on, of the container's clock; ``damage`` lists what is damaged from there on.
-
-    If seeking ends behind that time, as without an index, all pictures before are decoded too.
-    """
+    """Yield the pictures from a time of the container's clock on; ``damage`` lists what is damaged from there on."""
     start_s = (container.start_time or 0) / 1e6
     if first_s <= start_s:
         yield from _pictures(container, stream, damage)
@@ -183,21 +180,18 @@ def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
 def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:
     """Raise InputError for pictures that are too small or too large; ``pixel_shape``: width of a pixel over height."""
     if not width or not height:  # FFmpeg gives no size for pictures that it refuses
-        raise InputError(f"{path}: pictures of no size, or of more than {MOST_PIXELS} pixels; scale the video")
+        raise InputError(f"{path}: pictures of no size, or of more than {MAX_PIXELS} pixels; scale the video")
     shown = round(width * pixel_shape)
     if not (LEAST_SIDE_PX <= shown <= LONGEST_SIDE_PX and LEAST_SIDE_PX <= height <= LONGEST_SIDE_PX):
         sides = f"{LEAST_SIDE_PX} to {LONGEST_SIDE_PX}"
         raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {sides}; scale the video")
-    if shown * height > MOST_PIXELS:
-        most = f"at most {MOST_PIXELS} in all"
+    if shown * height > MAX_PIXELS:
+        most = f"at most {MAX_PIXELS} in all"
         raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {most}; scale the video")
 
 
 def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
-    """Return a picture as RGB [shape=(H, W, 3)], rotated upright, with square pixels, of at most ``longest_px``.
-
-    Raises MissingDependencyError: it is to be rotated, and OpenCV, which takes a tenth of NumPy's time, is missing.
-    """
+    """Return a picture as RGB [shape=(H, W, 3)], upright, with square pixels, at most ``longest_px``."""
     width, height = round(picture.width * pixel_shape), picture.height
     if longest_px is not None and max(width, height) > longest_px:
         scale = longest_px / max(width, height)

@@ -75,7 +75,15 @@ def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
         face = (scale[:, None, None] * (rigid @ rotation.transpose(0, 2, 1)) + translation[:, None, :]).mean(axis=0)
         face *= size / np.linalg.norm(face)  # without this the mean shrinks from round to round
     rotation, scale, translation = fit_similarities(rigid, face)
-    axes, origin, unit = _head_axes(face)
+    eyes = [face[RIGID_POINTS.index(index)] for index in EYE_CORNERS]
+    up = face[RIGID_POINTS.index(FOREHEAD)] - face[RIGID_POINTS.index(NASION)]
+    unit = float(np.linalg.norm(eyes[1] - eyes[0]))
+    x, origin = (eyes[1] - eyes[0]) / unit, (eyes[0] + eyes[1]) / 2
+    up = up - (up @ x) * x
+    up /= np.linalg.norm(up)
+    slope = np.deg2rad(FOREHEAD_SLOPE_DEG)
+    y = np.cos(slope) * up + np.sin(slope) * np.cross(x, up)
+    axes = np.stack([x, y, np.cross(x, y)])
     return HeadPose(axes @ rotation, scale, (translation - origin) @ axes.T, unit)
 
 
@@ -107,20 +115,6 @@ def fit_similarities(points: Array, target: Array) -> tuple[Array, Array, Array]
     scale = (singular * sign).sum(axis=1) / np.square(centred).sum(axis=(1, 2))
     translation = target_mean - scale[:, None] * (rotation @ mean[:, :, None])[:, :, 0]
     return rotation, scale, translation
-
-
-def _head_axes(face: Array) -> tuple[Array, Array, float]:
-    """Return the head's axes as rows [shape=(3, 3)], the origin [shape=(3,)] and the unit, from its rigid points."""
-    right_eye, left_eye, forehead, nasion = (
-        face[RIGID_POINTS.index(index)] for index in (*EYE_CORNERS, FOREHEAD, NASION)
-    )
-    unit = float(np.linalg.norm(left_eye - right_eye))
-    x = (left_eye - right_eye) / unit
-    up = forehead - nasion - ((forehead - nasion) @ x) * x
-    up /= np.linalg.norm(up)
-    slope = np.deg2rad(FOREHEAD_SLOPE_DEG)
-    y = np.cos(slope) * up + np.sin(slope) * np.cross(x, up)
-    return np.stack([x, y, np.cross(x, y)]), (left_eye + right_eye) / 2, unit
 
 
 def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:

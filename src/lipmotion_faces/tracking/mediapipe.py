@@ -64,12 +64,7 @@ class FaceMesh(_Graph):
         module = import_face_mesh()
         super().__init__(lambda: module.FaceMesh(max_num_faces=most, refine_landmarks=True))
 
-    def faces(self, image: Image) -> list[NDArray[np.float64]]:
-        """Return the points of every face in the next frame.
-
-        image : uint8 array [shape=(H, W, 3)], RGB
-        Returns one array a face [shape=(len(TRACKED_POINTS), 3)]: px, x to the right, y down, z away from the camera.
-        """
+    def faces(self, image: Image) -> list[NDArray[np.float64]]:  # noqa: D102
         height, width = image.shape[:2]
         return [
             np.array([(point.x, point.y, point.z) for point in (face.landmark[index] for index in TRACKED_POINTS)])
@@ -89,9 +84,8 @@ class FaceFinder(_Graph):
         super().__init__(lambda: import_face_detection().FaceDetection(**settings))
 
     def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
-        """Return the faces in a picture, those with the highest score first.
+        """Return the faces in a picture, those with the highest score first, as ``BoxFinder.boxes``.
 
-        image    : uint8 array [shape=(H, W, 3)], RGB
         thorough : where the whole picture shows none, search the parts of ``parts`` too, which takes four times as long
         A face needs an eye distance of a fortieth of the picture's longer side; in a part, of the shorter side.
         """

@@ -111,11 +111,7 @@ def register_maps(footage: Footage) -> Array:
 
 
 def _remove_noise(rows: Array, sigma: float, share: float, envelope: float) -> Array:
-    """Return smooth rows, and what smoothing takes away where it is much larger than noise.
-
-    sigma, envelope : standard deviations, frames
-    share           : 1 / noise
-    """
+    """Return smooth rows, and what smoothing takes away where it is much larger than 1 / ``share``."""
     smooth = _smooth(rows, sigma)
     rest = rows - smooth
     power = _smooth(np.square(rest * share).sum(axis=1), envelope)
@@ -145,10 +141,7 @@ def _blurred_region(frame: NDArray[np.uint8], to_image: Array, samples: float) -
 
 
 def _step(before: Sequence[Floats], after: Sequence[Floats]) -> Array:
-    """Return how far a region moved, px [shape=(2,)]: after(x + step) is before(x), but for gain and offset.
-
-    Returns zeros if the regions are not more alike then.
-    """
+    """Return how far a region moved, px [shape=(2,)], but for gain and offset; 0 where nothing is more alike then."""
     if min(before[-1].std(), after[-1].std()) < FLAT_LEVELS:
         return np.zeros(2)
     step = np.zeros(2)

@@ -126,7 +126,7 @@ TRACKERS: Registry[type[LandmarkTracker]] = Registry(
 )
 
 
-def tracker_named(name: str = MEDIAPIPE) -> LandmarkTracker:
+def make_tracker(name: str = MEDIAPIPE) -> LandmarkTracker:
     """Return a tracker. Raises InputError: none of that name, or what an installed package adds is no tracker."""
     chosen = TRACKERS.load(name)
     if not (isinstance(chosen, type) and issubclass(chosen, LandmarkTracker)):

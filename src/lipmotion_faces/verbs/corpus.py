@@ -27,19 +27,41 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     prepare.add_argument("--offset-ms", type=float, metavar="MS", help=late)
     add_machine_readable(prepare)
     prepare.set_defaults(run=run_prepare)
-    _add_info(actions)
-    _add_sync(actions)
-    _add_offset(actions)
-    _add_prompts(actions)
-    _add_coverage(actions)
+    action = actions.add_parser("info", help="print what a corpus contains")
+    add_input(action, "corpus", what="corpus")
+    action.set_defaults(run=run_info)
+    action = actions.add_parser("sync", help="correct the offset between sound and lips of a corpus")
+    add_input(action, "corpus", what="corpus")
+    action.set_defaults(run=run_sync)
+    action = actions.add_parser("offset", help="measure by how much a separate recording of the sound is late")
+    add_input(action, "camera", what="recording", help="the recording that is in step with the motion: video or sound")
+    add_input(action, "recorder", what="recording", help="the separate recording of the same sound")
+    action.set_defaults(run=run_offset)
+    action = actions.add_parser("prompts", help="print sentences to record, those that cover most sounds first")
+    action.add_argument("--count", type=int, default=50, metavar="N", help="at most N sentences (default: 50)")
+    sentences = "choose from the sentences of this file, one per line"
+    add_input(action, "--text", what="text", metavar="FILE", help=sentences)
+    covered = "do not count what this corpus covers already"
+    add_input(action, "--have", what="corpus", metavar="CORPUS", help=covered)
+    add_options(action, Request, "lexicon")
+    action.set_defaults(run=run_prompts)
+    action = actions.add_parser("coverage", help="print which sounds a corpus lacks, and what is nearest to them")
+    add_input(action, "corpus", what="corpus")
+    sentences = "the sentences whose sounds are needed, one per line (default: those of lipmotion corpus prompts)"
+    add_input(action, "--text", what="text", metavar="FILE", help=sentences)
+    add_options(action, Request, "lexicon")
+    most = f"at most N lines each of phones, diphones and triphones (default: {LINES})"
+    action.add_argument("--count", type=int, default=LINES, metavar="N", help=most)
+    action.add_argument("--json", action="store_true", help="print one JSON object, with everything that is missing")
+    action.set_defaults(run=run_coverage)
 
 
 def run_prepare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.prepare``; report what was prepared, kept and skipped."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion_faces.corpus.prepare import prepare
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         done = prepare(
             options.recordings,
             options.output,
@@ -51,12 +73,6 @@ def run_prepare(options: argparse.Namespace) -> None:
         report.finish(str(done), corpus=str(done.corpus), kind=done.kind, **done.counts)
 
 
-def _add_info(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("info", help="print what a corpus contains")
-    add_input(parser, "corpus", what="corpus")
-    parser.set_defaults(run=run_info)
-
-
 def run_info(options: argparse.Namespace) -> None:
     """Print the summary of ``lipmotion.Corpus``, and by how much its sound is late."""
     from lipmotion.corpora.store import Corpus
@@ -65,12 +81,6 @@ def run_info(options: argparse.Namespace) -> None:
     corpus = Corpus.open(options.corpus)
     for name, value in (*corpus.summary().items(), *(("offset", line) for line in offsets(corpus).lines())):
         print_line(f"{name:12} {value}")
-
-
-def _add_sync(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("sync", help="correct the offset between sound and lips of a corpus")
-    add_input(parser, "corpus", what="corpus")
-    parser.set_defaults(run=run_sync)
 
 
 def run_sync(options: argparse.Namespace) -> None:
@@ -86,31 +96,13 @@ def run_sync(options: argparse.Namespace) -> None:
         print_line(f"{corpus.path}: nothing moved: the sound is in step, or its offset could not be measured")
 
 
-def _add_offset(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("offset", help="measure by how much a separate recording of the sound is late")
-    add_input(parser, "camera", what="recording", help="the recording that is in step with the motion: video or sound")
-    add_input(parser, "recorder", what="recording", help="the separate recording of the same sound")
-    parser.set_defaults(run=run_offset)
-
-
 def run_offset(options: argparse.Namespace) -> None:
     """Call ``sound_offset``; print the offset and how it was found."""
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion.speech.sound.sound_offset import sound_offset
 
-    found = sound_offset(read_audio(options.camera), read_audio(options.recorder))
-    print_line(f"--offset-ms {found.late_s * 1000:.1f}  (by {found.how}; levels correlate by {found.alike:.2f})")
-
-
-def _add_prompts(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("prompts", help="print sentences to record, those that cover most sounds first")
-    parser.add_argument("--count", type=int, default=50, metavar="N", help="at most N sentences (default: 50)")
-    sentences = "choose from the sentences of this file, one per line"
-    add_input(parser, "--text", what="text", metavar="FILE", help=sentences)
-    covered = "do not count what this corpus covers already"
-    add_input(parser, "--have", what="corpus", metavar="CORPUS", help=covered)
-    add_options(parser, Request, "lexicon")
-    parser.set_defaults(run=run_prompts)
+    offset = sound_offset(read_audio(options.camera), read_audio(options.recorder))
+    print_line(f"--offset-ms {offset.late_s * 1000:.1f}  (by {offset.how}; levels correlate by {offset.alike:.2f})")
 
 
 def run_prompts(options: argparse.Namespace) -> None:
@@ -134,18 +126,6 @@ def run_prompts(options: argparse.Namespace) -> None:
         print_error(f"warning: left out {len(selection.left_out)} sentences for their words: {some}")
 
 
-def _add_coverage(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = actions.add_parser("coverage", help="print which sounds a corpus lacks, and what is nearest to them")
-    add_input(parser, "corpus", what="corpus")
-    sentences = "the sentences whose sounds are needed, one per line (default: those of lipmotion corpus prompts)"
-    add_input(parser, "--text", what="text", metavar="FILE", help=sentences)
-    add_options(parser, Request, "lexicon")
-    most = f"at most N lines each of phones, diphones and triphones (default: {LINES})"
-    parser.add_argument("--count", type=int, default=LINES, metavar="N", help=most)
-    parser.add_argument("--json", action="store_true", help="print one JSON object, with everything that is missing")
-    parser.set_defaults(run=run_coverage)
-
-
 def run_coverage(options: argparse.Namespace) -> None:
     """Call ``coverage`` and print it."""
     from lipmotion.corpora.store import Corpus
@@ -153,13 +133,13 @@ def run_coverage(options: argparse.Namespace) -> None:
     from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines
 
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    found = coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)
+    result = coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)
     if options.json:
-        print_json(coverage_document(found))
+        print_json(coverage_document(result))
     else:
-        for line in coverage_lines(found, max(options.count, 0)):
+        for line in coverage_lines(result, max(options.count, 0)):
             print_line(line)
-    if found.left_out and not options.json:
-        print_error(f"warning: left out {len(found.left_out)} sentences for their words (--json has them)")
-    if found.unknown and not options.json:
-        print_error(f"warning: {found.unknown} utterances without known words or phones were not counted")
+    if result.left_out and not options.json:
+        print_error(f"warning: left out {len(result.left_out)} sentences for their words (--json has them)")
+    if result.unknown and not options.json:
+        print_error(f"warning: {result.unknown} utterances without known words or phones were not counted")

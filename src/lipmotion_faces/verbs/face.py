@@ -30,7 +30,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_build(options: argparse.Namespace) -> None:
     """Call ``lipmotion.build_face`` and ``lipmotion.save_face``; report what was made."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.errors import ExportError
     from lipmotion.storage.files import check_target
     from lipmotion_faces.film.build import build_face
@@ -39,7 +39,7 @@ def run_build(options: argparse.Namespace) -> None:
     if options.output.suffix.lower() != SUFFIX:
         raise ExportError(f"{options.output}: a face is a file ending in {SUFFIX}; name it so")
     check_target(options.output)
-    with reporting(options) as report:
+    with report_progress(options) as report:
         face = build_face(
             options.footage,
             recordings=options.recordings,

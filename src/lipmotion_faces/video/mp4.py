@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from fractions import Fraction
 from heapq import merge
 from itertools import chain
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.files import as_text, atomic_file
 from lipmotion.storage.media import x264_instructions
 from lipmotion.types import Audio
 
@@ -101,8 +102,14 @@ def write_mp4(
     if unknown := set(tags or ()) - TAGS:
         raise ExportError(f"{path}: unknown tags {', '.join(sorted(unknown))}; known: {', '.join(sorted(TAGS))}")
     texts = {name: as_text(text) for name, text in (tags or {}).items()}
-    with whole_file(path) as temporary:
-        _encode(temporary, path, _checked(frames, path), frame_rate(fps), audio, texts)
+
+    def is_even(shape: tuple[int, ...]) -> bool:  # of RGB or YUV 4:2:0
+        height, width, *colours = shape
+        return not width % 2 and (not height % 2 if colours == [3] else not colours and not height % 3)
+
+    with atomic_file(path) as temporary:
+        checked = check_frames(frames, path, "RGB", is_even)
+        _encode(temporary, path, checked, frame_rate(fps), audio, texts)
         if xmp is not None:
             append_xmp(temporary, xmp)
 
@@ -115,24 +122,22 @@ def frame_rate(fps: float) -> Fraction:
     return Fraction(fps).limit_denominator(1001)
 
 
-def _checked(frames: Iterable[Frame], path: Path) -> Iterator[Frame]:
-    """Yield the frames. Raises ExportError: there are none, or one has another type or size than required."""
+def check_frames(
+    frames: Iterable[Frame], path: Path, kind: str, is_even: Callable[[tuple[int, ...]], bool]
+) -> Iterator[Frame]:
+    """Yield the frames. Raises ExportError: there are none, or one has another type or size than required.
+
+    kind    : of colours, for the message;  is_even : whether a shape is of that kind and of even sizes
+    """
     shape: tuple[int, ...] | None = None
     for n, frame in enumerate(frames):
         shape = shape or frame.shape
-        if frame.shape != shape or frame.dtype != np.uint8 or not _has_even_sizes(shape):
-            raise ExportError(
-                f"{path}: frame {n} is {frame.dtype} {frame.shape}, required uint8 RGB of even sizes, all alike"
-            )
+        if frame.shape != shape or frame.dtype != np.uint8 or not is_even(shape):
+            required = f"required uint8 {kind} of even sizes, all alike"
+            raise ExportError(f"{path}: frame {n} is {frame.dtype} {frame.shape}, {required}")
         yield frame
     if shape is None:
         raise ExportError(f"{path}: there are no frames to write")
-
-
-def _has_even_sizes(shape: tuple[int, ...]) -> bool:
-    """Return whether frames of a shape are RGB or YUV 4:2:0 of even height and width."""
-    height, width, *colours = shape
-    return not width % 2 and (not height % 2 if colours == [3] else not colours and not height % 3)
 
 
 def _encode(
@@ -142,51 +147,61 @@ def _encode(
 
     converter = av.video.reformatter.VideoReformatter()  # to make one for every frame takes as long as to use it
     first = next(frames)
+    with open_output(temporary, path, format="mp4", options={"movflags": "+faststart"}) as container:
+        container.metadata.update(tags)
+        options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + x264_instructions()}
+        video = container.add_stream("libx264", rate=rate, options=options)
+        video.height, video.width = first.shape[:2] if first.ndim == 3 else (len(first) * 2 // 3, first.shape[1])
+        video.pix_fmt = "yuv420p"
+        context = video.codec_context
+        context.time_base = 1 / rate
+        context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
+        context.color_primaries = context.color_trc = _BT709
+        sound = container.add_stream("aac", rate=SOUND_HZ, layout="mono", bit_rate=128_000)
+
+        def convert(frame: Frame) -> Any:
+            if frame.ndim == 3:
+                picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
+                return converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
+            picture = av.VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), format="yuv420p")
+            picture.colorspace, picture.color_range = _BT601, _LIMITED_RANGE
+            return picture
+
+        mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, sound_parts(audio))
+
+
+@contextmanager
+def open_output(temporary: Path, path: Path, **settings: Any) -> Iterator[Any]:
+    """Open a file to encode into with settings of ``av.open``. Raises ExportError, naming ``path``: it fails."""
+    import av
+
     try:
-        with av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-            container.metadata.update(tags)
-            video = _video_stream(container, first, rate)
-            sound = container.add_stream("aac", rate=SOUND_HZ, layout="mono", bit_rate=128_000)
-            pictures = (
-                (n / rate, video, _picture(frame, n, rate, converter)) for n, frame in enumerate(chain([first], frames))
-            )
-            sounds = ((part.pts * part.time_base, sound, part) for part in _sound_parts(audio))
-            for _, stream, part in merge(pictures, sounds, key=itemgetter(0)):
-                container.mux(stream.encode(part))
-            for stream in (video, sound):
-                container.mux(stream.encode(None))
+        with av.open(str(temporary), "w", **settings) as container:
+            yield container
     except av.FFmpegError as error:
         if isinstance(error, OSError):  # a full disk
             raise
         raise ExportError(f"{path}: cannot be encoded: {error}") from error
 
 
-def _video_stream(container: Any, first: Frame, rate: Fraction) -> Any:
-    options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + x264_instructions()}
-    stream = container.add_stream("libx264", rate=rate, options=options)
-    stream.height, stream.width = first.shape[:2] if first.ndim == 3 else (len(first) * 2 // 3, first.shape[1])
-    stream.pix_fmt = "yuv420p"
-    context = stream.codec_context
-    context.time_base = 1 / rate
-    context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
-    context.color_primaries = context.color_trc = _BT709
-    return stream
+def mux_streams(
+    container: Any, video: Any, pictures: Iterable[Any], rate: Fraction, sound: Any, parts: Iterable[Any]
+) -> None:
+    """Encode pictures, numbered at a rate, and parts of sound into two streams, in the order of their times."""
+
+    def number(n: int, picture: Any) -> tuple[Fraction, Any, Any]:
+        picture.pts, picture.time_base = n, 1 / rate
+        return n / rate, video, picture
+
+    numbered = (number(n, picture) for n, picture in enumerate(pictures))
+    timed = ((part.pts * part.time_base, sound, part) for part in parts)
+    for _, stream, part in merge(numbered, timed, key=itemgetter(0)):
+        container.mux(stream.encode(part))
+    for stream in (video, sound):
+        container.mux(stream.encode(None))
 
 
-def _picture(frame: Frame, n: int, rate: Fraction, converter: Any) -> Any:
-    from av import VideoFrame
-
-    if frame.ndim == 2:
-        picture = VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), format="yuv420p")
-        picture.colorspace, picture.color_range = _BT601, _LIMITED_RANGE
-    else:
-        picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
-        picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
-    picture.pts, picture.time_base = n, 1 / rate
-    return picture
-
-
-def _sound_parts(audio: Audio) -> Iterator[Any]:
+def sound_parts(audio: Audio) -> Iterator[Any]:
     """Yield the sound in parts of a tenth of a second, so that it is stored in the file near its frames."""
     from av import AudioFrame
 

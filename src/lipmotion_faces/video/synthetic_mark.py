@@ -70,12 +70,11 @@ def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = L
     Raises InputError: the face is no such box.
     """
     if face is not None and not (face[0] <= face[2] and face[1] <= face[3]):
-        raise InputError(
-            f"face {face}, required: left, top, right and bottom in px, left before right, top over bottom"
-        )
+        required = "left, top, right and bottom in px, left before right, top over bottom"
+        raise InputError(f"face {face}, required: {required}")
     drawn: _DrawnLabel | None = None
     for frame in frames:
-        drawn = drawn or _placed(frame.shape[0], frame.shape[1], face, label)
+        drawn = drawn or _place(frame.shape[0], frame.shape[1], face, label)
         height, width = drawn.ground.shape
         marked = frame.copy()
         part = marked[drawn.top : drawn.top + height, drawn.left : drawn.left + width]
@@ -93,17 +92,19 @@ class _DrawnLabel:
     letters: NDArray[np.float32]
 
 
-def _placed(height: int, width: int, face: Box | None, label: str) -> _DrawnLabel:
+def _place(height: int, width: int, face: Box | None, label: str) -> _DrawnLabel:
     """Return the label in the first free corner, as large as possible. Raises ExportError: no corner is free."""
     largest = max(SMALLEST_LETTERS_PX, round(LETTER_SHARE * min(height, width)))
     for size in range(largest, SMALLEST_LETTERS_PX - 1, -1):
-        ground, letters = _drawn(label, size)
+        ground, letters = _draw(label, size)
         rows, columns = ground.shape
         space = round(EDGE_DISTANCE * size)
         for top in (height - space - rows, space):
             for left in (width - space - columns, space):
                 inside = 0 <= top <= height - rows and 0 <= left <= width - columns
-                if inside and (face is None or _apart((left, top, left + columns, top + rows), face)):
+                x, y, right, bottom = face or (width, height, width, height)
+                is_free = left + columns <= x or right <= left or top + rows <= y or bottom <= top
+                if inside and is_free:
                     return _DrawnLabel(top, left, ground, letters)
     raise ExportError(
         f"no corner of the {width} × {height} px frame has room for the label {label!r} beside the face {face}; "
@@ -111,11 +112,7 @@ def _placed(height: int, width: int, face: Box | None, label: str) -> _DrawnLabe
     )
 
 
-def _apart(one: Box, other: Box) -> bool:
-    return one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
-
-
-def _drawn(label: str, size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _draw(label: str, size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return opacity and grey levels of a label: white letters of ``size`` px on a dark ground with round corners."""
     from PIL import Image, ImageDraw, ImageFont
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from heapq import merge
 from itertools import chain
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.types import Audio
-from lipmotion_faces.video.mp4 import frame_rate
+from lipmotion_faces.video.mp4 import SOUND_HZ, check_frames, frame_rate, mux_streams, open_output, sound_parts
 
 Frame = NDArray[np.uint8]
 
-SOUND_HZ = 48_000
 _BT709, _LIMITED_RANGE = 1, 1
 
 
@@ -59,8 +56,8 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
         raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
     if not len(audio.samples):
         raise ExportError(f"{path}: the sound has no samples")
-    with whole_file(path) as temporary:
-        _encode(temporary, path, _checked(frames, path), frame_rate(fps), audio)
+    with atomic_file(path) as temporary:
+        _encode(temporary, path, check_frames(frames, path, "RGB or RGBA", _is_even), frame_rate(fps), audio)
 
 
 def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
@@ -71,71 +68,35 @@ def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
     """
     from PIL import Image
 
-    for number, frame in enumerate(_checked(frames, path)):
-        with whole_file(path.with_name(path.name % number)) as temporary:
+    for number, frame in enumerate(check_frames(frames, path, "RGB or RGBA", _is_even)):
+        with atomic_file(path.with_name(path.name % number)) as temporary:
             Image.fromarray(frame).save(temporary, compress_level=4)
 
 
-def _checked(frames: Iterable[Frame], path: Path) -> Iterator[Frame]:
-    """Yield the frames. Raises ExportError: there are none, or one has another type or size than required."""
-    shape: tuple[int, ...] | None = None
-    for n, frame in enumerate(frames):
-        shape = shape or frame.shape
-        even = len(shape) == 3 and shape[2] in (3, 4) and not (shape[0] % 2 or shape[1] % 2)
-        if frame.shape != shape or frame.dtype != np.uint8 or not even:
-            raise ExportError(
-                f"{path}: frame {n} is {frame.dtype} {frame.shape}, required uint8 RGB or RGBA of even sizes, all alike"
-            )
-        yield frame
-    if shape is None:
-        raise ExportError(f"{path}: there are no frames to write")
+def _is_even(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 3 and shape[2] in (3, 4) and not (shape[0] % 2 or shape[1] % 2)
 
 
 def _encode(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction, audio: Audio) -> None:
-    import av
+    from av import AudioResampler, VideoFrame
 
     codecs, first = _CONTAINERS[path.suffix.lower()], next(frames)
-    pixels = codecs.transparent if first.shape[2] == 4 else codecs.opaque
-    try:
-        with av.open(str(temporary), "w", format=codecs.container) as container:
-            video = container.add_stream(codecs.video, rate=rate, options=codecs.video_options)
-            video.height, video.width = first.shape[:2]
-            video.pix_fmt = pixels
-            context = video.codec_context
-            context.time_base, context.thread_count = 1 / rate, os.cpu_count() or 1
-            context.colorspace = context.color_primaries = context.color_trc = _BT709
-            context.color_range = _LIMITED_RANGE
-            sound = container.add_stream(codecs.sound, rate=SOUND_HZ, layout="mono")
-            pictures = ((n / rate, video, _picture(f, n, rate, pixels)) for n, f in enumerate(chain([first], frames)))
-            sounds = ((part.pts * part.time_base, sound, part) for part in _sound_parts(audio, codecs.sound_format))
-            for _, stream, part in merge(pictures, sounds, key=itemgetter(0)):
-                container.mux(stream.encode(part))
-            for stream in (video, sound):
-                container.mux(stream.encode(None))
-    except av.FFmpegError as error:
-        if isinstance(error, OSError):  # a full disk
-            raise
-        raise ExportError(f"{path}: cannot be encoded: {error}") from error
+    has_alpha = first.shape[2] == 4
+    pixels = codecs.transparent if has_alpha else codecs.opaque
+    with open_output(temporary, path, format=codecs.container) as container:
+        video = container.add_stream(codecs.video, rate=rate, options=codecs.video_options)
+        video.height, video.width = first.shape[:2]
+        video.pix_fmt = pixels
+        context = video.codec_context
+        context.time_base, context.thread_count = 1 / rate, os.cpu_count() or 1
+        context.colorspace = context.color_primaries = context.color_trc = _BT709
+        context.color_range = _LIMITED_RANGE
+        sound = container.add_stream(codecs.sound, rate=SOUND_HZ, layout="mono")
+        resampler = AudioResampler(format=codecs.sound_format, layout="mono", rate=SOUND_HZ)
 
+        def convert(frame: Frame) -> Any:
+            picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if has_alpha else "rgb24")
+            return picture.reformat(format=pixels, dst_colorspace="itu709")
 
-def _picture(frame: Frame, n: int, rate: Fraction, pixels: str) -> Any:
-    from av import VideoFrame
-
-    picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if frame.shape[2] == 4 else "rgb24")
-    picture = picture.reformat(format=pixels, dst_colorspace="itu709")
-    picture.pts, picture.time_base = n, 1 / rate
-    return picture
-
-
-def _sound_parts(audio: Audio, kind: str) -> Iterator[Any]:
-    """Yield the sound at ``SOUND_HZ`` in parts of a tenth of a second."""
-    from av import AudioFrame, AudioResampler
-
-    resampler = AudioResampler(format=kind, layout="mono", rate=SOUND_HZ)
-    length = max(1, audio.rate_hz // 10)
-    for start in range(0, len(audio.samples), length):
-        samples = np.ascontiguousarray(audio.samples[None, start : start + length], dtype=np.float32)
-        part = AudioFrame.from_ndarray(samples, format="fltp", layout="mono")
-        part.rate, part.pts, part.time_base = audio.rate_hz, start, Fraction(1, audio.rate_hz)
-        yield from resampler.resample(part)
-    yield from resampler.resample(None)
+        parts = (part for sound_part in chain(sound_parts(audio), [None]) for part in resampler.resample(sound_part))
+        mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, parts)

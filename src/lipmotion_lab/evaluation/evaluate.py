@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closure_figures, phone_closures
+from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.motion.rest import is_away_from_speech
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser

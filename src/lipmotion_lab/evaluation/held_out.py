@@ -16,12 +16,12 @@ from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
+from lipmotion.pipeline.analysis.speech_analysis import build_speech, recognise_speech, with_voice
+from lipmotion.pipeline.analysis.transcribe import warn_of_guesses
 from lipmotion.pipeline.generation import generate_for
 from lipmotion.pipeline.model import GEOMETRY, Model, with_prior
 from lipmotion.pipeline.training.channels import with_visual_channels
-from lipmotion.pipeline.training.train import phones_of
-from lipmotion.pipeline.understand.transcribe import warn_of_guesses
-from lipmotion.pipeline.understand.understood_speech import recognised_speech, speech_of, with_voice
+from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import (
@@ -146,7 +146,7 @@ def load_held_out(  # noqa: PLR0913
     reference = []
     for utterance in aligned:
         try:
-            reference.append(phones_of(utterance, phones, lexicon))
+            reference.append(label_phones(utterance, phones, lexicon))
         except AlignmentError as error:
             raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
     threshold = None
@@ -214,9 +214,9 @@ def make_speech(
                 used.append(found)
                 return found
 
-            plain = recognised_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
+            plain = recognise_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
         else:
-            plain = speech_of(engine, utterance.audio, utterance.features, units, phones.kind)
+            plain = build_speech(engine, utterance.audio, utterance.features, units, phones.kind)
         voiced = with_voice(phones.own, utterance.audio, plain, used[-1] if used else None)
         speech.append(with_prior(recordings.prior, voiced))
     return speech

@@ -11,15 +11,22 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
 from lipmotion.formats.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY
-from lipmotion.pipeline.training.fingerprint import fingerprint
-from lipmotion.storage.files import TEMPORARY, locked, remove_unfinished, unfinished_work, whole_file, whole_folder
+from lipmotion.pipeline.training.fingerprint import fingerprint_training
+from lipmotion.storage.files import (
+    TEMPORARY,
+    atomic_file,
+    atomic_folder,
+    lock_folder,
+    remove_unfinished,
+    unfinished_work,
+)
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, sub_monitor
@@ -203,10 +210,12 @@ def experiment_report(
         raise CorpusError(f"{corpus.path}: {name} is {reason}")
     check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
     _check_folder(folder)
-    with locked(folder):
+    with lock_folder(folder):
         remove_unfinished(folder)
         config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
-        of_input = fingerprint(corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None)
+        of_input = fingerprint_training(
+            corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None
+        )
         lists = [[split, *corpus.names(split)] for split in SPLITS]
         writer = _Writer(
             corpus, folder, quick, settings, lacking, f"{of_input} {lists} {quick} {settings.seed} {can_draw()}"
@@ -296,7 +305,7 @@ class _Writer:
         text = report_html(f"Experiments on {corpus}", about, finished, left_open, failed, quick=self.quick)
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
-            with whole_file(page) as unfinished:
+            with atomic_file(page) as unfinished:
                 unfinished.write_text(text, encoding="utf-8")
 
     def run(self, name: str, settings: ExperimentSettings) -> None:
@@ -325,7 +334,7 @@ class _Writer:
             section, motion = part.section(figures), keeper.content()
             made_with = stamp.content(self._command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
-            with whole_folder(target) as made:
+            with atomic_folder(target) as made:
                 videos = []
                 if motion:
                     drawing = sub_monitor(settings.monitor, 0.95, 1)
@@ -339,7 +348,7 @@ class _Writer:
                 folder = made / "tables"
                 folder.mkdir()
                 for table in section.tables:
-                    with whole_file(folder / f"{table.name}.csv") as unfinished:
+                    with atomic_file(folder / f"{table.name}.csv") as unfinished:
                         unfinished.write_text(table.as_csv(), encoding="utf-8", newline="")
                     _write_json(folder / f"{table.name}.json", table.as_content())
                 _write_json(made / MOTION, motion)
@@ -358,5 +367,5 @@ def describe_error(error: Exception) -> str:
 
 
 def _write_json(path: Path, content: Any) -> None:
-    with whole_file(path) as unfinished:
+    with atomic_file(path) as unfinished:
         unfinished.write_text(as_json(content, indent=1) + "\n", encoding="utf-8")

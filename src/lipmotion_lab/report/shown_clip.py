@@ -15,10 +15,10 @@ from PIL.Image import Resampling
 from lipmotion.corpora.store import Corpus
 from lipmotion.formats.web_page import Html
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
-from lipmotion_faces import Staging, staged_face
+from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
@@ -67,7 +67,7 @@ class ClipKeeper:
             content |= {"channels": [recordings.channels[column] for column in columns], "spoken": clip.spoken}
             content |= {"time_s": rounded(clip.time_s), RECORDED: rounded(clip.original[:, columns])}
         content["systems"][system] = rounded(clip.generated[:, columns])
-        with whole_file(self.path) as unfinished:
+        with atomic_file(self.path) as unfinished:
             unfinished.write_text(as_json(content) + "\n", encoding="utf-8")
 
     def content(self) -> dict[str, Any]:
@@ -128,7 +128,7 @@ def write_videos(
         columns = [np.interp(time_s, content["time_s"], column) for column in values.T]
         motion = Motion(np.stack(columns, axis=1), FPS, tuple(map(Channel, content["channels"])))
         file = f"{number}.mp4"
-        frames = (picture[LOWER_FACE] for picture in staged_face("woman", STAGING).render(motion, silence, fps=FPS))
+        frames = (picture[LOWER_FACE] for picture in stage_face("woman", STAGING).render(motion, silence, fps=FPS))
         write_mp4(folder / file, frames, fps=FPS, audio=sound)
         found.append({"file": file, "caption": "a drawn face, recorded motion" if name == RECORDED else name})
     return found

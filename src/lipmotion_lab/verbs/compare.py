@@ -20,7 +20,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.compare`` and print its figures."""
-    from lipmotion.measures.comparison_table import comparison_table
+    from lipmotion.measures.evaluation_table import comparison_table
     from lipmotion_lab.compare import compare
 
     report_figures(

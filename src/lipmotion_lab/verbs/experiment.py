@@ -112,7 +112,7 @@ def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentPar
 
 def run_learning_curve(options: argparse.Namespace) -> None:
     """Call ``learning_curve`` and print its table."""
-    from lipmotion.corpora.splits import read_names
+    from lipmotion.corpora.source_recordings import read_names
     from lipmotion_lab.learning_curve import learning_curve, table
 
     def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
@@ -172,7 +172,7 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its table."""
-    from lipmotion.corpora.splits import read_names
+    from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
     from lipmotion_lab.noise import NoiseConditions, read_talkers
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, table, xieliu2007
@@ -247,13 +247,13 @@ def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 
 def run_all(options: argparse.Namespace) -> None:
     """Call ``experiment_report``; print what was found, and the page. Raises the error of an experiment that failed."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus
     from lipmotion.units import Lexicon
     from lipmotion_lab.report.report import describe_error, experiment_report
     from lipmotion_lab.runner import ExperimentSettings
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=report.receive)
         found = experiment_report(

@@ -12,7 +12,7 @@ from lipmotion.engines.coupled.conversion.em_conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.extensions import install_command
-from lipmotion.storage.files import make_folder, whole_file
+from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.types import GREY
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
 from lipmotion_lab.xie_liu2007.systems import TrainedSystem
@@ -109,5 +109,5 @@ def _label_axes(axes: Any, recordings: HeldOutRecordings, title: str) -> None:
 
 
 def _save(picture: Any, path: Path) -> None:
-    with whole_file(path) as unfinished:
+    with atomic_file(path) as unfinished:
         picture.savefig(unfinished, format="png", dpi=110)

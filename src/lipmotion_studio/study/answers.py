@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from lipmotion.errors import InputError, shortened
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.errors import InputError, shorten
+from lipmotion.storage.files import atomic_file, read_text_file
 from lipmotion.storage.text_table import as_field, from_field
 from lipmotion.types.values import parse_number, parse_whole
 
@@ -57,9 +57,9 @@ class Answer:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise InputError(f"an answer of the kind {shortened(self.kind)!r}, required one of {', '.join(KINDS)}")
+            raise InputError(f"an answer of the kind {shorten(self.kind)!r}, required one of {', '.join(KINDS)}")
         if not is_possible(self.kind, self.value):
-            raise InputError(f"the answer {shortened(self.value)!r}, required {POSSIBLE[self.kind]}")
+            raise InputError(f"the answer {shorten(self.value)!r}, required {POSSIBLE[self.kind]}")
 
 
 POSSIBLE = {
@@ -94,7 +94,7 @@ def answers_text(answers: Iterable[Answer]) -> str:
 
 def write_answers(path: Path, answers: Iterable[Answer]) -> None:
     """Write a table of answers. Raises ExportError: it cannot be written."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text(answers_text(answers), encoding="utf-8", newline="")
 
 

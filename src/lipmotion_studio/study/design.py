@@ -10,7 +10,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Outputs, Request
-from lipmotion.storage.files import read_text_file, sha256_of, whole_folder
+from lipmotion.storage.files import atomic_folder, read_text_file, sha256_of
 from lipmotion.types import Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
 from lipmotion_studio.study.answers import ANCHOR, KINDS, MOS, PAIRED, RANKING, RECORDING
@@ -72,7 +72,7 @@ def design_study(
         path = getattr(settings, name)
         if path:
             texts[name] = read_text_file(path, name, MAX_TEXT_BYTES).strip()
-    with whole_folder(output) as folder:
+    with atomic_folder(output) as folder:
         (folder / VIDEOS).mkdir()
         videos: list[StudyVideo] = []
         wanted = [(sentence, name) for sentence in spoken for name in makers]

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
 from lipmotion.formats.base import readable_suffixes
+from lipmotion.pipeline.analysis.recordings import list_recordings
 from lipmotion.pipeline.job import Job, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
-from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
+from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
 from lipmotion.pipeline.outputs.write import write
-from lipmotion.pipeline.understand.recordings import recordings_of
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion.storage.media import has_video, open_media
@@ -59,7 +59,7 @@ def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
 
     Raises InputError: none, two of one name, or a folder without recordings.
     """
-    found = [StudySentence(path.stem, path) for path in recordings_of(given)]
+    found = [StudySentence(path.stem, path) for path in list_recordings(given)]
     if not found:
         raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
     names = [sentence.name for sentence in found]
@@ -148,7 +148,7 @@ def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> C
         made = {"file": path.name, "file_sha256": sha256_of(path)}
         if path.suffix.lower() in VIDEO_SUFFIXES:
             return MadeVideo(path, made | {"made": "finished"})
-        generation = as_long_as(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
+        generation = match_duration(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
         write(generation, target, speech=sentence.recording, face=outputs.face, fps=outputs.fps)
         return MadeVideo(target, made | {"made": "drawn", "face": outputs.face})
 

@@ -75,11 +75,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_design(options: argparse.Namespace) -> None:
     """Call ``design_study``; report what was made."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion_studio.study.design import design_study
     from lipmotion_studio.study.settings import StudySettings
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         study = design_study(
             options.output,
             options.kind,

@@ -33,7 +33,7 @@ EDGES = ("we saw ice cream", "we saw i scream"), ("see that's tough", "see that 
 """The same phones, cut into words elsewhere."""
 
 
-def recordings_of(
+def list_recordings(
     units: RecordedUnits, config: SelectionConfig, wanted: Timeline[Unit], wrong: Timeline[Unit], by: str = "stress"
 ) -> set[int]:
     """Return the recordings of the phones that differ between two sentences by their stress or words, if any do."""
@@ -51,8 +51,8 @@ def recordings_of(
 def test_stress_alone_decides(config: SelectionConfig, one: str, other: str) -> None:
     for wanted, wrong in ((sentence(one), sentence(other)), (sentence(other), sentence(one))):
         units = recorded(wrong, wanted)
-        assert recordings_of(units, config, wanted, wrong) == {1}
-        assert recordings_of(units, replace(config, stress=0.0), wanted, wrong) == {0}
+        assert list_recordings(units, config, wanted, wrong) == {1}
+        assert list_recordings(units, replace(config, stress=0.0), wanted, wrong) == {0}
 
 
 @BOTH
@@ -61,17 +61,17 @@ def test_edges_of_words_alone_decide(config: SelectionConfig, one: str, other: s
     config = replace(config, stress=0.0)
     for wanted, wrong in ((sentence(one), sentence(other)), (sentence(other), sentence(one))):
         units = recorded(wrong, wanted)
-        assert recordings_of(units, config, wanted, wrong, by="words") == {1}
-        assert recordings_of(units, replace(config, word=0.0), wanted, wrong, by="words") == {0}
+        assert list_recordings(units, config, wanted, wrong, by="words") == {1}
+        assert list_recordings(units, replace(config, word=0.0), wanted, wrong, by="words") == {0}
 
 
 def test_pace_alone_decides_but_not_in_print() -> None:
     text = "my bee sleeps"
     for wanted, wrong in ((sentence(text, 0.06), sentence(text, 0.2)), (sentence(text, 0.2), sentence(text, 0.06))):
         units = recorded(wrong, wanted)
-        assert recordings_of(units, DEFAULT, wanted, wrong) == {1}
+        assert list_recordings(units, DEFAULT, wanted, wrong) == {1}
         for deaf in (replace(DEFAULT, duration=0.0), PRINTED):
-            assert recordings_of(units, deaf, wanted, wrong) == {0}
+            assert list_recordings(units, deaf, wanted, wrong) == {0}
 
 
 @pytest.mark.parametrize("phone", PRESERVED)

@@ -3,6 +3,8 @@
 import numpy as np
 
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.stage import Stage
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())
 
@@ -19,3 +21,14 @@ def said(*phones: str, duration_s: float = 0.4) -> Timeline[Unit]:
 def steady(phones: tuple[str, ...], values: float = 0.08, duration_s: float = 0.4) -> Motion:
     """Return a motion of one opening for as long as the phones take."""
     return opening(*[values] * (int(100 * duration_s) * len(phones) + 1), rate_hz=100.0)
+
+
+def parts_seen(stage: Stage, pose: CharacterPose) -> dict[str, np.ndarray]:
+    """Return which pixels show lips, wall, tongue, teeth (lower) and upper teeth [each shape=(H, W)]."""
+    drawn = stage.figure.frame(pose, stage.canvas.camera.place)
+    seen = {}
+    for name, rows in stage.figure.mouth_rows().items():
+        marked = np.zeros(len(drawn.places), bool)
+        marked[rows] = True
+        seen[name] = stage.canvas.shown(drawn.places, marked, stage.figure.triangles)
+    return seen

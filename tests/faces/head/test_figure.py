@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from lipmotion_faces.base import rotate_head
 from lipmotion_faces.head.forms import MOUTH_Y, head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import REST
 from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh
-from lipmotion_faces.turning import turned
 from meshes.heads import shaped
 
 VIEWER = camera_for(640, 360).place
@@ -73,7 +73,7 @@ def test_turning_moves_the_head_and_not_the_body():
 
 @pytest.mark.parametrize("angles", [(0.3, 0, 0), (0, 0.2, 0), (0, 0, 0.1), (0.2, -0.1, 0.3)])
 def test_turns_keep_lengths(angles):
-    matrix = turned(*angles)
+    matrix = rotate_head(*angles)
     assert matrix @ matrix.T == pytest.approx(np.eye(3), abs=1e-12)
     assert np.linalg.det(matrix) == pytest.approx(1)
 

@@ -5,43 +5,40 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faces.head.motions import NOTHING_SAID, opening
+from faces.head.motions import NOTHING_SAID, opening, parts_seen
 from lipmotion import Staging
 from lipmotion.errors import InputError
-from lipmotion_faces import face_named
-from lipmotion_faces.head import Head, render
+from lipmotion_faces import make_face
+from lipmotion_faces.head import Head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.stage import Stage, camera_for
 from lipmotion_faces.rendering.rasteriser import Camera
 from lipmotion_faces.testing import check_face
 
-SMALL: dict[str, Any] = {"width": 160, "height": 120}
-
 
 def test_the_number_of_frames_follows_the_frame_rate():
     moved = opening(*np.zeros(21), rate_hz=100.0)
-    assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30)] == [6, 7]
+    assert [sum(1 for _ in Head(size=(160, 120)).render(moved, NOTHING_SAID, fps=fps)) for fps in (25, 30)] == [6, 7]
 
 
 @pytest.mark.long
 def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
     moved = opening(*np.linspace(0, 0.2, 8))
     first, second, other = (
-        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), width=64, height=64)))
-        for seed in (1, 1, 2)
+        np.array(list(Head(Staging(seed=seed), size=(64, 64)).render(moved, NOTHING_SAID))) for seed in (1, 1, 2)
     )
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
 
 
 def test_the_head_is_a_face_like_all_others():
-    check_face(face_named("head"))
+    check_face(make_face("head"))
 
 
 def test_an_unusable_size_is_refused_at_once():
-    for size in ({"width": 63}, {"height": 0}, {"width": 129}):
+    for size in ((63, 120), (160, 0), (129, 120)):
         with pytest.raises(InputError, match="even number of at least 64"):
-            render(opening(0), NOTHING_SAID, **{**SMALL, **size})
+            Head(size=size).render(opening(0), NOTHING_SAID)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +47,7 @@ def front() -> Stage:
 
 
 def areas(stage: Stage, **pose: Any) -> dict[str, int]:
-    return {name: int(mask.sum()) for name, mask in stage.parts_seen(CharacterPose(**pose)).items()}
+    return {name: int(mask.sum()) for name, mask in parts_seen(stage, CharacterPose(**pose)).items()}
 
 
 def test_closed_lips_show_nothing_of_the_mouth(front):
@@ -104,5 +101,5 @@ def test_what_is_switched_off_does_not_move():
     still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
     frames = list(Head(still).render(moved, NOTHING_SAID))
     assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])
-    lively = list(Head().staged(Staging(size=64)).render(moved, NOTHING_SAID))
+    lively = list(Head().with_staging(Staging(size=64)).render(moved, NOTHING_SAID))
     assert not np.array_equal(lively[0], lively[30])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from faces.head.motions import said
+from faces.head.motions import parts_seen, said
 from lipmotion.articulation.mouth import ROUND_GAP
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.head.pose import CharacterPose, head_poses
@@ -46,7 +46,7 @@ def mouths() -> dict[str, Mouth]:
     wanted = {"f": (0.04, 0.0), "uw": (0.045, -0.04), "w": (0.035, -0.045), "aa": (0.17, 0.0), "iy": (0.08, 0.03)}
     mouths = {}
     for phone, (opening, wider) in wanted.items():
-        masks = stage.parts_seen(pose_of(phone, opening, wider))
+        masks = parts_seen(stage, pose_of(phone, opening, wider))
         lips = masks.pop("lips")
         inside = np.logical_or.reduce(list(masks.values()))
         seen = {name: int(mask.sum()) for name, mask in masks.items()} | {"lips": int(lips.sum())}
@@ -119,7 +119,7 @@ def test_upper_teeth_dominate_in_ee(mouths):
 
 
 def test_the_tongue_of_th_is_seen_and_is_narrower_than_the_mouth():
-    masks = Stage(Camera(*STAGE_SIZE, (0.0, -0.68), 0.8)).parts_seen(pose_of("th", 0.05))
+    masks = parts_seen(Stage(Camera(*STAGE_SIZE, (0.0, -0.68), 0.8)), pose_of("th", 0.05))
     inside = size(np.logical_or.reduce([mask for name, mask in masks.items() if name != "lips"]))
     tongue = masks["tongue"]
     assert 0.25 * inside[0] < size(tongue)[0] < 0.6 * inside[0]

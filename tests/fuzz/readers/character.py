@@ -17,7 +17,7 @@ from fuzz.readers.plausible import require
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.fitting.driven import load_character
-from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion_faces.mesh import MeshStage
 from lipmotion_faces.rendering.drawn_surface import drawn_surface
 from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
@@ -126,7 +126,7 @@ def read(folder: Path, _: Good) -> None:
     warnings.filterwarnings("ignore", ".*texture of the character.*")  # the surface then has one colour
     found = {path.name: path for path in folder.iterdir()}
     if "rig.csv" in found:
-        controls = curves_of(motion(), units(), found["rig.csv"])
+        controls = make_curves(motion(), units(), found["rig.csv"])
         require(bool(np.isfinite(controls.values).all()), "controls that are not finite")
     path = next(path for name, path in sorted(found.items()) if name in HEADS)
     binding = found.get("head.binding") or found.get("weights.csv")

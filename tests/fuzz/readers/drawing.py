@@ -11,7 +11,7 @@ from faces.test_cut_out import draw
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.types import Channel, Motion, Timeline
-from lipmotion_faces import Staging, staged_face
+from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.cut_out import read_cut_out
 
 ROBOT = Path(__file__).parents[3] / "examples" / "robot.svg"
@@ -38,5 +38,5 @@ def read(folder: Path, _: Good) -> None:
             require(frame.shape[0] == 64 and frame.shape[2] == 3, "a frame of another shape")
         return
     motion = Motion(np.array([[0.0], [0.2]]), 25.0, (Channel("opening"),))
-    for frame in staged_face(str(folder / "face.svg"), Staging(size=64)).render(motion, Timeline(()), fps=25.0):
+    for frame in stage_face(str(folder / "face.svg"), Staging(size=64)).render(motion, Timeline(()), fps=25.0):
         require(frame.ndim == 3 and frame.shape[0] == 64 and frame.shape[2] == 3, "a frame of another shape")

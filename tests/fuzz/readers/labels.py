@@ -12,8 +12,7 @@ from formats.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.corpora.layouts import read_aligned_words
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
-from lipmotion.corpora.splits import LISTS, assign_splits
+from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits
 from lipmotion.formats.label_files import read_labels
 from lipmotion.types import TimedWord, TranscriptLine
 from lipmotion_faces.corpus.supplied import supplied_phones

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.pipeline.batch import BatchLine, read_lines
-from lipmotion.pipeline.batch.ledger import LEDGER, Place, opened_ledger, write_receipt
+from lipmotion.pipeline.batch.ledger import LEDGER, Place, open_ledger, write_receipt
 from lipmotion.pipeline.batch.marks import MARKS, read_marks, write_marks
 from lipmotion.pipeline.batch.report import write_reports
 
@@ -66,7 +66,7 @@ def _go_on(place: Place, lines: list[BatchLine]) -> None:
     if hasattr(os, "mkfifo"):
         os.mkfifo(place.receipt("one"))
     out = Path(place.out)
-    with opened_ledger(place, lines) as ledger:
+    with open_ledger(place, lines) as ledger:
         require(all(ledger.kept(line, "settings", out) is None for line in lines), "a line without outputs is kept")
         write_reports(lines, ledger, out)
     left = {path.name for path in out.iterdir()}

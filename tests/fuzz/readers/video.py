@@ -27,7 +27,7 @@ CODECS = {
     **{"ts": ("mpeg2video", "yuv420p"), "y4m": ("rawvideo", "yuv420p")},
 }
 FRAMES = 6
-MOST_PIXELS = 1 << 26
+MAX_PIXELS = 1 << 26
 """Twice those of the largest video that anybody records."""
 
 
@@ -64,7 +64,7 @@ def read(folder: Path, _: Good) -> None:
         for frame in video.frames:
             height, width, colours = frame.image.shape
             require(colours == 3 and min(height, width) > 0, "a picture of another shape")
-            require(height * width <= MOST_PIXELS, "a picture that is too large")
+            require(height * width <= MAX_PIXELS, "a picture that is too large")
             require(math.isfinite(frame.time_s), "a picture without a time")
             times_s.append(frame.time_s)
         rate_hz = nominal_rate_hz(np.array(times_s), video.stated_rates_hz)

@@ -24,7 +24,7 @@ from lipmotion.formats.base import motion_suffixes
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
-from lipmotion.pipeline.batch.one_line import LineWork, finished_line
+from lipmotion.pipeline.batch.one_line import LineWork, finish_line
 from lipmotion.pipeline.batch.pool import WorkerDied
 from lipmotion.types import Item
 from lipmotion_faces.filmed.face import FilmedFace
@@ -83,16 +83,21 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: Job, tmp_path:
 
 @pytest.mark.long
 def test_the_face_of_another_person_is_mapped_onto_once(
-    filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
+    filmed_face: FilmedFace, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mapped: list[str] = []
-    monkeypatch.setattr(one_line, "provided", lambda _: lambda *_, speaker: mapped.append(speaker) or Path("a map"))
+    mapped, requests = list[str](), list[Request]()
+    monkeypatch.setattr(
+        one_line, "load_provided", lambda _: lambda *_, speaker: mapped.append(speaker) or Path("a map")
+    )
     other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
-    shared = one_line._Shared(other, shown_face(filmed_face), None)
-    assert [one_line._request(line, Request(), shared).onto for line in lines] == [Path("a map")] * 2
+    monkeypatch.setattr(one_line, "run", lambda job, **_: requests.append(job.request))
+    for model, line in ((other, lines[0]), (other, lines[1]), (toy_model, lines[0])):
+        shared = one_line._Shared(model, shown_face(filmed_face), None)
+        monkeypatch.setattr(one_line, "_share", lambda *_, shared=shared: shared)
+        one_line._write_line(LineWork(line, Job(), "", Place(str(tmp_path), "a run")))
+    assert [request.onto for request in requests] == [Path("a map"), Path("a map"), None]
     assert mapped == [""]
-    assert one_line._request(lines[0], Request(), replace(shared, model=toy_model)).onto is None
 
 
 def test_what_was_done_is_kept(sounds: Path, settings: Job, tmp_path: Path) -> None:
@@ -230,7 +235,7 @@ def waiting(sounds: Path, settings: Job, out: Path) -> list[LineWork]:
 @pytest.mark.parametrize(("times", "outcome"), [(1, "done"), (2, "failed")])
 def test_a_worker_dies(sounds: Path, settings: Job, tmp_path: Path, times: int, outcome: str) -> None:
     works = waiting(sounds, settings, tmp_path / "out")
-    records = list(run_module._finished(DyingPool("one", times), works))
+    records = list(run_module._finish_lines(DyingPool("one", times), works))
     assert {record["name"]: record["outcome"] for record in records} == {
         "one": outcome, "three": "done", "deep/two": "done",
     }  # fmt: skip
@@ -243,20 +248,20 @@ def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: Job, tmp
         yield
 
     with pytest.raises(CorpusError, match="die before they begin"):
-        list(run_module._finished(dead, waiting(sounds, settings, tmp_path / "out")))
+        list(run_module._finish_lines(dead, waiting(sounds, settings, tmp_path / "out")))
 
 
 def test_a_line_that_another_worker_finished_is_not_done_again(sounds: Path, settings: Job, tmp_path: Path) -> None:
     work = waiting(sounds, settings, tmp_path / "out")[0]
-    first = finished_line(work)
+    first = finish_line(work)
     assert 0 < first["motion"] < 1
     assert 0 <= first["least_sure_s"] < first["duration_s"]
     path = tmp_path / "out" / next(iter(first["outputs"]))
     before = path.stat().st_mtime_ns
-    assert finished_line(work) == first
+    assert finish_line(work) == first
     assert path.stat().st_mtime_ns == before
     path.unlink()  # the worker died after the receipt, before the renaming
-    assert finished_line(work)["outputs"] == first["outputs"]
+    assert finish_line(work)["outputs"] == first["outputs"]
     assert path.is_file()
 
 
@@ -264,7 +269,7 @@ def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: Job, 
     work = waiting(sounds, settings, tmp_path / "out")[0]
     (work.place.own / "run").write_text("a later one")
     with pytest.raises(ExportError, match="another run of this batch has begun"):
-        finished_line(work)
+        finish_line(work)
     assert contents(tmp_path / "out").keys() == {".batch/run"}
 
 
@@ -287,7 +292,7 @@ def test_an_output_that_cannot_be_renamed_is_a_line_that_fails(
     work = waiting(sounds, settings, tmp_path / "out")[0]
     monkeypatch.setattr("lipmotion.pipeline.batch.one_line.check_target", lambda _: None)
     (tmp_path / "out" / f"{work.line.name}.json").mkdir(parents=True)
-    record = finished_line(work)
+    record = finish_line(work)
     assert (record["outcome"], record["outputs"]) == ("failed", {})
 
 
@@ -297,7 +302,7 @@ def test_a_bug_that_one_line_meets_does_not_end_the_batch(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division")
 
-    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._written", broken)
+    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._write_line", broken)
     found = batch(sounds, tmp_path / "out", settings, jobs=1)
     assert found.failed == 3
     assert "unexpected ZeroDivisionError: float division" in ledger_rows(tmp_path / "out")[0]["error"]
@@ -349,8 +354,8 @@ def test_what_a_killed_process_was_writing_is_deleted(toy_speech: Path, settings
     out.mkdir()
     staged = Place(str(out), "of an earlier run").staged("line000", "json")
     write = (
-        "import os, sys; from pathlib import Path; from lipmotion.storage.files import whole_file\n"
-        "with whole_file(Path(sys.argv[1])) as path:\n    path.write_text('half'); os._exit(9)"
+        "import os, sys; from pathlib import Path; from lipmotion.storage.files import atomic_file\n"
+        "with atomic_file(Path(sys.argv[1])) as path:\n    path.write_text('half'); os._exit(9)"
     )
     assert run_child([sys.executable, "-c", write, staged]).returncode == 9
     assert len(list(out.iterdir())) == 1
@@ -369,7 +374,7 @@ def many(folder: Path, speech: Path, count: int) -> Path:
     return folder
 
 
-def events_of(process: Child) -> Iterator[dict]:
+def create_events(process: Child) -> Iterator[dict]:
     assert process.stdout is not None
     for text in process.stdout:
         yield json.loads(text)
@@ -385,7 +390,7 @@ def test_kills(toy_speech: Path, settings: Job, tmp_path: Path, whom: str) -> No
     how = [sounds, "--out", tmp_path / "out", "--model", settings.request.model, "--recogniser", "own", "--jobs", 2]
     with child(command(*how)) as process:
         items = 0
-        for event in events_of(process):
+        for event in create_events(process):
             items += event["type"] == "item"
             if items == 10 and event["type"] == "item":
                 os.kill(process.pid if whom == "first process" else worker_of(process.pid), signal.SIGKILL)
@@ -453,7 +458,7 @@ def test_a_worker_of_a_cluster_is_killed(
     ]
     with child(command(*how)) as process:
         items = 0
-        for event in events_of(process):
+        for event in create_events(process):
             items += event["type"] == "item"
             if items == 15 and event["type"] == "item":
                 processes[1].kill()

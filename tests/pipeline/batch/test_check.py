@@ -16,10 +16,10 @@ from lipmotion.pipeline.batch.check import (
     CheckedLine,
     Finding,
     LineToCheck,
-    _findings,
-    checked_line,
+    _find_problems,
+    check_line,
+    count_letters,
     expected_s,
-    letters_of,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
 
@@ -82,7 +82,7 @@ def test_every_kind_is_found(tmp_path: Path) -> None:
 def test_tags_are_no_words(tmp_path: Path) -> None:
     sound(tmp_path / "a.wav", 1.0, 1)
     line = BatchLine("a", str(tmp_path / "a.wav"), "[angry] Who is <smile> there?")
-    assert checked_line(LineToCheck(line, Request())).words == ("who", "is", "there")
+    assert check_line(LineToCheck(line, Request())).words == ("who", "is", "there")
 
 
 def test_a_folder_has_no_orphans(tmp_path: Path) -> None:
@@ -98,15 +98,15 @@ def test_the_measure_of_length_is_the_usual_rate() -> None:
         usual = [CheckedLine(f"{n}", spoken_s=share * expected_s(60), letters=60) for n in range(FEWEST_LINES)]
         return [*usual, CheckedLine("x", spoken_s=2.6 * expected_s(60), letters=60)]
 
-    assert [each.name for each in _findings(lines(0.8), [])] == ["x"]
-    assert list(_findings(lines(1.3), [])) == []
+    assert [each.name for each in _find_problems(lines(0.8), [])] == ["x"]
+    assert list(_find_problems(lines(1.3), [])) == []
 
 
 def test_short_lines_may_have_the_same_words() -> None:
     long, short = ("who", "goes", "there", "now"), ("yes", "sir")
     checked = [CheckedLine(name, words=words) for name, words in zip("abcd", (long, short, long, short), strict=True)]
-    assert list(_findings(checked, [])) == [Finding("same words", "c", "as of a")]
+    assert list(_find_problems(checked, [])) == [Finding("same words", "c", "as of a")]
 
 
 def test_letters_of_other_scripts_take_longer() -> None:
-    assert letters_of(["hello", "\uac00"]) == pytest.approx(8.0)
+    assert count_letters(["hello", "\uac00"]) == pytest.approx(8.0)

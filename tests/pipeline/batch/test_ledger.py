@@ -21,18 +21,13 @@ from lipmotion.pipeline.batch.ledger import (
     WORK,
     Place,
     Record,
-    opened_ledger,
+    open_ledger,
     read_receipt,
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.report import write_reports
-from lipmotion.pipeline.batch.settings import (
-    check_kinds,
-    fingerprint_of,
-    input_files,
-    line_fingerprint,
-)
+from lipmotion.pipeline.batch.settings import check_kinds, fingerprint_job, fingerprint_line, input_files
 from lipmotion.storage.files import LOCK
 
 CONTENT = b"motion"
@@ -45,7 +40,7 @@ def record_of(line: BatchLine, run: str = "old") -> Record:
         "name": line.name,
         "recording": line.recording,
         "run": run,
-        "fingerprint": line_fingerprint(line, "settings"),
+        "fingerprint": fingerprint_line(line, "settings"),
         "outcome": DONE,
         "inputs": inputs,
         "outputs": {f"{line.name}.json": DIGEST},
@@ -70,10 +65,10 @@ def written(out: Path) -> list[str]:
 
 def test_a_line_is_kept_while_nothing_changes(line: BatchLine, out: Path) -> None:
     (out / "a.json").write_bytes(CONTENT)
-    with opened_ledger(Place(str(out), "1"), [line]) as ledger:
+    with open_ledger(Place(str(out), "1"), [line]) as ledger:
         assert ledger.kept(line, "settings", out) is None
         ledger.append(record_of(line))
-    with opened_ledger(Place(str(out), "2"), [line]) as ledger:
+    with open_ledger(Place(str(out), "2"), [line]) as ledger:
         assert ledger.kept(line, "settings", out) == record_of(line)
         assert ledger.kept(line, "other settings", out) is None
         Path(line.recording).touch()  # a new time, the same content
@@ -90,11 +85,11 @@ def test_a_line_is_kept_while_nothing_changes(line: BatchLine, out: Path) -> Non
 
 
 def test_a_row_that_was_cut_is_removed(line: BatchLine, out: Path) -> None:
-    with opened_ledger(Place(str(out), "1"), [line]) as ledger:
+    with open_ledger(Place(str(out), "1"), [line]) as ledger:
         ledger.append(record_of(line))
     whole = (out / "batch.jsonl").read_bytes()
     (out / "batch.jsonl").write_bytes(whole + whole[:-40])
-    with opened_ledger(Place(str(out), "2"), [line]) as ledger:
+    with open_ledger(Place(str(out), "2"), [line]) as ledger:
         assert ledger.record_of("a") == record_of(line)
     assert (out / "batch.jsonl").read_bytes() == whole
 
@@ -152,7 +147,7 @@ def test_damaged_rows_are_said_once_and_their_lines_done_again(
         for others in (b"", good.replace(b'"a', b'"b') * 2):
             (out / "batch.jsonl").write_bytes(others + row + b"\n")
             caplog.clear()
-            with opened_ledger(Place(str(out), "2"), [line]) as ledger:
+            with open_ledger(Place(str(out), "2"), [line]) as ledger:
                 assert ledger.kept(line, "settings", out) is None, what
                 write_reports([line], ledger, out)
                 ledger.append(record_of(line))
@@ -182,7 +177,7 @@ def test_what_is_no_file_of_a_batch_is_refused(line: BatchLine, out: Path) -> No
             else:
                 path.symlink_to(path if aim.name == "itself" else aim)
             with pytest.raises(ExportError, match=rf"{name}: is a (link|file)"):
-                opened_ledger(Place(str(out), "1"), [line]).__enter__()
+                open_ledger(Place(str(out), "1"), [line]).__enter__()
             path.unlink()
     assert (elsewhere / "file").read_bytes() == b"precious"
     assert sorted(path.name for path in elsewhere.iterdir()) == ["file", "work"]
@@ -196,7 +191,7 @@ def test_killed_after_the_receipt(line: BatchLine, out: Path, in_place: bool) ->
     old.work("a").mkdir(parents=True)
     write_receipt(old.receipt("a"), record_of(line))
     (out / "a.json").write_bytes(CONTENT if in_place else b"of an earlier batch")
-    with opened_ledger(Place(str(out), "new"), [line]) as ledger:
+    with open_ledger(Place(str(out), "new"), [line]) as ledger:
         assert (ledger.kept(line, "settings", out) is not None) == in_place
         assert not old.work("a").exists()
         assert read_receipt(old.receipt("a")) is None
@@ -207,53 +202,53 @@ def test_killed_after_the_ledger(line: BatchLine, out: Path) -> None:
     """A receipt that is in the ledger already is not entered twice."""
     place = Place(str(out), "old")
     (out / "a.json").write_bytes(CONTENT)
-    with opened_ledger(place, [line]) as ledger:
+    with open_ledger(place, [line]) as ledger:
         ledger.append(record_of(line))
     place.receipt("a").parent.mkdir(parents=True)
     write_receipt(place.receipt("a"), record_of(line))
-    with opened_ledger(Place(str(out), "new"), [line]):
+    with open_ledger(Place(str(out), "new"), [line]):
         pass
     assert written(out) == ["a"]
 
 
 def test_a_later_run_ends_the_earlier_one(out: Path) -> None:
     first, second = Place(str(out), "1"), Place(str(out), "2")
-    with opened_ledger(first, []):
+    with open_ledger(first, []):
         assert first.is_current()
-        with pytest.raises(ExportError, match="at work on it"), opened_ledger(second, []):
+        with pytest.raises(ExportError, match="at work on it"), open_ledger(second, []):
             pass
         assert first.is_current()
-    with opened_ledger(second, []):
+    with open_ledger(second, []):
         assert not first.is_current()
 
 
 def test_settings_have_a_fingerprint(tmp_path: Path) -> None:
     (tmp_path / "words.txt").write_text("a AH")
     plain = Job()
-    assert fingerprint_of(plain) == fingerprint_of(Job())
-    assert fingerprint_of(plain) != fingerprint_of(Job(Request(recogniser="fast")))
+    assert fingerprint_job(plain) == fingerprint_job(Job())
+    assert fingerprint_job(plain) != fingerprint_job(Job(Request(recogniser="fast")))
     own = Job(outputs=Outputs(character=tmp_path / "head.glb"))
-    before = fingerprint_of(own)
+    before = fingerprint_job(own)
     (tmp_path / "head.glb.character.csv").write_text("control,source\n")
-    assert fingerprint_of(own) != before
+    assert fingerprint_job(own) != before
     lexicon = Job(Request(lexicon=tmp_path / "words.txt"))
-    before = fingerprint_of(lexicon)
+    before = fingerprint_job(lexicon)
     (tmp_path / "words.txt").write_text("a EY")
-    assert fingerprint_of(lexicon) != before
+    assert fingerprint_job(lexicon) != before
     (tmp_path / "A.png").write_text("a drawing")
     drawn = Job(outputs=Outputs(face=str(tmp_path)))
-    before = fingerprint_of(drawn)
+    before = fingerprint_job(drawn)
     (tmp_path / "words.txt").write_text("a AY")
-    assert fingerprint_of(drawn) == before
+    assert fingerprint_job(drawn) == before
     (tmp_path / "A.png").write_text("another one")
-    assert fingerprint_of(drawn) != before
+    assert fingerprint_job(drawn) != before
 
 
 def test_a_line_without_the_recogniser_of_phones_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
     found = set()
     for name in ("hama", None):
         monkeypatch.setattr(settings, "installed_phone_recogniser", lambda name=name: name)
-        found.add(fingerprint_of(Job()))
+        found.add(fingerprint_job(Job()))
     assert len(found) == 2
 
 

@@ -114,7 +114,7 @@ def test_kinds_do_not_meet() -> None:
 
 
 def test_a_list_of_too_many_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lines_module, "MOST_LINES", 2)
+    monkeypatch.setattr(lines_module, "MAX_LINES", 2)
     assert len(listed(tmp_path, "a.wav\nb.wav\n")) == 2
     with pytest.raises(InputError, match="3 lines, required at most 2"):
         listed(tmp_path, "a.wav\nb.wav\nc.wav\n")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.batch.marks import Mark, is_due, merged, read_marks, write_marks
+from lipmotion.pipeline.batch.marks import Mark, is_due, merge_marks, read_marks, write_marks
 
 
 def test_they_are_read_as_they_were_written(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_what_is_refused(tmp_path: Path, text: str, said: str) -> None:
 
 def test_later_marks_are_ahead_and_may_take_back() -> None:
     kept = {"a": Mark("approve"), "b": Mark("redo"), "c": Mark("approve")}
-    assert merged(kept, {"a": Mark("redo", "2"), "b": Mark("")}) == {"a": Mark("redo", "2"), "c": Mark("approve")}
+    assert merge_marks(kept, {"a": Mark("redo", "2"), "b": Mark("")}) == {"a": Mark("redo", "2"), "c": Mark("approve")}
 
 
 def test_a_line_is_due_once_for_each_mark() -> None:

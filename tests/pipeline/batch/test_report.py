@@ -10,8 +10,8 @@ from urllib.parse import unquote
 import pytest
 
 from lipmotion.pipeline.batch import BatchLine
-from lipmotion.pipeline.batch.ledger import Place, opened_ledger
-from lipmotion.pipeline.batch.report import COLUMNS, doubt_of, write_reports
+from lipmotion.pipeline.batch.ledger import Place, open_ledger
+from lipmotion.pipeline.batch.report import COLUMNS, rate_doubt, write_reports
 from lipmotion.printable import printable
 
 GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}
@@ -33,8 +33,8 @@ GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 
     ],
 )
 def test_what_is_doubtful(worse: dict, better: dict) -> None:
-    assert doubt_of(GOOD | worse) > doubt_of(GOOD | better)
-    assert doubt_of(GOOD) == pytest.approx(0)
+    assert rate_doubt(GOOD | worse) > rate_doubt(GOOD | better)
+    assert rate_doubt(GOOD) == pytest.approx(0)
 
 
 def rows_of(page: str) -> list[list]:
@@ -46,7 +46,7 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
     names = ["a", "b/c", "d"]
     lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
     base = {"run": "1", "fingerprint": "f", "inputs": []}
-    with opened_ledger(Place(str(tmp_path), "1"), lines) as ledger:
+    with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
         for line in lines[:2]:
             outputs = {f"{line.name}.json": "0"} if line.name == "a" else {}
             wrong = {} if line.name == "a" else {"outcome": "failed", "error": hostile}
@@ -73,7 +73,7 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
 def test_no_text_is_a_formula(tmp_path: Path, name: str) -> None:
     lines = [BatchLine(name, f"/x/{name}.wav")]
     record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": name, "outputs": {f"{name}.json": "0"}}
-    with opened_ledger(Place(str(tmp_path), "1"), lines) as ledger:
+    with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
         ledger.append(record | {"recording": lines[0].recording, "range_db": -3.0, "warnings": [name, "a"]})
         table, page = write_reports(lines, ledger, tmp_path)
     with table.open(encoding="utf-8", newline="") as file:
@@ -87,7 +87,7 @@ def test_no_text_is_a_formula(tmp_path: Path, name: str) -> None:
 def test_a_recording_without_an_address_is_not_played(tmp_path: Path, recording: str) -> None:
     lines = [BatchLine("a", "/a.wav")]
     record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": "a", "outputs": {"a.json": "0"}}
-    with opened_ledger(Place(str(tmp_path), "1"), lines) as ledger:
+    with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
         ledger.append(record | {"recording": recording})
         page = write_reports(lines, ledger, tmp_path)[1]
     assert rows_of(page.read_text(encoding="utf-8"))[0][COLUMNS.index("mark") + 2] is None

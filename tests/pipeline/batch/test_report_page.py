@@ -12,17 +12,14 @@ import pytest
 
 from children import wait_until
 from lipmotion.pipeline.batch import BatchLine
-from lipmotion.pipeline.batch.ledger import Place, opened_ledger
+from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.pipeline.batch.marks import Mark, read_marks
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
 from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, axe_script, browser
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING),
-]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
 SCREENS = ((1200, 800, "light"), (1200, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
 LINES = 10_000
 FOUND = {
@@ -58,7 +55,7 @@ def report(folder: Path, speech: Path, count: int, *, film: bool) -> Path:
         frames = [np.full((120, 160, 3), (200, 16 * step, 128), np.uint8) for step in range(12)]
         for line in lines:
             write_mp4(out / f"{line.name}.mp4", frames, fps=25, audio=Audio(tone, 16_000))
-    with opened_ledger(Place(str(out), "1"), lines) as ledger:
+    with open_ledger(Place(str(out), "1"), lines) as ledger:
         for n, line in enumerate(lines):
             record = FOUND | {"name": line.name, "recording": line.recording, "outputs": {f"{line.name}.{kind}": "0"}}
             warnings = {"warnings": [f"word {n} is not said"] * (3 - n)} if n < 3 else {}

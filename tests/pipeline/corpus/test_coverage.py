@@ -25,14 +25,14 @@ def corpus_of(folder: Path, *texts: str | None) -> Corpus:
     return corpus
 
 
-def text_of(path: Path, *lines: str) -> Path:
+def format_moods(path: Path, *lines: str) -> Path:
     path.write_text("\n".join(lines))
     return path
 
 
 def test_counts_and_shares(tmp_path: Path) -> None:
     corpus = corpus_of(tmp_path / "corpus", "pab")
-    found = coverage(corpus, text_of(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
+    found = coverage(corpus, format_moods(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
     phones, diphones, triphones = found.kinds
     assert (phones.needed, phones.covered) == (5, 3)
     assert phones.share == pytest.approx(8 / 12)
@@ -51,7 +51,7 @@ def test_counts_and_shares(tmp_path: Path) -> None:
 def test_what_stands_in(tmp_path: Path) -> None:
     corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
     lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
-    phones, diphones, triphones = coverage(corpus, text_of(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
+    phones, diphones, triphones = coverage(corpus, format_moods(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
     stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
     assert stand_ins["d"] == ("t", 1)
     assert stand_ins["m"][0] == find_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"
@@ -71,7 +71,7 @@ def test_the_nearest_has_the_least_distance(tmp_path: Path, toy_corpus: Corpus) 
     for name in toy_corpus.names():
         phones = [p for word in toy_corpus.utterance(name).words or () for p in lexicon.pronunciations(word)[0]]
         recorded.update(zip(["sil", *phones[:-1]], phones, [*phones[1:], "sil"], strict=True))
-    _, _, triphones = coverage(toy_corpus, text_of(tmp_path / "text", "please judge the toys")).kinds
+    _, _, triphones = coverage(toy_corpus, format_moods(tmp_path / "text", "please judge the toys")).kinds
     assert triphones.missing
 
     def cost(wanted: tuple[str, ...], other: tuple[str, ...]) -> float:
@@ -91,7 +91,7 @@ def test_labelled_phones_count_and_silence_divides_them(tmp_path: Path) -> None:
     step_s = utterance.audio.duration_s / len(names)
     spans = tuple(Span(n * step_s, (n + 1) * step_s, Unit(name)) for n, name in enumerate(names))
     corpus.add(replace(utterance, phones=Timeline(spans), words=("tib",)))
-    phones, diphones, _ = coverage(corpus, text_of(tmp_path / "text", "pab tib"), lexicon=WORDS).kinds
+    phones, diphones, _ = coverage(corpus, format_moods(tmp_path / "text", "pab tib"), lexicon=WORDS).kinds
     assert {unit.unit for unit in phones.missing} == {"t", "iy"}
     assert "aa-b" in {unit.unit for unit in diphones.missing}
     assert "p-aa" not in {unit.unit for unit in diphones.missing}
@@ -99,7 +99,7 @@ def test_labelled_phones_count_and_silence_divides_them(tmp_path: Path) -> None:
 
 def test_everything_is_covered(tmp_path: Path) -> None:
     corpus = corpus_of(tmp_path / "corpus", "pab tib")
-    found = coverage(corpus, text_of(tmp_path / "text", "pab tib"), lexicon=WORDS)
+    found = coverage(corpus, format_moods(tmp_path / "text", "pab tib"), lexicon=WORDS)
     assert [(kind.covered, kind.missing) for kind in found.kinds] == [(5, ()), (7, ()), (6, ())]
     assert all(kind.share == pytest.approx(1) for kind in found.kinds)
 

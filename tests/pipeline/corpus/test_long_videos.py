@@ -88,7 +88,7 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
     monkeypatch.setattr(module, "track", track)
     monkeypatch.setattr(
         module,
-        "tracker_named",
+        "make_tracker",
         lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"}),
     )
     return told

@@ -15,7 +15,7 @@ from children import NOWHERE, child
 from lipmotion import Corpus, prepare
 from lipmotion.corpora.entry import read_entry
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.storage.files import locked
+from lipmotion.storage.files import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Track
 from lipmotion_faces.corpus import prepare as module
 
@@ -58,7 +58,7 @@ def tracked(monkeypatch) -> list[str]:
     monkeypatch.setattr(module, "track", track)
     monkeypatch.setattr(
         module,
-        "tracker_named",
+        "make_tracker",
         lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"}),
     )
     return asked
@@ -176,7 +176,7 @@ def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "tracker_named", lambda _: SimpleNamespace(versions=missing))
+    monkeypatch.setattr(module, "make_tracker", lambda _: SimpleNamespace(versions=missing))
     with pytest.raises(MissingDependencyError):
         prepare(studio, tmp_path / "corpus")
     assert not (tmp_path / "corpus").exists()
@@ -236,7 +236,7 @@ def test_the_outcome_of_every_recording_is_reported_at_once(studio, tmp_path, ca
 
 @pytest.mark.usefixtures("tracked")
 def test_two_at_a_time_are_refused(studio, tmp_path):
-    with locked(tmp_path / "corpus"):
+    with lock_folder(tmp_path / "corpus"):
         (tmp_path / "corpus" / ".part-of-the-other").touch()
         with pytest.raises(ExportError, match=rf"corpus: another lipmotion \(process {os.getpid()}\) is at work on it"):
             prepare(studio, tmp_path / "corpus", workers=1)

@@ -68,8 +68,7 @@ def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_pa
 
 def test_each_of_many_unusable_files_is_reported_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "lipmotion_faces.corpus.prepare.tracker_named",
-        lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "1"}),
+        "lipmotion_faces.corpus.prepare.tracker_named", lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "1"})
     )
     names = [f"clip{number:03d}" for number in range(30)]
     (tmp_path / "clips").mkdir()

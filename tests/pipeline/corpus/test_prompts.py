@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lipmotion import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.training.prompts import greedy_cover, prompts, units_of
+from lipmotion.pipeline.training.prompts import cover_greedily, find_units, prompts
 from lipmotion.units import Lexicon
 
 SETS = st.lists(st.sets(st.integers(0, 11), min_size=1), min_size=1, max_size=8)
@@ -36,21 +36,21 @@ def test_the_lazy_cover_is_the_greedy_one(sets, data):
     worth = [data.draw(st.sampled_from([0.0, 1.0, 2.0, 8.0])) for _ in range(12)]
     arrays = [np.array(sorted(elements)) for elements in sets]
     for count in (1, 3, 20):
-        assert greedy_cover(arrays, costs, np.array(worth), count) == plain_cover(sets, costs, worth, count)
+        assert cover_greedily(arrays, costs, np.array(worth), count) == plain_cover(sets, costs, worth, count)
 
 
 @given(SETS)
 def test_it_is_near_the_best_cover_there_is(sets):
     """Of k sets, a greedy choice covers at least 1 - 1/e of what any k cover (Nemhauser, Wolsey, Fisher 1978)."""
     arrays = [np.array(sorted(elements)) for elements in sets]
-    chosen = greedy_cover(arrays, [1.0] * len(sets), np.ones(12), 3)
+    chosen = cover_greedily(arrays, [1.0] * len(sets), np.ones(12), 3)
     covered = len(set().union(*(sets[i] for i in chosen)))
     best = max(len(set().union(*some)) for some in permutations(sets, min(3, len(sets))))
     assert covered >= (1 - 1 / np.e) * best
 
 
 def test_units_of_a_word():
-    assert units_of(("t", "uw")) == {
+    assert find_units(("t", "uw")) == {
         *[("phone", "t"), ("phone", "uw")],
         *[("diphone", "sil", "t"), ("diphone", "t", "uw"), ("diphone", "uw", "sil")],
         *[("beside", "[sip]-t"), ("beside", "t+[lr2]"), ("beside", "[al]-uw"), ("beside", "uw+[sip]")],
@@ -76,7 +76,7 @@ def test_coverage_is_what_the_sentences_hold():
     for prompt in prompts(count=15).chosen:
         words = prompt.text.lower().replace(",", "").replace(".", "").replace("?", "").split()
         before = len(seen)
-        seen |= units_of([phone for word in words for phone in lexicon.pronunciations(word)[0]])
+        seen |= find_units([phone for word in words for phone in lexicon.pronunciations(word)[0]])
         assert len(seen) > before
         assert prompt.phones == sum(unit[0] == "phone" for unit in seen)
         assert prompt.diphones == sum(unit[0] == "diphone" for unit in seen)
@@ -102,7 +102,7 @@ def test_what_is_recorded_is_not_asked_for_again(toy_corpus: Corpus, tmp_path: P
     path.write_text("\n".join([*said, "thirty judges"]))
     (only,) = prompts(path, have=toy_corpus).chosen
     assert only.text == "thirty judges"
-    assert only.diphones > len(units_of("th er t iy jh ah jh ix z".split())) / 4  # what is recorded counts as covered
+    assert only.diphones > len(find_units("th er t iy jh ah jh ix z".split())) / 4  # what is recorded counts as covered
 
 
 @pytest.mark.parametrize(

@@ -15,10 +15,7 @@ WHISPER = {
             "start": 1.0,
             "end": 2.0,
             "text": " Hello you",
-            "words": [
-                {"word": " Hello", "start": 1.0, "end": 1.4},
-                {"word": " you", "start": 1.5, "end": 2.0},
-            ],
+            "words": [{"word": " Hello", "start": 1.0, "end": 1.4}, {"word": " you", "start": 1.5, "end": 2.0}],
         }
     ]
 }

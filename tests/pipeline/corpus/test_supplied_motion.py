@@ -51,7 +51,7 @@ def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "tracker_named", lambda _: SimpleNamespace(versions=missing))
+    monkeypatch.setattr(module, "make_tracker", lambda _: SimpleNamespace(versions=missing))
     folder = tmp_path / "studio"
     (folder / "anna").mkdir(parents=True)
     for seed, (name, suffix) in enumerate((("a", ".npz"), ("b", ".json"), ("anna/c", ".csv"))):

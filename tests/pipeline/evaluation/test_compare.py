@@ -9,7 +9,7 @@ import pytest
 import lipmotion
 from lipmotion import compare
 from lipmotion.errors import InputError
-from lipmotion.measures import curves, vertices
+from lipmotion.measures import curves
 from lipmotion.types import WEIGHT, Channel, Motion, Track
 from meshes.speech import motion
 
@@ -81,7 +81,7 @@ def test_blendshapes_are_found_however_they_are_spelt() -> None:
     assert "mouthClose" in pair["notes"][0]
     still = moved(other, "brow_inner_up", np.full(60, 0.2))
     upper = compare(reference, still)["others"][0]["upper_face"]
-    wanted = vertices.upper_face_deviation(
+    wanted = curves.upper_face_deviation(
         [np.zeros((60, 1, 1))], [np.array(reference.values[:, 1:2, None], float)], np.zeros((1, 1))
     )
     assert upper == {"curves": 1, "deviation": pytest.approx(wanted)}

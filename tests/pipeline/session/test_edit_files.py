@@ -12,8 +12,8 @@ import pytest
 from lipmotion import Delivery, Edits, Request, Staging, animate, load_model
 from lipmotion.errors import InputError
 from lipmotion.formats.sound import write_sound
-from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
-from lipmotion.pipeline.edits import STEPS, MoodStep, step_of
+from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
+from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
@@ -43,10 +43,10 @@ SENTENCES = (
 
 
 def test_every_kind_of_edit_is_a_sentence() -> None:
-    steps = [step_of(sentence) for sentence in SENTENCES]
+    steps = [parse_step(sentence) for sentence in SENTENCES]
     assert {type(step) for step in steps} == set(STEPS)
     assert tuple(map(str, steps)) == SENTENCES
-    assert [step_of(str(step)) for step in steps] == steps
+    assert [parse_step(str(step)) for step in steps] == steps
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_every_kind_of_edit_is_a_sentence() -> None:
 )
 def test_sentences_that_state_no_edit(sentence: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        step_of(sentence)
+        parse_step(sentence)
 
 
 def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for() -> None:
@@ -138,7 +138,7 @@ def test_a_file_holds_the_moods_of_tags(toy_sentence: ToySentence, toy_model_fil
     words, recording = toy_sentence.words, tmp_path / "a.wav"
     write_sound(recording, toy_sentence.audio)
     tagged = f"[happy:0.5] {words[0]} [angry] {' '.join(words[1:])}"
-    file = begun(Request(recording, tagged, model=toy_model_file))
+    file = create_edit_file(Request(recording, tagged, model=toy_model_file))[0]
     first, second = (step for step in file.edits.steps if isinstance(step, MoodStep))
     assert (str(first), second.mood) == ("mood happy:0.5 at 0.0", "angry")
     spoken = [span for span in group_words(file.units or Timeline(())) if span.label]
@@ -149,10 +149,10 @@ def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Pa
     """The phones in the file are the base: the motion is that of the session in which they were edited."""
     asked = Request(toy_speech, recogniser="own", model=toy_model_file)
     path, edits = tmp_path / "a.json", Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
-    write_edits(replace(begun(asked), edits=edits), path)
+    write_edits(replace(create_edit_file(asked)[0], edits=edits), path)
     read = read_edits(path)
     plain = animate(Request(toy_speech, recogniser="own"), model=load_model(toy_model_file), edits=edits)
-    replayed = read.session().generated(read.edits)
+    replayed = read.session().generate(read.edits)
     assert np.array_equal(replayed.motion.values, plain.motion.values)
     assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)
 
@@ -161,7 +161,7 @@ def test_edits_of_another_sound_are_refused(toy_speech: Path, toy_model_file: Pa
     """Of the same length, and wherever it lies; without a digest, as in earlier files, they are taken."""
     sound, path = tmp_path / "a.wav", tmp_path / "a.edits.json"
     sound.write_bytes(toy_speech.read_bytes())
-    file = begun(Request(sound, recogniser="own", model=toy_model_file))
+    file = create_edit_file(Request(sound, recogniser="own", model=toy_model_file))[0]
     write_edits(file, path)
     assert read_edits(path).sha256 == sha256_of(toy_speech)
     other = tmp_path / "other.wav"

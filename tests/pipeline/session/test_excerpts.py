@@ -10,10 +10,10 @@ import pytest
 from lipmotion import Edits, Model, Session
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
-from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, excerpt_of_change
-from lipmotion.pipeline.generation import generation_of
+from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
+from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, find_excerpt
+from lipmotion.pipeline.generation import generate_motion
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Generation, Pin, Span, Timeline, Unit
 
@@ -39,11 +39,11 @@ def made_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     lengths: list[float] = []
 
     def counted(*given: object) -> Generation:
-        (understood,) = (each for each in given if isinstance(each, UnderstoodSpeech))
+        (understood,) = (each for each in given if isinstance(each, SpeechAnalysis))
         lengths.append(understood.speech.features.duration_s)
-        return generation_of(*given)  # type: ignore[arg-type]
+        return generate_motion(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(session_module, "generation_of", counted)
+    monkeypatch.setattr(session_module, "generate_motion", counted)
     return lengths
 
 
@@ -58,7 +58,7 @@ def test_around_an_edit_the_motion_is_that_of_the_whole(
     """At the first phone, in the middle, at the last one, of a pause, with pins; one edit after another."""
     session, other = Session(long_request, model=toy_model), Session(long_request, model=toy_model)
     units, lasts_s = session.units(), long_request.recording.duration_s  # type: ignore[union-attr]
-    before = session.generated().motion
+    before = session.generate().motion
     middle, edits = parse_number(units, "iy", lasts_s / 2), Edits()
     silent = parse_number(units, "sil", lasts_s / 4)
     for sentence in (
@@ -73,26 +73,26 @@ def test_around_an_edit_the_motion_is_that_of_the_whole(
         edits = edits.then(sentence)
         made_s.clear()
         with session.sketching():
-            sketch = session.generated(edits)
+            sketch = session.generate(edits)
         assert sum(made_s) <= 2 * (2 * MARGIN_S + 2 * GRID_S + 5) < lasts_s, sentence
-        whole = other.generated(edits)
+        whole = other.generate(edits)
         assert [span.label.phone for span in sketch.units] == [span.label.phone for span in whole.units]
         assert np.abs(sketch.motion["opening"] - whole.motion["opening"]).max() < UNSEEN, sentence
         assert sketch.motion["opening"].min() >= 0
-    after = session.generated(edits)  # without sketching: the same as if nothing had been there before
+    after = session.generate(edits)  # without sketching: the same as if nothing had been there before
     assert after.motion.values == pytest.approx(whole.motion.values, abs=1e-6)
     assert np.abs(after.motion["opening"] - before["opening"]).max() > 0.1
     with session.sketching(), pytest.raises(InputError, match="9999"):
-        session.generated(edits.then("pin opening 0.1 at 9999"))
+        session.generate(edits.then("pin opening 0.1 at 9999"))
 
 
 def test_what_lies_far_apart_is_made_whole() -> None:
     units, frames = Timeline(tuple(Span(n / 10, (n + 1) / 10, Unit("aa")) for n in range(600))), 6001
-    assert excerpt_of_change(units, units, (), frames) is None
-    near = excerpt_of_change(units, units, [Pin(30.0, "opening", 0.1), Pin(31.0, "opening", 0.1)], frames)
+    assert find_excerpt(units, units, (), frames) is None
+    near = find_excerpt(units, units, [Pin(30.0, "opening", 0.1), Pin(31.0, "opening", 0.1)], frames)
     assert near is not None
     assert near.frames.start % 100 == 0
     assert near.frames.start / 100 <= 30 - MARGIN_S
     assert near.frames.stop / 100 >= 31 + MARGIN_S
     far = [Pin(1.0, "opening", 0.1), Pin(2.0 + LONGEST_S, "opening", 0.1)]
-    assert excerpt_of_change(units, units, far, frames) is None
+    assert find_excerpt(units, units, far, frames) is None

@@ -15,18 +15,18 @@ from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edit_files import EditFile
-from lipmotion.pipeline.generation import generation_of
-from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.pipeline.outputs.delivered import shown
+from lipmotion.pipeline.generation import generate_motion
+from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.outputs.prosody import measure_prosody
 from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion_faces.outputs.drawn_video import sound_track
 from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import shown_face
-from lipmotion_faces.registry import staged_face
+from lipmotion_faces.registry import stage_face
 
 
 @pytest.fixture
@@ -51,21 +51,21 @@ def test_a_session_gives_what_one_pass_gives(session: Session, request_: Request
     """Whatever was asked for before; with phones edited in a session, or given."""
     place = phones(session.units()).index("iy") + 1
     edits = edited(f"phone {place} is aa", "pin opening 0.05 at 1.0")
-    session.generated(edited("remove phone 3"))
-    for found in (session.generated(edits), animate(request_, model=toy_model, edits=edits)):
+    session.generate(edited("remove phone 3"))
+    for found in (session.generate(edits), animate(request_, model=toy_model, edits=edits)):
         assert found.units[place - 1].label.phone == "aa"
-        assert np.array_equal(found.motion.values, session.generated(edits).motion.values)
-        assert np.array_equal(found.variance, session.generated(edits).variance)
+        assert np.array_equal(found.motion.values, session.generate(edits).motion.values)
+        assert np.array_equal(found.variance, session.generate(edits).variance)
     given = replace(request_, transcript=None, units=session.units(edits))
     assert animate(given, model=toy_model, edits=edited("pin opening 0.05 at 1.0")).motion.values == pytest.approx(
-        session.generated(edits).motion.values, abs=1e-6
+        session.generate(edits).motion.values, abs=1e-6
     )
-    assert np.array_equal(session.generated().motion.values, animate(request_, model=toy_model).motion.values)
+    assert np.array_equal(session.generate().motion.values, animate(request_, model=toy_model).motion.values)
 
 
 def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
-    for name in ("understood_speech", "generation_of"):
+    for name in ("analyse_speech", "generate_motion"):
         plain = getattr(session_module, name)
 
         def counted(*given: object, name: str = name, plain: object = plain, **more: object) -> object:
@@ -73,12 +73,12 @@ def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pyte
             return plain(*given, **more)  # type: ignore[operator]
 
         monkeypatch.setattr(session_module, name, counted)
-    first = session.generated()
-    session.generated(edited("phone 3 is p"))
-    session.generated(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
-    session.delivered(edited("phone 3 is p", "set intensity 1.5"))
-    assert session.generated() is first  # undone
-    assert calls == ["understood_speech", "generation_of", "generation_of"]
+    first = session.generate()
+    session.generate(edited("phone 3 is p"))
+    session.generate(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
+    session.deliver(edited("phone 3 is p", "set intensity 1.5"))
+    assert session.generate() is first  # undone
+    assert calls == ["analyse_speech", "generate_motion", "generate_motion"]
 
 
 def test_edits_of_phones(session: Session) -> None:
@@ -132,21 +132,21 @@ def test_a_phone_is_split_and_words_are_said_otherwise(session: Session) -> None
 
 
 def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session: Session) -> None:
-    plain = session.generated()
-    found = session.generated(edited("draw opening 0.1 0.2 0.1 from 0.8 to 1.0", "draw jawOpen 0 1 from 1.5 to 1.6"))
+    plain = session.generate()
+    found = session.generate(edited("draw opening 0.1 0.2 0.1 from 0.8 to 1.0", "draw jawOpen 0 1 from 1.5 to 1.6"))
     assert found.motion["opening"][[80, 90, 100]] == pytest.approx([0.1, 0.2, 0.1])
     change = found.motion["opening"] - plain.motion["opening"]
     assert np.abs(np.diff(change[60:81])).max() < 0.5 * np.abs(change[80]) + 0.01  # no jump
     assert not change[:69].any()
-    arkit = curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)["jawOpen"]
+    arkit = make_curves(found.motion, found.units, "arkit", edits=found.curve_edits)["jawOpen"]
     assert arkit[[150, 160]] == pytest.approx([0, 1])
-    held = session.generated(edited("hold from 0.8 to 1.0")).motion.values
+    held = session.generate(edited("hold from 0.8 to 1.0")).motion.values
     assert np.array_equal(held[80:101], np.broadcast_to(plain.motion.values[80], held[80:101].shape))
     assert np.array_equal(held[:75], plain.motion.values[:75])
     with pytest.raises(InputError, match="required 0 to 1"):
-        session.generated(edited("draw jawOpen 0 1.2 from 1.5 to 1.6"))
+        session.generate(edited("draw jawOpen 0 1.2 from 1.5 to 1.6"))
     with pytest.raises(InputError, match="cannot draw 'jaw'"):
-        session.generated(edited("draw jaw 0 1 from 1.5 to 1.6"))
+        session.generate(edited("draw jaw 0 1 from 1.5 to 1.6"))
 
 
 def test_a_thousand_edits_of_phones_are_no_deeper_than_one(session: Session) -> None:
@@ -158,36 +158,38 @@ def test_pins_hold_for_channels_and_curves(session: Session, tmp_path: Path) -> 
     edits = edited(
         "pin opening 0.1 at 0.8", "pin jawOpen 0.7 at 1.2", "gain 1.5 from 0.5 to 1.0", "pin viseme_PP 0.4 at 1.5"
     )
-    found = session.generated(edits)
+    found = session.generate(edits)
     assert found.motion["opening"][80] == pytest.approx(0.1, abs=1e-9)
-    arkit = curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)
-    plain = curves_of(found.motion, found.units, "arkit")
+    arkit = make_curves(found.motion, found.units, "arkit", edits=found.curve_edits)
+    plain = make_curves(found.motion, found.units, "arkit")
     assert arkit["jawOpen"][120] == pytest.approx(0.7)
     assert np.array_equal(arkit["jawOpen"][:100], plain["jawOpen"][:100])  # bent within a tenth of a second alone
     write(found, tmp_path / "a.csv", curves="visemes")
     rows = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True)
     assert rows["viseme_PP"][150] == pytest.approx(0.4)
-    later = session.delivered(edits.then("set offset_ms 500"))
-    assert curves_of(later.motion, later.units, "arkit", edits=later.curve_edits)["jawOpen"][170] == pytest.approx(0.7)
+    later = session.deliver(edits.then("set offset_ms 500"))
+    assert make_curves(later.motion, later.units, "arkit", edits=later.curve_edits)["jawOpen"][170] == pytest.approx(
+        0.7
+    )
 
 
 def test_pins_that_are_close_together_all_hold(session: Session) -> None:
-    found = session.generated(edited("pin jawOpen 0.7 at 1.2", "pin jawOpen 0.2 at 1.25", "pin jawOpen 0.3 at 1.25"))
-    curve = curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)["jawOpen"]
+    found = session.generate(edited("pin jawOpen 0.7 at 1.2", "pin jawOpen 0.2 at 1.25", "pin jawOpen 0.3 at 1.25"))
+    curve = make_curves(found.motion, found.units, "arkit", edits=found.curve_edits)["jawOpen"]
     assert curve[[120, 125]] == pytest.approx([0.7, 0.3])  # of two at one time the last
 
 
 def test_gains_make_movements_larger_for_a_time(session: Session) -> None:
-    plain, larger = session.generated(), session.generated(edited("gain 2 from 0.6 to 1.4"))
+    plain, larger = session.generate(), session.generate(edited("gain 2 from 0.6 to 1.4"))
     span = slice(60, 141)
     assert np.ptp(larger.motion["opening"][span]) > 1.3 * np.ptp(plain.motion["opening"][span])
     edge = round(GAIN_EDGE_S * 100)
     assert np.array_equal(larger.motion.values[: 60 - edge], plain.motion.values[: 60 - edge])
     assert np.array_equal(larger.motion.values[141 + edge :], plain.motion.values[141 + edge :])
-    wider = session.generated(edited("gain opening 3 from 0.6 to 1.4")).motion["opening"]
+    wider = session.generate(edited("gain opening 3 from 0.6 to 1.4")).motion["opening"]
     assert wider.min() >= 0
     assert wider[span].max() > 2 * plain.motion["opening"][span].max()
-    still = session.generated(edited("gain width 0 from 0.6 to 1.4"))
+    still = session.generate(edited("gain width 0 from 0.6 to 1.4"))
     assert np.ptp(still.motion["width"][span]) < 1e-9
     assert np.array_equal(still.motion["opening"], plain.motion["opening"])
 
@@ -195,47 +197,47 @@ def test_gains_make_movements_larger_for_a_time(session: Session) -> None:
 def test_a_locked_span_stays_as_it_was(session: Session) -> None:
     first = edited("pin opening 0.1 at 0.8", "lock from 0.6 to 1.0")
     later = first.then("gain 2 from 0.2 to 2.0", f"phone {len(session.units()) - 2} is aa")
-    before, after = session.generated(edited("pin opening 0.1 at 0.8")), session.generated(later)
+    before, after = session.generate(edited("pin opening 0.1 at 0.8")), session.generate(later)
     assert np.array_equal(after.motion.values[60:101], before.motion.values[60:101])
     assert not np.allclose(after.motion.values[120:160], before.motion.values[120:160])
     jump = np.abs(np.diff(after.motion["opening"])).max()
-    assert jump < 2 * np.abs(np.diff(session.generated(edited("gain 2 from 0.2 to 2.0")).motion["opening"])).max()
+    assert jump < 2 * np.abs(np.diff(session.generate(edited("gain 2 from 0.2 to 2.0")).motion["opening"])).max()
     assert LOCK_EDGE_S > 0
     number = next(n for n, span in enumerate(session.units(), 1) if span.start_s > 0.6)
     for refused in (f"phone {number} is p", "pin opening 0.2 at 0.7", "gain 2 from 0.7 to 0.8"):
         with pytest.raises(InputError, match=r"locked \('lock from 0.6 to 1.0'\); take the lock out first"):
-            session.generated(first.then(refused))
-    freed = session.generated(later.then("unlock from 0.6 to 1.0", "pin opening 0.2 at 0.7"))
+            session.generate(first.then(refused))
+    freed = session.generate(later.then("unlock from 0.6 to 1.0", "pin opening 0.2 at 0.7"))
     assert freed.motion["opening"][70] == pytest.approx(0.2)
 
 
 def test_a_locked_span_keeps_channels_that_are_added_later(session: Session) -> None:
-    spoken = session.generated(edited("pin tongue 0.5 at 1.5"))
-    locked = session.generated(edited("lock from 0.6 to 1.0", "pin tongue 0.5 at 1.5"))
+    spoken = session.generate(edited("pin tongue 0.5 at 1.5"))
+    locked = session.generate(edited("lock from 0.6 to 1.0", "pin tongue 0.5 at 1.5"))
     assert np.allclose(locked.motion["tongue"], spoken.motion["tongue"])
     assert locked.motion["tongue"][150] == pytest.approx(0.5)
 
 
 def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
+    monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
     steps = [
         each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
     ]
-    session.generated(edited(*steps))
+    session.generate(edited(*steps))
     assert 12 <= len(made) <= 14  # of every pin once
-    session.generated(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
+    session.generate(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
     assert len(made) <= 15
 
 
 def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
-    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generated().motion.values))
-    found = [session.generated(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
-    assert session.generated(edited("pin opening 0.1 at 0.5")) is found[1]
+    monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
+    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generate().motion.values))
+    found = [session.generate(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
+    assert session.generate(edited("pin opening 0.1 at 0.5")) is found[1]
     assert len(made) == 4
-    again = session.generated(edited("pin opening 0.1 at 0.3"))
+    again = session.generate(edited("pin opening 0.1 at 0.3"))
     assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
 
 
@@ -265,7 +267,7 @@ def test_edits_of_another_recording_are_refused(session: Session, toy_model: Mod
 )
 def test_edits_that_are_not_possible(session: Session, sentence: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        session.generated(edited(sentence))
+        session.generate(edited(sentence))
 
 
 def test_single_pictures_are_those_of_the_video(session: Session, request_: Request) -> None:
@@ -273,12 +275,15 @@ def test_single_pictures_are_those_of_the_video(session: Session, request_: Requ
     pictures = SessionPictures(session)
     for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
         performance = Performance(
-            session.generated(edits),
+            session.generate(edits),
             OutputSettings(shown_face("portrait"), None, sounded=True, staging=edits.staging()),
             sound=request_.recording,  # type: ignore[arg-type]
         )
-        seen, prosody = shown(performance.generation, Delivery(), 25.0), prosody_of_speech(sound_track(performance))
-        frames = list(staged_face("portrait", edits.staging(), prosody).render(seen.motion, seen.units, fps=25.0))
+        seen, prosody = (
+            deliver_to_face(performance.generation, Delivery(), 25.0),
+            measure_prosody(sound_track(performance)),
+        )
+        frames = list(stage_face("portrait", edits.staging(), prosody).render(seen.motion, seen.units, fps=25.0))
         for number in (25, 3):
             assert np.array_equal(pictures.picture(number / 25, edits), frames[number])
     with pytest.raises(InputError, match="9 s lies outside the video"):
@@ -290,14 +295,14 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy
     requests = [Request(toy_sentence.audio, " ".join(toy_sentence.words)), Request(toy_sentence.audio)]
     edits = [edited("phone 3 is p"), edited("pin opening 0.05 at 1.0")]
     alone = [
-        Session(request, model=toy_model).generated(edit).motion.values
+        Session(request, model=toy_model).generate(edit).motion.values
         for request, edit in zip(requests, edits, strict=True)
     ]
     both = Barrier(2)
 
     def work(number: int) -> list[np.ndarray]:
         both.wait(60)
-        return [Session(requests[number], model=toy_model).generated(edits[number]).motion.values for _ in range(3)]
+        return [Session(requests[number], model=toy_model).generate(edits[number]).motion.values for _ in range(3)]
 
     with ThreadPoolExecutor(2) as pool:
         for number, found in enumerate(pool.map(work, range(2))):
@@ -310,6 +315,6 @@ def test_what_comes_next_is_prepared_while_processes_work(
 ) -> None:
     prepared: list[object] = []
     monkeypatch.setattr(session_module, "prepare_search", prepared.append)
-    session = Session(request_, model=toy_model, workers=2, meanwhile=lambda: prepared.append("face"))
+    session = Session(request_, model=toy_model, workers=2, background=lambda: prepared.append("face"))
     assert list(session._work(abs, [-1, -2, -3])) == [1, 2, 3]
     assert prepared == [session.request, "face"]

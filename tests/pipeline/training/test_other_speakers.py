@@ -15,10 +15,10 @@ from lipmotion import Model
 from lipmotion.errors import CorpusError, MissingDependencyError
 from lipmotion.pipeline.training import other_speakers as module
 from lipmotion.pipeline.training.other_speakers import (
+    align_recordings,
     is_held_out_speaker,
-    recorded_sentences,
-    synthetic_sentences,
-    voice_examples,
+    make_voice_examples,
+    synthesise_sentences,
 )
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
@@ -51,7 +51,7 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("spoken")
 def test_every_text_in_every_voice() -> None:
-    sentences = list(synthetic_sentences(TEXTS))
+    sentences = list(synthesise_sentences(TEXTS))
     assert [sentence.name for sentence in sentences] == [
         "flite-low-001",
         "flite-low-002",
@@ -59,12 +59,12 @@ def test_every_text_in_every_voice() -> None:
         "flite-high-002",
     ]
     assert [sentence.speaker for sentence in sentences] == ["anna", "anna", "bert", "bert"]
-    assert [s.name for s in synthetic_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
+    assert [s.name for s in synthesise_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
 
 
 @pytest.mark.usefixtures("spoken")
 def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
-    for sentence in synthetic_sentences(TEXTS):
+    for sentence in synthesise_sentences(TEXTS):
         first, last = sentence.phones[0], sentence.phones[-1]
         assert first.label == last.label == Unit("sil")
         assert (first.start_s, first.end_s) == (0, 0.25)
@@ -80,7 +80,7 @@ def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
 def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     phones = [("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)]
     monkeypatch.setattr(module, "speak_sentences", lambda *_: iter([synthesise(phones)]))
-    (sentence,) = synthetic_sentences(["Bee"], VOICES[:1])
+    (sentence,) = synthesise_sentences(["Bee"], VOICES[:1])
     assert [span.label.phone for span in sentence.phones] == ["sil", "b", "iy", "sil"]
     assert [span.start_s for span in sentence.phones] == pytest.approx([0, 0.35, 0.45, 0.65])
     assert sentence.phones[-1].end_s == pytest.approx(1.1)
@@ -88,8 +88,8 @@ def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.usefixtures("spoken")
 def test_the_same_again_shared_or_not() -> None:
-    shared = synthetic_sentences(TEXTS, each=lambda function, items: iter([function(item) for item in list(items)]))
-    for one, other in zip(synthetic_sentences(TEXTS), shared, strict=True):
+    shared = synthesise_sentences(TEXTS, each=lambda function, items: iter([function(item) for item in list(items)]))
+    for one, other in zip(synthesise_sentences(TEXTS), shared, strict=True):
         assert np.array_equal(one.audio.samples, other.audio.samples)
         assert one.phones == other.phones
 
@@ -97,7 +97,7 @@ def test_the_same_again_shared_or_not() -> None:
 @pytest.mark.long
 @pytest.mark.usefixtures("spoken")
 def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
-    sentences = list(synthetic_sentences(voices=VOICES[:1]))
+    sentences = list(synthesise_sentences(voices=VOICES[:1]))
     said = {span.label.phone for sentence in sentences for span in sentence.phones}
     assert len(sentences) == 60
     assert {"er", "hh", "ng", "oy", "sh", "uh", "zh"} <= said
@@ -106,8 +106,8 @@ def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
 
 @pytest.mark.usefixtures("spoken")
 def test_sentences_become_training_data() -> None:
-    sentences = list(synthetic_sentences(TEXTS))
-    for sentence, (features, units, speaker) in zip(sentences, voice_examples(sentences), strict=True):
+    sentences = list(synthesise_sentences(TEXTS))
+    for sentence, (features, units, speaker) in zip(sentences, make_voice_examples(sentences), strict=True):
         assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)
         assert features.values == pytest.approx(analysed(sentence.audio).mfcc().values)
         assert units == sentence.phones
@@ -117,7 +117,7 @@ def test_sentences_become_training_data() -> None:
 def test_without_voices_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "installed_voices", lambda: ())
     with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
-        next(synthetic_sentences(TEXTS))
+        next(synthesise_sentences(TEXTS))
 
 
 def test_sides_never_change() -> None:
@@ -163,7 +163,7 @@ def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pyte
     monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
     items: list[Item] = []
     given = {"anna-*": "Anna B."}
-    sentences = list(recorded_sentences(folder, own, speakers=given, monitor=items.append))  # type: ignore[arg-type]
+    sentences = list(align_recordings(folder, own, speakers=given, monitor=items.append))  # type: ignore[arg-type]
     assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "Anna B."), ("two", "two")]
     for sentence, toy in zip(sentences, toy_sentences(3), strict=False):
         assert [span.label for span in sentence.phones] == [span.label for span in toy.units]
@@ -181,7 +181,7 @@ def test_a_transcript_of_other_words_is_detected(
 ) -> None:
     monkeypatch.setattr(module, "agreement_score", lambda *_: -4.3)
     items: list[Item] = []
-    assert list(recorded_sentences(folder, own, monitor=items.append)) == []  # type: ignore[arg-type]
+    assert list(align_recordings(folder, own, monitor=items.append)) == []  # type: ignore[arg-type]
     assert "agree with the sound at -4.3, required -4.2 or more" in {item.name: item.reason for item in items}["two"]
 
 
@@ -189,7 +189,7 @@ def test_a_transcript_of_other_words_is_detected(
 def test_a_folder_without_transcripts(tmp_path: Path, own: Recogniser, toy_sentence: ToySentence, name: str) -> None:
     write(tmp_path / "unsaid.wav", toy_sentence.audio)
     with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
-        next(recorded_sentences(tmp_path / name, own))
+        next(align_recordings(tmp_path / name, own))
 
 
 @pytest.mark.recordings
@@ -199,7 +199,7 @@ def test_real_recordings(recordings: Path, toy_model: Model) -> None:
         pytest.skip("speech-open is not here")
     items: list[Item] = []
     general = Recogniser(toy_model.phones, "general")
-    sentences = list(recorded_sentences(folder, general, speakers={"sense_*": "reader"}, monitor=items.append))  # type: ignore[arg-type]
+    sentences = list(align_recordings(folder, general, speakers={"sense_*": "reader"}, monitor=items.append))  # type: ignore[arg-type]
     assert len(sentences) == 11
     assert sum(s.speaker == "reader" for s in sentences) == 5
     assert sorted(item.name for item in items) == ["13697_11991_000000", "common_voice_ja_24511055"]
@@ -210,7 +210,7 @@ def test_real_voices() -> None:
     voices = installed_voices()[-1:]
     if not voices:
         pytest.skip("the synthesisers have no voices")
-    (sentence,) = synthetic_sentences(["My baby may be home."], voices)
+    (sentence,) = synthesise_sentences(["My baby may be home."], voices)
     closed = [span.label.phone for span in sentence.phones if span.label.phone in ("m", "b")]
     assert closed == list("mbbmbm")
     assert sentence.phones[0].duration_s >= 0.25

@@ -20,7 +20,7 @@ from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import fingerprint as fingerprints
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.fingerprint import fingerprint
+from lipmotion.pipeline.training.fingerprint import fingerprint_training
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 
@@ -77,7 +77,7 @@ def content(model: Model, folder: Path) -> bytes:
     return (folder / "model.lipmotion").read_bytes()
 
 
-def events_of(corpus: Corpus, work: Path | None = None) -> list[Progress | Item]:
+def create_events(corpus: Corpus, work: Path | None = None) -> list[Progress | Item]:
     events: list[Progress | Item] = []
     run(corpus, work, events.append)
     return events
@@ -94,7 +94,7 @@ def test_stopped_after_any_event(
     corpus: Corpus, whole: bytes, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
-    count = len(events_of(corpus))
+    count = len(create_events(corpus))
     assert count > 15
     for number in range(1, count + 1, 4):
         with pytest.raises(Stopped):
@@ -173,7 +173,7 @@ def test_stopped_in_two_processes(
 
 def test_what_is_done_is_not_done_again(corpus: Corpus, work: Path) -> None:
     """What could not be used is reported again."""
-    first, again = events_of(corpus, work), events_of(corpus, work)
+    first, again = create_events(corpus, work), create_events(corpus, work)
     shares = [event.share for event in again if isinstance(event, Progress)]
     assert shares == sorted(shares)
     assert shares[0] >= 0.5  # of phones; motion is learned again
@@ -192,16 +192,16 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(
     engine, job = engine_named("trajectory", {}), (CONFIG, Lexicon())
 
     def digests() -> list[str]:
-        return [fingerprint(corpus, ["toy00"], engine, *job, visual, None) for visual in (GEOMETRY, BOTH)]
+        return [fingerprint_training(corpus, ["toy00"], engine, *job, visual, None) for visual in (GEOMETRY, BOTH)]
 
     corpus.add(utterance)
     plain, pictured = digests()
     assert plain != pictured
     others = [
-        fingerprint(corpus, [], engine, *job, GEOMETRY, None),
-        fingerprint(corpus, ["toy00"], engine_named("trajectory", {"states": 3}), *job, GEOMETRY, None),
-        fingerprint(corpus, ["toy00"], engine, replace(CONFIG, relevance=3.0), Lexicon(), GEOMETRY, None),
-        fingerprint(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), GEOMETRY, None),
+        fingerprint_training(corpus, [], engine, *job, GEOMETRY, None),
+        fingerprint_training(corpus, ["toy00"], engine_named("trajectory", {"states": 3}), *job, GEOMETRY, None),
+        fingerprint_training(corpus, ["toy00"], engine, replace(CONFIG, relevance=3.0), Lexicon(), GEOMETRY, None),
+        fingerprint_training(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), GEOMETRY, None),
     ]
     assert len({plain, *others}) == 5
     with monkeypatch.context() as changed:

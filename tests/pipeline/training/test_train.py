@@ -14,7 +14,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.resample import resample_track
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
-from lipmotion.pipeline.training.train import about_training, phones_of
+from lipmotion.pipeline.training.train import describe_training, label_phones
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
@@ -64,7 +64,7 @@ def test_untranscribed_utterances_are_recognised_and_used(
     assert "1 of 8 recordings have no words: their phones are recognised" in caplog.text
     recogniser = Recogniser(model.phones, "own")
     found, known = (
-        [span.label.phone for span in phones_of(corpus.utterance("toy05"), recogniser, Lexicon())]
+        [span.label.phone for span in label_phones(corpus.utterance("toy05"), recogniser, Lexicon())]
         for corpus in (mixed, toy_corpus)
     )
     assert np.mean([phone in found for phone in known]) > 0.8
@@ -82,14 +82,14 @@ def test_labelled_phones_are_used_as_they_are(
     toy_corpus: Corpus, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
-    monkeypatch.setattr(module, "phones_in_time", None)
+    monkeypatch.setattr(module, "align_or_recognise", None)
     given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
     given[0] = replace(given[0], words=("not", "what", "is", "said"))
     model, report = train(corpus_of(given, tmp_path), recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
-    assert phones_of(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
+    assert label_phones(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
 
 
 @pytest.mark.long
@@ -100,7 +100,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
     truth = labelled(toy_corpus.utterance("toy11"))
     assert truth.phones is not None
     recognised = [
-        s.label.phone for s in phones_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())
+        s.label.phone for s in label_phones(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())
     ]
     assert np.mean([span.label.phone in recognised for span in truth.phones]) > 0.8
 
@@ -161,7 +161,7 @@ def test_guessed_words_are_reported(toy_corpus: Corpus, tmp_path: Path, caplog: 
 def test_licence_and_attribution_go_with_the_model(toy_corpus: Corpus) -> None:
     rights = [{"licence": "CC0"}, {"licence": "CC BY 4.0", "attribution": "Anna"}, {"attribution": "Anna"}, {}]
     given = [replace(u, source=source) for u, source in zip(some(toy_corpus, 4), rights, strict=True)]
-    about = about_training(toy_corpus, given, "train", 4)
+    about = describe_training(toy_corpus, given, "train", 4)
     assert about["licence"] == ["CC BY 4.0", "CC0"]
     assert about["attribution"] == ["Anna"]
     assert about["corpus"] == ["toy"]

@@ -12,7 +12,7 @@ from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training import labels as module
 from lipmotion.pipeline.training.labels import (
-    MOST_NAMED_RECORDINGS,
+    MAX_NAMED_RECORDINGS,
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
@@ -88,7 +88,7 @@ def test_without_general_models_nothing_is_measured(
 def test_only_some_are_named(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
     named = labelled[0][0]
     many = [
-        replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MOST_NAMED_RECORDINGS + 4)
+        replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MAX_NAMED_RECORDINGS + 4)
     ]
     warn_of_missing_transcripts([named, *many])
     (text,) = messages(caplog)

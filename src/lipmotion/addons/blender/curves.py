@@ -62,18 +62,18 @@ def matched(names: list[str], keys: list[str]) -> dict[str, str]:
     spelt: dict[str, str] = {}
     for key in keys:
         spelt.setdefault(spelling(key), key)
-    found = {name: name if name in keys else spelt.get(spelling(name), "") for name in names}
-    return {name: key for name, key in found.items() if key}
+    keys_of = {name: name if name in keys else spelt.get(spelling(name), "") for name in names}
+    return {name: key for name, key in keys_of.items() if key}
 
 
 def control(name: str) -> tuple[str, str, str] | None:
     """Return bone, kind and axis of a control as ``Bone.rotation.x``, or bone, ``property`` and name of
     ``Bone[name]``; the bone of ``[name]`` is empty. None: it is no control."""
-    found = _BONE.match(name)
-    if found:
-        return found["bone"], found["kind"], found["axis"]
-    found = _PROPERTY.match(name)
-    return (found["bone"], "property", found["property"]) if found else None
+    match = _BONE.match(name)
+    if match:
+        return match["bone"], match["kind"], match["axis"]
+    match = _PROPERTY.match(name)
+    return (match["bone"], "property", match["property"]) if match else None
 
 
 def at_frames(curves: Curves, times: list[float], fps: float, stepped: tuple[str, ...] = ()) -> Curves:
@@ -92,14 +92,14 @@ def at_frames(curves: Curves, times: list[float], fps: float, stepped: tuple[str
         nearest = round((times[moment] - times[0]) * fps)
         if nearest < count:
             closed[nearest] = (moment, 0.0)
-    found = {}
+    sampled = {}
     for name, values in curves.items():
         if name in stepped:
-            found[name] = [values[low] for low, _ in places]
+            sampled[name] = [values[low] for low, _ in places]
             continue
         chosen = closed if spelling(name).startswith(MOUTH) else places
-        found[name] = [_between(values, *place) for place in chosen]
-    return found
+        sampled[name] = [_between(values, *place) for place in chosen]
+    return sampled
 
 
 def closures(curves: Curves, count: int) -> list[int]:
@@ -112,12 +112,12 @@ def closures(curves: Curves, count: int) -> list[int]:
     gap = [max(jaw - shut, 0.0) for jaw, shut in zip(spelt["jawopen"], close)]  # noqa: B905
     for name in ("mouthfunnel", "mouthlowerdownleft", "mouthlowerdownright", "mouthupperupleft", "mouthupperupright"):
         gap = [sum(both) for both in zip(gap, spelt.get(name, none))]  # noqa: B905
-    found = []
+    moments = []
     for moment, value in enumerate(gap):
         around = gap[max(moment - NEAR, 0) : moment + NEAR + 1]
         if value < OPEN_BELOW and value <= min(around) and max(around) > value:
-            found.append(moment)
-    return found
+            moments.append(moment)
+    return moments
 
 
 def _between(values: list[float], low: int, share: float) -> float:

@@ -55,7 +55,8 @@ def key_frames(
             used |= set(keys)
         used |= set(key_controls(each, frames, controls, first, replace=replace, stepped=stepped))
     if used:
-        show_all(scene, first + max(len(values) for values in frames.values()) - 1)
+        last = first + max(len(values) for values in frames.values()) - 1
+        scene.frame_end = max(scene.frame_end, math.ceil(last))
         add_sound(scene, sound, first, sound_s)
     return len(used), [name for name in frames if name not in used]
 
@@ -82,7 +83,7 @@ def key_shapes(
         shapes.key_blocks[key].slider_min = min(shapes.key_blocks[key].slider_min, min(curves[name], default=0.0))
         shapes.key_blocks[key].slider_max = max(shapes.key_blocks[key].slider_max, max(curves[name], default=0.0))
         kind = "CONSTANT" if name in stepped else "LINEAR"
-        _key(fcurves, f'key_blocks["{_escaped(key)}"].value', -1, curves[name], first, replace, kind)
+        _key(fcurves, f'key_blocks["{_escape(key)}"].value', -1, curves[name], first, replace, kind)
     return len(keys)
 
 
@@ -100,20 +101,25 @@ def key_controls(
     controls : of each curve, as of ``control``; rotations are in degrees
     stepped  : names of curves that hold each value until the next one
     """
-    found = []
+    keyed = []
     fcurves = None
     for name, (bone, kind, axis) in controls.items():
-        place = _place_of(rig, bone, kind, axis)
-        if place is None:
+        owner = rig.pose.bones.get(bone) if bone and getattr(rig, "pose", None) else (rig if not bone else None)
+        if owner is None or (kind == "property" and axis not in owner.keys()):  # noqa: SIM118
             continue
+        inside = f'pose.bones["{_escape(bone)}"]' if bone else ""
+        if kind == "property":
+            path, index = f'{inside}["{_escape(axis)}"]', -1
+        else:
+            path, index = f"{inside}.{'rotation_euler' if kind == 'rotation' else kind}", AXES[axis]
         fcurves = fcurves if fcurves is not None else _fcurves(rig, f"{rig.name} speech")
         values = curves[name]
         if kind == "rotation":
             rig.pose.bones[bone].rotation_mode = "XYZ"
             values = [math.radians(value) for value in values]
-        _key(fcurves, *place, values, first, replace, "CONSTANT" if name in stepped else "LINEAR")
-        found.append(name)
-    return found
+        _key(fcurves, path, index, values, first, replace, "CONSTANT" if name in stepped else "LINEAR")
+        keyed.append(name)
+    return keyed
 
 
 def add_sound(scene: Any, path: str, first: float, sound_s: float = 0.0) -> bool:
@@ -139,25 +145,9 @@ def add_sound(scene: Any, path: str, first: float, sound_s: float = 0.0) -> bool
     return True
 
 
-def show_all(scene: Any, last: float) -> None:
-    """Let the scene end at a frame or later."""
-    scene.frame_end = max(scene.frame_end, math.ceil(last))
-
-
 def frame_rate(scene: Any) -> float:
     """Return the frames per second of a scene."""
     return float(scene.render.fps / scene.render.fps_base)
-
-
-def _place_of(rig: Any, bone: str, kind: str, axis: str) -> tuple[str, int] | None:
-    """Return the path and the index of what a control moves, or None."""
-    owner = rig.pose.bones.get(bone) if bone and getattr(rig, "pose", None) else (rig if not bone else None)
-    if owner is None or (kind == "property" and axis not in owner.keys()):  # noqa: SIM118
-        return None
-    inside = f'pose.bones["{_escaped(bone)}"]' if bone else ""
-    if kind == "property":
-        return f'{inside}["{_escaped(axis)}"]', -1
-    return f"{inside}.{'rotation_euler' if kind == 'rotation' else kind}", AXES[axis]
 
 
 def _fcurves(owner: Any, name: str) -> Any:
@@ -184,12 +174,12 @@ def _key(
     where = {"index": index} if index >= 0 else {}
     curve = fcurves.find(path, **where) or fcurves.new(path, **where)
     last = first + len(values) - 1
-    kept = [
+    others = [
         (point.co[0], point.co[1], point.interpolation)
         for point in curve.keyframe_points
         if not replace and not first - 0.5 < point.co[0] < last + 0.5
     ]
-    points = sorted([*kept, *((first + number, value, interpolation) for number, value in enumerate(values))])
+    points = sorted([*others, *((first + number, value, interpolation) for number, value in enumerate(values))])
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(points))
     curve.keyframe_points.foreach_set("co", [number for point in points for number in point[:2]])
@@ -198,5 +188,5 @@ def _key(
     curve.update()
 
 
-def _escaped(name: str) -> str:
+def _escape(name: str) -> str:
     return name.replace("\\", "\\\\").replace('"', '\\"')

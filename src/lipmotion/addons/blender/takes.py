@@ -30,8 +30,8 @@ def read_take(rows: list[list[str]]) -> tuple[list[str], list[float], list[list[
     while names and not names[-1]:
         names.pop()
     times = timecode_seconds([row[0].strip() for row in rows[1:]])
-    kept_s: list[float] = []
-    kept: list[list[float]] = []
+    seen_s: list[float] = []
+    rows_seen: list[list[float]] = []
     latest = -math.inf
     for number, (row, time_s) in enumerate(zip(rows[1:], times), 2):  # noqa: B905
         if latest - time_s > BACKWARDS_S:
@@ -39,16 +39,16 @@ def read_take(rows: list[list[str]]) -> tuple[list[str], list[float], list[list[
         ordered, latest = time_s > latest, max(latest, time_s)
         values = _values(row, skipped, len(names), number) if ordered else []
         if values:
-            kept_s.append(time_s)
-            kept.append(values)
-    if not kept:
+            seen_s.append(time_s)
+            rows_seen.append(values)
+    if not rows_seen:
         raise ValueError("the take has no rows with values")
     rest = [0.0] * len(names)
-    before = [time_s for time_s in times if time_s < kept_s[0]]
-    after = [time_s for time_s in times if time_s > kept_s[-1]]
-    kept_s = [*before[:1], *before[1:][-1:], *kept_s, *after[:1], *after[1:][-1:]]
-    kept = [*[rest] * len(before[:2]), *kept, *[rest] * len(after[:2])]
-    return names, [time_s - kept_s[0] for time_s in kept_s], kept
+    before = [time_s for time_s in times if time_s < seen_s[0]]
+    after = [time_s for time_s in times if time_s > seen_s[-1]]
+    seen_s = [*before[:1], *before[1:][-1:], *seen_s, *after[:1], *after[1:][-1:]]
+    rows_seen = [*[rest] * len(before[:2]), *rows_seen, *[rest] * len(after[:2])]
+    return names, [time_s - seen_s[0] for time_s in seen_s], rows_seen
 
 
 def timecode_seconds(codes: list[str]) -> list[float]:
@@ -58,38 +58,34 @@ def timecode_seconds(codes: list[str]) -> list[float]:
     (numbers 0 and 1 are left out in every minute but each tenth, SMPTE 12M); after ``.`` follow parts of a second.
     Raises ValueError: not a timecode.
     """
-    found = [_TIMECODE.fullmatch(code) for code in codes]
-    parts = [(int(each[1]) * 3600 + int(each[2]) * 60 + int(each[3]), each[4], each[5]) for each in found if each]
+    matches = [_TIMECODE.fullmatch(code) for code in codes]
+    parts = [(int(each[1]) * 3600 + int(each[2]) * 60 + int(each[3]), each[4], each[5]) for each in matches if each]
     if len(parts) < len(codes):
-        raise ValueError(f"{codes[found.index(None)]!r} is no timecode as 12:30:59:29.500")
+        raise ValueError(f"{codes[matches.index(None)]!r} is no timecode as 12:30:59:29.500")
     if not parts:
         return []
     mark = parts[0][1]
     times: list[float] = []
     frames = [float(f"0.{text.replace('.', '')}" if sign == "." else text) for _, sign, text in parts]
-    rate = 1 if mark == "." else _timecode_rate([whole for whole, *_ in parts], frames)
+    rate = 1
+    if mark != ".":  # as many frames make a second as the take shows
+        passed = [number for number in range(len(parts) - 1) if parts[number + 1][0] - parts[number][0] == 1]
+        last = int(max([frames[number] for number in passed] if len(passed) == 1 else frames))
+        if last >= TIMECODE_RATES[-1]:
+            raise ValueError(f"a timecode has frame {last}, required less than {TIMECODE_RATES[-1]}")
+        shown = next(rate for rate in TIMECODE_RATES if rate > last)
+        rate = shown if passed else max(shown, APP_RATE)
     passed_s = 0.0
-    for (whole, *_), frame in zip(parts, frames):  # noqa: B905
-        time_s = whole + frame / rate
+    for (seconds, *_), frame in zip(parts, frames):  # noqa: B905
+        time_s = seconds + frame / rate
         if mark == ";":
-            minutes = whole // 60
+            minutes = seconds // 60
             dropped = rate / 15 * (minutes - minutes // 10)
-            time_s = (whole * rate + frame - dropped) * 1001 / (1000 * rate)
+            time_s = (seconds * rate + frame - dropped) * 1001 / (1000 * rate)
         if times and time_s + passed_s - times[-1] < -DAY_S / 2:
             passed_s += DAY_S
         times.append(time_s + passed_s)
     return times
-
-
-def _timecode_rate(whole: list[int], frames: list[float]) -> int:
-    """Return how many frames of the timecode make a second."""
-    passed = [number for number in range(len(whole) - 1) if whole[number + 1] - whole[number] == 1]
-    seen = [frames[number] for number in passed] if len(passed) == 1 else frames
-    most = int(max(seen))
-    if most >= TIMECODE_RATES[-1]:
-        raise ValueError(f"a timecode has frame {most}, required less than {TIMECODE_RATES[-1]}")
-    shown = next(rate for rate in TIMECODE_RATES if rate > most)
-    return shown if passed else max(shown, APP_RATE)
 
 
 def _values(row: list[str], skipped: int, curves: int, number: int) -> list[float]:

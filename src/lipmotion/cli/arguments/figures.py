@@ -28,22 +28,20 @@ def add_figures_arguments(parser: argparse.ArgumentParser, *, lexicon: bool = Tr
 
 
 def report_figures(
-    options: argparse.Namespace,
-    compute: Callable[[Lexicon | None, Monitor], Figures],
-    table: Callable[[Figures], str],
+    options: argparse.Namespace, compute: Callable[[Lexicon | None, Monitor], Figures], table: Callable[[Figures], str]
 ) -> None:
     """Call ``compute(lexicon, monitor)``, write its figures, and print their table."""
-    from lipmotion.cli.terminal.progress import reporting
-    from lipmotion.storage.files import check_target, whole_file
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.storage.files import atomic_file, check_target
     from lipmotion.storage.json_text import as_json, nan_as_null
     from lipmotion.units import Lexicon
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         if options.output:
             check_target(options.output)
         file = getattr(options, "lexicon", None)
         figures = compute(Lexicon.from_file(file) if file else None, report.receive)
         if options.output:
-            with whole_file(options.output) as unfinished:
+            with atomic_file(options.output) as unfinished:
                 unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n")
         report.finish(table(figures), figures=figures)

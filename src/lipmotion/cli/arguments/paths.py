@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,20 +81,17 @@ def check_paths(options: argparse.Namespace) -> None:
 
     declared: tuple[OutputArgument, ...] = getattr(options, "writes", ())
     written = [(output, path) for output in declared for path in _paths(getattr(options, output.name))]
-    if written:
-        folders = [path for output, path in written if output.is_folder]
-        folders += [work_folder(path) for output, path in written if output.keeps_work]
-        files = [path for output, path in written if not output.is_folder]
-        check_apart(files, _sources(options), folders=folders, force=getattr(options, "force", False))
-
-
-def _sources(options: argparse.Namespace) -> Iterator[Source]:
-    """Yield the inputs of a command."""
+    if not written:
+        return
+    folders = [path for output, path in written if output.is_folder]
+    folders += [work_folder(path) for output, path in written if output.keeps_work]
+    files, sources = [path for output, path in written if not output.is_folder], list[Source]()
     for argument in getattr(options, "reads", ()):
-        given = _paths(getattr(options, argument.name))
-        paths = given or ([argument.default_path()] if argument.default_path else [])
+        paths = _paths(getattr(options, argument.name))
+        paths = paths or ([argument.default_path()] if argument.default_path else [])
         inputs = [path for path in paths if not (argument.is_text and is_folder(path))]
-        yield from (Source(path, argument.what, argument.replaceable) for path in inputs)
+        sources += [Source(path, argument.what, argument.replaceable) for path in inputs]
+    check_apart(files, sources, folders=folders, force=getattr(options, "force", False))
 
 
 def _paths(value: Any) -> list[Path]:

@@ -43,28 +43,31 @@ def is_pipe(path: Path | str) -> bool:
 
 @contextmanager
 def read_pipe(path: Path) -> Iterator[Path]:
-    """Yield the path of a recording; what comes through a pipe is kept in a temporary file meanwhile.
+    """Yield the path of a recording; what comes through a pipe is stored in a temporary file.
 
     Raises InputError: nothing comes, or more than ``LARGEST_RECORDING_BYTES`` bytes.
     """
     if not is_pipe(path):
         yield path
         return
+    from lipmotion.errors import InputError
     from lipmotion.storage.files import temporary_folder
 
     with temporary_folder() as folder:
-        kept = folder / "standard-input"
-        with kept.open("wb") as file:
+        stored = folder / "standard-input"
+        with stored.open("wb") as file:
+            if str(path) == PIPE and sys.stdin is None:
+                raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
             if str(path) == PIPE:
-                _copy(_standard_input(), file)
+                _copy(sys.stdin.buffer, file)
             else:
                 with path.open("rb") as source:
                     _copy(source, file)
-        yield kept
+        yield stored
 
 
 @contextmanager
-def written_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], bool]]:
+def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], bool]]:
     """Let ``-`` among the outputs be a temporary file, and write it to standard output at the end.
 
     Yields the outputs, and whether standard output is one of them; then nothing else may be printed there.
@@ -76,17 +79,9 @@ def written_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...],
     from lipmotion.storage.files import temporary_folder
 
     with temporary_folder() as folder:
-        kept = folder / f"motion.{options.format}"
-        yield tuple(str(kept) if output == PIPE else output for output in outputs), True
-        write_bytes(kept)
-
-
-def _standard_input() -> IO[bytes]:
-    from lipmotion.errors import InputError
-
-    if sys.stdin is None:
-        raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
-    return sys.stdin.buffer
+        motion = folder / f"motion.{options.format}"
+        yield tuple(str(motion) if output == PIPE else output for output in outputs), True
+        write_bytes(motion)
 
 
 def _copy(source: IO[bytes], target: IO[bytes]) -> None:

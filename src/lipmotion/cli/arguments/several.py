@@ -20,89 +20,27 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.outputs.output import ShownFace
 
 
-def animated_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
+def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
     """Run a job for each of several recordings, or for all of a folder, or where the output is a folder.
 
-    Each recording is reported; at the end the paths that were written are printed.
+    Each recording is reported; at the end the paths that were written are printed. The words and phones in files beside
+    the recordings are used, as a corpus and a batch use them. Faces and characters are opened once.
     Returns False, and does nothing, where there is one recording and its outputs are files.
     Raises ExportError: outputs that are not for several recordings, or that clash.
     Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
-    from lipmotion.pipeline.understand.recordings import is_for_several, recordings_of
-
-    if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
-        return False
-    _check_named(given)
-    _animate_each(*_one_by_one(job, recordings_of(given)), options, report)
-    return True
-
-
-@contextmanager
-def placed_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterator[list[Path]]:
-    """Yield the output files of one recording; of folders, which are made, the files in them.
-
-    kind : suffix of a file in a folder, without the dot
-    If the block fails, no new folders are left.
-    Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``planned_outputs``.
-    """
-    from lipmotion.pipeline.understand.recordings import is_for_several, planned_outputs
-    from lipmotion.storage.files import made_folders
-
-    if not any(map(is_for_several, outputs)):
-        yield [Path(output) for output in outputs]
-        return
-    _check_named([recording])
-    (planned,) = planned_outputs([recording], outputs, [kind])
-    files = [Path(file) for file in planned]
-    with made_folders({file.parent for file in files}):
-        yield files
-
-
-def _check_named(recordings: Sequence[Path]) -> None:
-    """Raise InputError where a recording has no name for a file in a folder."""
-    for recording in recordings:
-        if is_pipe(recording):
-            from lipmotion.errors import InputError
-
-            raise InputError(
-                f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
-                "the name of a file: -o FILE.json"
-            )
-
-
-def _one_by_one(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownFace]:
-    """Return the job of each recording, its outputs instead of folders and templates, and their face; make the folders.
-
-    Faces and characters are opened once, for all recordings. What cannot be leaves no new folders.
-    """
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.job import check_outputs, open_face
-    from lipmotion.pipeline.understand.recordings import planned_outputs
-    from lipmotion.storage.files import made_folders
-
-    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
-    alone["posteriors"] = job.outputs.posteriors
-    for name, value in alone.items():
-        if value is not None and len(recordings) > 1:
-            raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
-    planned = planned_outputs(recordings, job.outputs.files, job.outputs.kinds)
-    face = open_face(job.outputs)
-    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
-    with made_folders({Path(file).parent for files in planned for file in files}):
-        for each, recording in zip(jobs, recordings, strict=True):
-            check_outputs(each, face, recording)
-    return jobs, face
-
-
-def _animate_each(jobs: Sequence[Job], face: ShownFace, options: argparse.Namespace, report: Report) -> None:
-    """Run the jobs, with the words and phones in files beside the recordings, as a corpus and a batch use them."""
     from lipmotion.errors import LipMotionError
+    from lipmotion.pipeline.analysis.recordings import is_for_several, list_recordings
     from lipmotion.pipeline.job import run
     from lipmotion.pipeline.model import load_model
     from lipmotion.types.progress import Item, sub_monitor
 
-    model = load_model(jobs[0].request.model)
+    if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
+        return False
+    _check_named(given)
+    jobs, face = _plan_jobs(job, list_recordings(given))
+    model = load_model(job.request.model)
     written: list[str] = []
     failures: list[tuple[int, str, Exception]] = []
     for number, each in enumerate(jobs):
@@ -120,9 +58,63 @@ def _animate_each(jobs: Sequence[Job], face: ShownFace, options: argparse.Namesp
             report.receive(Item(name, "skipped", known[1]))
     if not failures:
         report.finish("\n".join(map(printable, written)), files=written)
-        return
+        return True
     if written and not options.machine_readable:
         print_lines("\n".join(map(printable, written)))
     _, speech, worst = max(failures, key=lambda failure: failure[0])
     kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
     raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst
+
+
+def _plan_jobs(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownFace]:
+    """Return the job of each recording, and their face; make the folders, but none where something is refused."""
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.analysis.recordings import plan_outputs
+    from lipmotion.pipeline.job import check_outputs, open_face
+    from lipmotion.storage.files import create_folders
+
+    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
+    alone["posteriors"] = job.outputs.posteriors
+    for name, value in alone.items():
+        if value is not None and len(recordings) > 1:
+            raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
+    planned = plan_outputs(recordings, job.outputs.files, job.outputs.kinds)
+    face = open_face(job.outputs)
+    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
+    with create_folders({Path(file).parent for files in planned for file in files}):
+        for each, recording in zip(jobs, recordings, strict=True):
+            check_outputs(each, face, recording)
+    return jobs, face
+
+
+@contextmanager
+def place_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterator[list[Path]]:
+    """Yield the output files of one recording; of folders, which are made, the files in them.
+
+    kind : suffix of a file in a folder, without the dot
+    If the block fails, no new folders are left.
+    Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``plan_outputs``.
+    """
+    from lipmotion.pipeline.analysis.recordings import is_for_several, plan_outputs
+    from lipmotion.storage.files import create_folders
+
+    if not any(map(is_for_several, outputs)):
+        yield [Path(output) for output in outputs]
+        return
+    _check_named([recording])
+    (planned,) = plan_outputs([recording], outputs, [kind])
+    files = [Path(file) for file in planned]
+    with create_folders({file.parent for file in files}):
+        yield files
+
+
+def _check_named(recordings: Sequence[Path]) -> None:
+    """Raise InputError where a recording has no name for a file in a folder."""
+    for recording in recordings:
+        if is_pipe(recording):
+            from lipmotion.errors import InputError
+
+            raise InputError(
+                f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
+                "the name of a file: -o FILE.json"
+            )

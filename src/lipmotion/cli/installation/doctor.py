@@ -18,7 +18,7 @@ from packaging.markers import Marker
 from packaging.specifiers import SpecifierSet
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
-from lipmotion.extensions import install_command, installed_version, provided
+from lipmotion.extensions import install_command, installed_version, load_provided
 
 EXTRA = re.compile(r'\s*(?:\band\b)?\s*extra == "([\w-]+)"')
 
@@ -89,7 +89,7 @@ EXTRAS = {
 PHONES = (("sil", 0.3), ("m", 0.09), ("aa", 0.16), ("m", 0.09), ("ax", 0.1), ("sil", 0.3))
 WORDS = "mama"
 """A made-up second of speech: its phones with their durations in seconds, and its word."""
-LEAST_OPENING = 0.03
+MIN_OPENING = 0.03
 """Opening of the lips that *mama* has at least, in distances between the outer eye corners."""
 OPENCV = "opencv-python-headless"
 LEAN = "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"
@@ -101,12 +101,12 @@ class InstalledPart:
 
     name  : what it is
     state : ``works``, ``absent`` (a part that nothing else needs) or ``broken``
-    told  : what was found; of what is absent or broken, what it would bring and what to do
+    text  : what was found; of what is absent or broken, what it would bring and what to do
     """
 
     name: str
     state: State
-    told: str
+    text: str
 
 
 def doctor() -> Iterator[InstalledPart]:
@@ -118,44 +118,33 @@ def doctor() -> Iterator[InstalledPart]:
         yield InstalledPart(
             "packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install ."
         )
-    yield from (_package(each) for each in declared if not each.extra)
+    for each in (each for each in declared if not each.extra):
+        state: State = "absent" if not each.applies else "works" if each.is_met else "broken"
+        command = f"pip install '{each.name}{each.versions}'"
+        texts = {
+            "absent": f"there is none for this Python or system (required: {each.marker})",
+            "works": each.installed,
+            "broken": f"{each.installed or 'not installed'}, required {each.versions}: {command}",
+        }
+        yield InstalledPart(each.name, state, texts[state])
     for extra in sorted({each.extra for each in declared} - {""}):
-        yield _extra(extra, [each for each in declared if each.extra == extra])
-    for name, look in _PARTS.items():
-        yield _looked(name, look)
+        packages, brings = [each for each in declared if each.extra == extra], EXTRAS.get(extra, "")
+        unmet = [each for each in packages if not each.is_met]
+        other = next((each for each in packages if not each.applies), None)
+        text = ", ".join(f"{each.name} {each.installed}" for each in packages)
+        if unmet and other is not None:
+            text = f"{brings}; not for this Python or system (required: {other.marker})"
+        elif unmet:
+            lacks = ", ".join(f"{each.installed or 'no'} {each.name} (required {each.versions})" for each in unmet)
+            text = f"{brings}: {install_command(extra)}; there is {lacks}"
+        yield InstalledPart(f"[{extra}]", "absent" if unmet else "works", text)
+    yield from map(look_at, _PARTS)
 
 
-def _package(each: Requirement) -> InstalledPart:
-    """Return what is found of a package that is always required."""
-    if not each.applies:
-        return InstalledPart(each.name, "absent", f"there is none for this Python or system (required: {each.marker})")
-    if each.is_met:
-        return InstalledPart(each.name, "works", each.installed)
-    found = each.installed or "not installed"
-    return InstalledPart(
-        each.name, "broken", f"{found}, required {each.versions}: pip install '{each.name}{each.versions}'"
-    )
-
-
-def _extra(name: str, its: list[Requirement]) -> InstalledPart:
-    """Return what is found of the packages of an extra."""
-    brings = EXTRAS.get(name, "")
-    other = next((each for each in its if not each.applies), None)
-    if other is not None and not all(each.is_met for each in its):
-        return InstalledPart(
-            f"[{name}]", "absent", f"{brings}; not for this Python or system (required: {other.marker})"
-        )
-    unmet = [each for each in its if not each.is_met]
-    if unmet:
-        lacks = ", ".join(f"{each.installed or 'no'} {each.name} (required {each.versions})" for each in unmet)
-        return InstalledPart(f"[{name}]", "absent", f"{brings}: {install_command(name)}; there is {lacks}")
-    return InstalledPart(f"[{name}]", "works", ", ".join(f"{each.name} {each.installed}" for each in its))
-
-
-def _looked(name: str, look: Callable[[], str]) -> InstalledPart:
-    """Return what a look at a part says; whatever it raises, the part is broken."""
+def look_at(name: str) -> InstalledPart:
+    """Return what a look at one of the parts that are no packages says; whatever it raises, the part is broken."""
     try:
-        return InstalledPart(name, "works", look())
+        return InstalledPart(name, "works", _PARTS[name]())
     except _AbsentError as absent:
         return InstalledPart(name, "absent", str(absent))
     except LipMotionError as error:
@@ -169,7 +158,6 @@ class _AbsentError(Exception):
 
 
 def _ffmpeg() -> str:
-    """Return the version of FFmpeg in PyAV, which must write what videos consist of."""
     import av
     from av.codec import codecs_available
 
@@ -180,7 +168,6 @@ def _ffmpeg() -> str:
 
 
 def _voices() -> str:
-    """Return how many voices each synthesiser has, and how to install the others."""
     from lipmotion.speech.voices.installed import SYNTHESISERS, how_to_install, nothing_installed
 
     found, others = [], []
@@ -211,7 +198,7 @@ def _phone_recogniser() -> str:
 def _face_tracking() -> str:
     """Return which OpenCV and MediaPipe are imported, and whether another OpenCV lies over that of the extra."""
     try:
-        opencv = provided("tracking_versions")()
+        opencv = load_provided("tracking_versions")()
     except MissingDependencyError as error:
         raise _AbsentError(str(error)) from error
     found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
@@ -220,7 +207,6 @@ def _face_tracking() -> str:
 
 
 def _model() -> str:
-    """Return version, size and digest of the model that ships, once it is read."""
     from lipmotion.pipeline.model import load_model, read_header, shipped_path
     from lipmotion.storage.files import sha256_of
 
@@ -245,7 +231,6 @@ def _compiled_kernels() -> str:
 
 
 def _temporary_folder() -> str:
-    """Return the folder for temporary files, once a file has been written there."""
     try:
         with tempfile.TemporaryFile() as file:
             file.write(b"lipmotion")
@@ -279,8 +264,8 @@ def _main_path() -> str:
         motion = job.run().motion
         sizes = [Path(file).stat().st_size for file in files]
     widest = float(motion["opening"].max())
-    if not (math.isfinite(widest) and widest > LEAST_OPENING and min(sizes) > 0):
-        raise LipMotionError(f"the lips open by {widest:.3f}, required more than {LEAST_OPENING}; install numpy again")
+    if not (math.isfinite(widest) and widest > MIN_OPENING and min(sizes) > 0):
+        raise LipMotionError(f"the lips open by {widest:.3f}, required more than {MIN_OPENING}; install numpy again")
     written = ", ".join(Path(file).name.partition(".")[2] for file in files)
     return f"{motion.time_s[-1]:.1f} s of made-up speech → {written}; the lips open by {widest:.2f}"
 

@@ -118,7 +118,7 @@ class RhubarbStatus(Events):
         self._ended = True
 
 
-def events_of(words: Sequence[str]) -> Events:
+def create_events(words: Sequence[str]) -> Events:
     """Return the events that a command line asks for, before it is parsed: parsing errors are events, too."""
     asked = any(len(word) > 2 and option.startswith(word) for option in OPTIONS for word in words)
     verb = next((word for word in words if not word.startswith("-")), "")

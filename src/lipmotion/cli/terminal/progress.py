@@ -30,7 +30,7 @@ class Report(Protocol):
 
 
 @contextmanager
-def reporting(options: argparse.Namespace) -> Iterator[Report]:
+def report_progress(options: argparse.Namespace) -> Iterator[Report]:
     """Yield the report of a command; meanwhile the package's warnings go to it, too."""
     chosen = (
         _MachineReport(options.stopper, options.events)

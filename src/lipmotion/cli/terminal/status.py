@@ -12,7 +12,7 @@ from pathlib import Path
 
 from lipmotion.cli.terminal.events import Events, RhubarbStatus
 from lipmotion.errors import ExportError, InputError, LipMotionError
-from lipmotion.extensions import failed_extension
+from lipmotion.extensions import describe_failed_extension
 from lipmotion.printable import printable
 from lipmotion.storage.files import as_text
 
@@ -30,7 +30,7 @@ def outcome(error: BaseException) -> tuple[int, str] | None:
     if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
         nameless = (error.errno, error.strerror, error.filename) == (errno.ENOENT, os.strerror(errno.ENOENT), None)
         return InputError.exit_code, one_line(GONE if nameless else error)  # the current folder
-    failed = failed_extension(error)
+    failed = describe_failed_extension(error)
     return None if failed is None else (InputError.exit_code, one_line(failed))
 
 

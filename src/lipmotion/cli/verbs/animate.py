@@ -6,8 +6,8 @@ import argparse
 
 from lipmotion.cli.arguments.declared import OF_ANIMATE, add_job_file, add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_execution, worker_count
-from lipmotion.cli.arguments.pipes import add_pipe_format, is_pipe, read_pipe, written_pipe
-from lipmotion.cli.arguments.several import animated_one_by_one
+from lipmotion.cli.arguments.pipes import add_pipe_format, is_pipe, read_pipe, write_pipe
+from lipmotion.cli.arguments.several import animate_one_by_one
 from lipmotion.cli.terminal.printing import print_note
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Outputs, Request
@@ -28,17 +28,17 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the job of each recording; print the paths that were written."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
 
     note = ""
     recordings = options.speech if isinstance(options.speech, list) else [options.speech]
-    with reporting(options) as report:
+    with report_progress(options) as report:
         request = part_of(options, options.start.request, recording=recordings[0])
         job = part_of(options, options.start, request=request)
-        if animated_one_by_one(job, recordings, options, report):
+        if animate_one_by_one(job, recordings, options, report):
             return
         piped = is_pipe(recordings[0])
-        with read_pipe(recordings[0]) as speech, written_pipe(options) as (files, pipe):
+        with read_pipe(recordings[0]) as speech, write_pipe(options) as (files, pipe):
             job = job.of(speech, files)
             done = run_job(job, temporary=piped, workers=worker_count(options), monitor=report.receive)
             note = done.outlook.text if done.outlook is not None else ""

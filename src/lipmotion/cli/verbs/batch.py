@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lipmotion.cli.arguments.declared import add_detail, add_job_file, add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.staging import Staging
-
-if TYPE_CHECKING:
-    from lipmotion.cli.terminal.progress import Report
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -33,12 +29,14 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
-    said: dict[str, Any] = {
+    changed: dict[str, Any] = {
         "rate_hz": {"help": "rate of motion files (default: --fps, or 100)"},
         "fps": {"help": "frames per second of videos (default: 25) and of cues (24)"},
         "background": {"metavar": "COLOUR", "help": "of that face: transparent, or as #40a0ff"},
     }
-    add_options(parser, Outputs, "rate_hz", "fps", "channels", "curves", "articulation", "face", "background", **said)
+    add_options(
+        parser, Outputs, "rate_hz", "fps", "channels", "curves", "articulation", "face", "background", **changed
+    )
     add_options(parser, Staging)
     add_options(parser, Delivery)
     add_detail(parser)
@@ -49,49 +47,28 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``batch`` or, with ``--check``, ``check``; print what was done. Raises InputError: some lines failed."""
-    from lipmotion.cli.terminal.progress import reporting
-
-    with reporting(options) as report:
-        job = part_of(options, options.start)
-        if options.check:
-            _check(options, job, report)
-        else:
-            _batch(options, job, report)
-
-
-def _batch(options: argparse.Namespace, job: Job, report: Report) -> None:
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.errors import InputError
-    from lipmotion.pipeline.batch import batch
-
-    if options.out is None:
-        raise InputError("no folder of the outputs is given; add --out DIR, or --check to write nothing")
-    found = batch(
-        options.source,
-        options.out,
-        job,
-        jobs=options.jobs,
-        cluster=options.cluster,
-        marks=options.marks,
-        monitor=report.receive,
-    )
-    if found.failed:
-        raise InputError(f"{found.text}; the reasons are in {found.csv}; mend them and run the same command again")
-    figures = {"done": found.done, "kept": found.kept, "report": [str(found.csv), str(found.html)]}
-    report.finish(printable(f"{found.text}; report: {found.html}"), **figures)
-
-
-def _check(options: argparse.Namespace, job: Job, report: Report) -> None:
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.batch import check
+    from lipmotion.pipeline.batch import batch, check
     from lipmotion.types import Item
 
-    found = check(options.source, job, jobs=options.jobs, monitor=report.receive)
-    if not found.findings:
-        report.finish(printable(found.text), lines=found.lines)
-        return
-    if options.machine_readable:
-        for each in found.findings:
-            report.receive(Item(each.name, each.kind, each.text))
-    else:
-        report.finish(found.table)
-    raise InputError(found.text)
+    with report_progress(options) as report:
+        job, monitor = part_of(options, options.start), report.receive
+        if options.check:
+            checked = check(options.source, job, jobs=options.jobs, monitor=monitor)
+            if not checked.findings:
+                report.finish(printable(checked.text), lines=checked.lines)
+                return
+            if not options.machine_readable:
+                report.finish(checked.table)
+            for each in checked.findings if options.machine_readable else ():
+                report.receive(Item(each.name, each.kind, each.text))
+            raise InputError(checked.text)
+        if options.out is None:
+            raise InputError("no folder of the outputs is given; add --out DIR, or --check to write nothing")
+        how = {"jobs": options.jobs, "cluster": options.cluster, "marks": options.marks}
+        done = batch(options.source, options.out, job, monitor=monitor, **how)
+        if done.failed:
+            raise InputError(f"{done.text}; the reasons are in {done.csv}; mend them and run the same command again")
+        figures = {"done": done.done, "kept": done.kept, "report": [str(done.csv), str(done.html)]}
+        report.finish(printable(f"{done.text}; report: {done.html}"), **figures)

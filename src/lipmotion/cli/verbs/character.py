@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types.values import parse_number
 
@@ -51,23 +51,32 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
-    from lipmotion.extensions import provided
+    from lipmotion.extensions import load_provided
     from lipmotion.meshes.files.binding_files import save_binding, write_points, write_weights
+    from lipmotion.meshes.files.character_files import read_character
+    from lipmotion.meshes.files.rig_tables import read_rig_table, table_path, write_rig_table
+    from lipmotion.meshes.fitting.driven import list_rows
     from lipmotion.pipeline.job import open_character
-    from lipmotion.pipeline.outputs.curve_sets import described
+    from lipmotion.pipeline.outputs.curve_sets import describe_character
+    from lipmotion.storage.sources import is_file
 
-    if options.character.suffix.lower() == ".csv":
-        _calibrate_rig(options)
+    stated, path = _read_values(options), options.character
+    if path.suffix.lower() == ".csv":
+        rows = read_rig_table(path)
+        if not stated:
+            raise InputError(f"{path}: is a rig's table; state values of its controls: --open NAME=X")
+        _write_table(path, rows, path, stated)
         return
-    stated = _stated(options)
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
     try:
         character = open_character(part_of(options, Outputs(), control_points=by_points))
     except InputError:
-        if options.write_table:
-            _write_blank_table(options.character)
+        table = table_path(path)
+        if options.write_table and not is_file(table):  # the mouth was not found: the table is to be filled in
+            write_rig_table(table, list_rows(read_character(path), None, {}))
+            print_line(table)
         raise
-    print_lines("\n".join(described(character)))
+    print_lines("\n".join(describe_character(character)))
     if options.write_table or stated:
         _write_table(character.table_file, character.table_rows(), character, stated)
     if options.write_points:
@@ -77,32 +86,10 @@ def run(options: argparse.Namespace) -> None:
     if options.write_binding and character.binding is not None:
         save_binding(options.write_binding, character.binding, character.mesh)
     if options.picture:
-        provided("write_picture")(options.picture, character)
-    for path in (options.write_points, options.write_weights, options.write_binding, options.picture):
-        if path:
-            print_line(path)
-
-
-def _write_blank_table(character: Path) -> None:
-    """Write the table of a character whose mouth was not found, to be filled in; where there is none yet."""
-    from lipmotion.meshes.files.character_files import read_character
-    from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
-    from lipmotion.meshes.fitting.driven import list_rows
-    from lipmotion.storage.sources import is_file
-
-    path = table_path(character)
-    if not is_file(path):
-        write_rig_table(path, list_rows(read_character(character), None, {}))
-        print_line(path)
-
-
-def _calibrate_rig(options: argparse.Namespace) -> None:
-    from lipmotion.meshes.files.rig_tables import read_rig_table
-
-    rows, stated = read_rig_table(options.character), _stated(options)
-    if not stated:
-        raise InputError(f"{options.character}: is a rig's table; state values of its controls: --open NAME=X")
-    _write_table(options.character, rows, options.character, stated)
+        load_provided("write_picture")(options.picture, character)
+    for output in (options.write_points, options.write_weights, options.write_binding, options.picture):
+        if output:
+            print_line(output)
 
 
 def _write_table(
@@ -110,24 +97,24 @@ def _write_table(
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
     from lipmotion.meshes.files.rig_tables import write_rig_table
-    from lipmotion.pipeline.outputs.calibration import calibrated, posed_sources
+    from lipmotion.pipeline.outputs.calibration import calibrate_rows, pose_sources
 
-    changed = calibrated(rows, posed_sources(curves, rows), stated) if stated else rows
+    changed = calibrate_rows(rows, pose_sources(curves, rows), stated) if stated else rows
     for row in changed:
         if row not in rows:
-            print_line(f"{shortened(row.control):14} {row.source}: gain {row.gain:.3g}, offset {row.offset:.3g}")
+            print_line(f"{shorten(row.control):14} {row.source}: gain {row.gain:.3g}, offset {row.offset:.3g}")
     write_rig_table(path, changed)
     print_line(path)
 
 
-def _stated(options: argparse.Namespace) -> dict[str, dict[str, float]]:
+def _read_values(options: argparse.Namespace) -> dict[str, dict[str, float]]:
     """Return what options say of controls in poses. Raises InputError: something that states no value."""
     stated: dict[str, dict[str, float]] = {}
     for pose in CALIBRATION:
         for part in filter(None, getattr(options, pose).split(",")):
             name, _, text = part.rpartition("=")
-            value = parse_number(text, f"--{pose}: the value in {shortened(part)!r} is", "NAME=X, as A=0.8")
+            value = parse_number(text, f"--{pose}: the value in {shorten(part)!r} is", "NAME=X, as A=0.8")
             if not name.strip():
-                raise InputError(f"--{pose}: {shortened(part)!r} names no control, required NAME=X, as A=0.8")
+                raise InputError(f"--{pose}: {shorten(part)!r} names no control, required NAME=X, as A=0.8")
             stated.setdefault(pose, {})[name.strip()] = value
     return stated

@@ -12,10 +12,10 @@ from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.arguments.paths import add_output, check_paths
 from lipmotion.cli.arguments.pipes import is_pipe, read_pipe
-from lipmotion.cli.arguments.several import placed_outputs
+from lipmotion.cli.arguments.several import place_outputs
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.status import LEVELS, status_lines
-from lipmotion.errors import shortened
+from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import is_file
 from lipmotion.types.delivery import Delivery
@@ -66,7 +66,7 @@ def _dialogue(path: str) -> str | None:
     Raises ArgumentTypeError: no such file.
     """
     if not is_file(Path(path)):
-        raise argparse.ArgumentTypeError(f"no such file: {shortened(path)!r}; the words themselves: --transcript TEXT")
+        raise argparse.ArgumentTypeError(f"no such file: {shorten(path)!r}; the words themselves: --transcript TEXT")
     with Path(path).open("rb") as file:
         return path if NO_WORDS.sub(b"", file.read(1 << 16).strip(BLANK)) else None
 
@@ -108,14 +108,14 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate``, ``lipmotion.cues`` and ``lipmotion.write_cues``; print the cues or their paths."""
+    from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import edit_file
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
-    from lipmotion.pipeline.understand.read_request import read_request
 
     piped = is_pipe(options.speech)
-    placed = placed_outputs(options.speech, options.output, options.format or "tsv")
+    placed = place_outputs(options.speech, options.output, options.format or "tsv")
     with status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is

@@ -18,17 +18,17 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Print what is found, one line for each part. Raises LipMotionError, of exit code 1: something is broken."""
     from lipmotion.cli.installation.doctor import doctor
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.errors import LipMotionError
     from lipmotion.types.progress import Item
 
     broken = []
-    with reporting(options) as report:
+    with report_progress(options) as report:
         for each in doctor():
             if options.machine_readable:
-                report.receive(Item(each.name, each.state, each.told))
+                report.receive(Item(each.name, each.state, each.text))
             else:
-                print_line(f"{each.state:7} {each.name:20} {each.told}")
+                print_line(f"{each.state:7} {each.name:20} {each.text}")
             broken += [each.name] if each.state == "broken" else []
         if broken:
             raise LipMotionError(f"broken: {', '.join(broken)}; what to do is said above")

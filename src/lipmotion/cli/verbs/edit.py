@@ -28,21 +28,21 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read or begin the file, add the edits, try them out, and write it."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.errors import InputError
-    from lipmotion.pipeline.edit_files import begun, read_edits, write_edits
+    from lipmotion.pipeline.edit_files import create_edit_file, read_edits, write_edits
     from lipmotion.units import group_words
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         if options.of is None and not options.file.exists():
             raise InputError(f"{options.file}: no such file; begin one: lipmotion edit {options.file} --of RECORDING")
         if options.of is not None and options.file.exists():
             raise InputError(f"{options.file}: exists; add edits without --of, or delete it to begin again")
         asked = part_of(options, Request(), recording=options.of)
-        file = begun(asked) if options.of is not None else read_edits(options.file)
+        file = create_edit_file(asked)[0] if options.of is not None else read_edits(options.file)
         after = file.undo(options.undo).then(*options.sentences)
         session, edits = file.session(), after.edits
-        units = session.generated(edits).units if edits.steps else session.units()
+        units = session.generate(edits).units if edits.steps else session.units()
         if options.of is not None or options.undo or options.sentences:
             write_edits(after, options.file)
         lines = [f"{number:4} {sentence}" for number, sentence in enumerate(edits.sentences, 1)]

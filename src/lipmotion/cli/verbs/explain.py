@@ -29,10 +29,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.explain`` and print the explanations; without a time, ``lipmotion.state_runs`` and the runs."""
+    from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.generate.explain import explain, explanation_document, explanation_text
     from lipmotion.pipeline.generate.state_runs import run_document, run_lines, state_runs
     from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.understand.read_request import read_request
 
     asked = part_of(options, Request())
     request, model = read_request(asked), load_model(options.former_model or asked.model)

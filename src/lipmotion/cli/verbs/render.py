@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.pipes import add_pipe_format, written_pipe
+from lipmotion.cli.arguments.pipes import add_pipe_format, write_pipe
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request
@@ -41,40 +41,50 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Read the motion and call ``lipmotion.write``; print the paths that were written."""
-    from lipmotion.cli.terminal.progress import reporting
+    """Read the motion and call ``lipmotion.write``; print the paths that were written.
 
-    with reporting(options) as report:
-        with written_pipe(options) as (files, pipe):
-            job = part_of(options, Job()).of(options.sound or _sound_named_by(options.motion), files)
-            _render(job, options.motion, options.motion_rate, report.receive)
+    The motion of a file of edits is generated again, and its outputs are written as ``animate`` does.
+    """
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.edit_files import is_edit_file, read_edits
+
+    with report_progress(options) as report:
+        with write_pipe(options) as (files, pipe):
+            path = options.motion
+            if is_edit_file(path):
+                job, edits = part_of(options, Job()).of(options.sound, files), read_edits(path)
+                if job.request.recording or job.request.units:
+                    raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
+                if edits.named.recording is None:
+                    raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
+                run_job(replace(job, request=replace(edits.named, edits=path)), monitor=report.receive)
+            else:
+                job = part_of(options, Job()).of(options.sound or _find_sound(path), files)
+                _render(job, path, options.motion_rate, report.receive)
         written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
 
 
-def _render(job: Job, motion: Path, rate_hz: float | None, monitor: Monitor) -> None:
+def _render(job: Job, path: Path, rate_hz: float | None, monitor: Monitor) -> None:
     import numpy as np
 
-    from lipmotion.pipeline.edit_files import is_edit_file
-    from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
+    from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion.types import Audio
 
-    if is_edit_file(motion):
-        _replay(job, motion, monitor)
-        return
     sound, face = job.request.recording, open_face(job.outputs)
     planned = check_outputs(job, face, sound)
-    generation = read_generation(motion, job.request.units, rate_hz)
+    generation = read_generation(path, job.request.units, rate_hz)
     if isinstance(sound, Path):
-        generation = as_long_as(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
+        generation = match_duration(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
     elif any(output.draws for output in planned):
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
         sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
     write_outputs(job, face, generation, sound, monitor=monitor)
 
 
-def _sound_named_by(motion: Path) -> Path | None:
+def _find_sound(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
     from lipmotion.meshes.files.gltf_writer import find_named_sound
     from lipmotion.storage.sources import is_file
@@ -88,19 +98,6 @@ def _sound_named_by(motion: Path) -> Path | None:
     why = "is not there" if not start_s else f"begins at {start_s:g} s of the motion"
     LOG.warning("%s: its sound %s %s; give a sound: --sound FILE", motion, sound, why)
     return None
-
-
-def _replay(job: Job, path: Path, monitor: Monitor) -> None:
-    """Make the motion of the recording that a file of edits names, and write the outputs as ``animate`` does."""
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.edit_files import read_edits
-
-    edits = read_edits(path)
-    if job.request.recording or job.request.units:
-        raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
-    if edits.named.recording is None:
-        raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
-    run_job(replace(job, request=replace(edits.named, edits=path)), monitor=monitor)
 
 
 SILENT_HZ = 16_000

@@ -42,49 +42,43 @@ def run(options: argparse.Namespace) -> None:
         options.wrong("required: a text, or --text FILE, not both")
     if options.words is not None and is_file(Path(options.words)):
         options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
 
-    with reporting(options) as report:
-        if options.voices:
-            _list_voices(report)
-        else:
+    with report_progress(options) as report:
+        if not options.voices:
             _speak(options, report)
+            return
+        from lipmotion.speech.voices.installed import all_voices
+
+        voices = all_voices()
+        report.finish(
+            "\n".join(f"{voice.full_name:28} {voice.language}" for voice in voices) or "no voice is installed",
+            voices=[{"name": voice.full_name, "language": voice.language} for voice in voices],
+        )
 
 
 def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.analysis.read_request import read_lexicon
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.understand.read_request import lexicon_of
 
     job = part_of(options, Job())
     face = open_face(job.outputs)
     check_outputs(job, face)
-    asked, text = job.request, read_text(options.text) if options.text else options.words
-    lexicon = lexicon_of(asked) if asked.lexicon else None
-    model, corpus = load_model(asked.model), Corpus.open(options.corpus) if options.corpus else None
+    request, text = job.request, read_text(options.text) if options.text else options.words
+    model, corpus = load_model(request.model), Corpus.open(options.corpus) if options.corpus else None
     sound, result = speak(
         text,
         voice=options.voice,
         corpus=corpus,
         model=model,
-        lexicon=lexicon,
-        speaker=asked.speaker,
-        onto=asked.onto or face.other_person(model, asked.speaker),
-        onto_speaker=asked.onto_speaker,
-        pauses=asked.pauses,
-        asymmetry=asked.asymmetry,
+        lexicon=read_lexicon(request) if request.lexicon else None,
+        speaker=request.speaker,
+        onto=request.onto or face.other_person(model, request.speaker),
+        onto_speaker=request.onto_speaker,
+        pauses=request.pauses,
+        asymmetry=request.asymmetry,
     )
     write_outputs(job, face, result, sound, model=model, monitor=report.receive)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))
-
-
-def _list_voices(report: Report) -> None:
-    """Report the installed voices, one a line, with their languages."""
-    from lipmotion.speech.voices.installed import all_voices
-
-    voices = all_voices()
-    report.finish(
-        "\n".join(f"{voice.full_name:28} {voice.language}" for voice in voices) or "no voice is installed",
-        voices=[{"name": voice.full_name, "language": voice.language} for voice in voices],
-    )

@@ -74,7 +74,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
-    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings, preset_visual
     from lipmotion.pipeline.model import GEOMETRY, save_model
@@ -83,7 +83,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.storage.files import unfinished_work
     from lipmotion.units import Lexicon
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         engine = engine_from_settings(options.engine, preset=options.preset, units=options.units, settings=options.set)
         voices = other_voices(

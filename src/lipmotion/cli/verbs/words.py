@@ -27,25 +27,25 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``recognise_words`` and ``write_words``; print the words or the paths that were written."""
-    from lipmotion.cli.terminal.progress import reporting
-    from lipmotion.pipeline.request import Request
-    from lipmotion.pipeline.understand.words import (
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.pipeline.analysis.words import (
         check_word_outputs,
+        describe_word,
+        format_words,
         recognise_words,
-        word_record,
-        words_as_text,
         write_words,
     )
+    from lipmotion.pipeline.request import Request
 
-    with reporting(options) as report:
+    with report_progress(options) as report:
         check_word_outputs(options.output, options.speech)
         request = Request(options.speech, recogniser=options.recogniser)
         found = recognise_words(request, model=options.model, workers=worker_count(options))
         write_words(found.words, options.output, options.speech)
-        text = "\n".join(map(str, options.output)) or words_as_text(found.words).removesuffix("\n")
+        text = "\n".join(map(str, options.output)) or format_words(found.words).removesuffix("\n")
         report.finish(
             text,
-            words=[word_record(span) for span in found.words],
+            words=[describe_word(span) for span in found.words],
             word_s=round(found.word_s, 2),
             phone_s=round(found.phone_s, 2),
             confidence=round(found.confidence or 0.0, 3),

@@ -33,8 +33,8 @@ from lipmotion.storage.schema import (
     Arrays,
     ArraySpec,
     arrays_under,
+    check_arrays,
     check_index,
-    checked_arrays,
     refuse_undeclared,
 )
 from lipmotion.units import UnitSet
@@ -104,7 +104,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
     try:
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         structure = _structure(arrays, config)
-        poses = checked_arrays(arrays, POSES, Q=space.dimensions)
+        poses = check_arrays(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
         _check_names(arrays, structure, len(streams))
         if structure.state_counts[0] > arrays["group_0/tie"].size:
@@ -189,14 +189,14 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
 def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
     sets = []
     for number, name in enumerate(config.chains.split()):
-        pairs = checked_arrays(arrays_under(arrays, f"chain_{number}/"), UNITS)["units"]
+        pairs = check_arrays(arrays_under(arrays, f"chain_{number}/"), UNITS)["units"]
         sets.append(UnitSet(name, dict(pairs.tolist())))
     return config.structure_with(tuple(sets))
 
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:
     of_chains = [arrays_under(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
-    chains = [checked_arrays(own, CHAIN, U=len(units)) for own, units in zip(of_chains, structure.units, strict=True)]
+    chains = [check_arrays(own, CHAIN, U=len(units)) for own, units in zip(of_chains, structure.units, strict=True)]
     for chain in chains:
         check_sums_to_one("first", chain["first"].sum(keepdims=True))
         check_sums_to_one("bigram", chain["bigram"].sum(axis=1))
@@ -204,25 +204,25 @@ def _transitions(arrays: Arrays, structure: Structure) -> Transitions | Factoria
     advance = tuple(chain["advance"] for chain in chains)
     if structure.kind == FACTORIAL and structure.limit is None and len(chains) == 2:
         first, second = advance
-        own_density_states = checked_arrays(arrays, PAIRS)["pairs"]
+        own_density_states = check_arrays(arrays, PAIRS)["pairs"]
         for number, count in enumerate(structure.state_counts):
             if len(advance[number]) != count:
                 raise ValueError(f"chain_{number}/advance of {len(advance[number])} states, required {count}")
             check_index(f"pairs of chain {number}", own_density_states[:, number], count)
         return FactorialTransitions(FactorialProduct(structure, grammar), (first, second), own_density_states)
     product = reachable(structure, grammar)
-    rows = tuple(checked_arrays(own, ROWS, J=len(product.joint_states))["rows"] for own in of_chains)
+    rows = tuple(check_arrays(own, ROWS, J=len(product.joint_states))["rows"] for own in of_chains)
     for number, row in enumerate(rows):
         check_index(f"chain_{number}/rows", row, len(advance[number]))
     return Transitions(product, rows, advance)
 
 
 def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> VisualStream:
-    columns = checked_arrays(arrays, VISUAL)["columns"]
+    columns = check_arrays(arrays, VISUAL)["columns"]
     check_index(f"columns of {name}", columns, dimensions)
     if len(set(columns.tolist())) < len(columns):
         raise ValueError(f"columns of {name} that repeat")
-    mean, deviation = checked_arrays(arrays, VISUAL, D=len(columns) * (3 if dynamic else 1))["scale"]
+    mean, deviation = check_arrays(arrays, VISUAL, D=len(columns) * (3 if dynamic else 1))["scale"]
     if not (deviation > 0).all():
         raise ValueError(f"scale of {name} with deviations that are not more than 0")
     return VisualStream(name, columns, dynamic, mean, deviation)
@@ -232,10 +232,10 @@ def _groups(arrays: Arrays, joint_states: int, visual: tuple[VisualStream, ...])
     groups, widths = [], [FEATURES, *(len(stream.mean) for stream in visual)]
     for number in range(sum(key.endswith("/tie") for key in arrays)):
         of_group = arrays_under(arrays, f"group_{number}/")
-        streams = tuple(checked_arrays(of_group, {"streams": GROUP["streams"]})["streams"].tolist())
+        streams = tuple(check_arrays(of_group, {"streams": GROUP["streams"]})["streams"].tolist())
         check_index(f"group_{number}/streams", np.array(streams), len(widths))
         edges = np.cumsum([0, *(widths[stream] for stream in streams)]).tolist()
-        checked = checked_arrays(of_group, GROUP, J=joint_states, D=edges[-1])
+        checked = check_arrays(of_group, GROUP, J=joint_states, D=edges[-1])
         check_index(f"group_{number}/tie", checked["tie"], checked.sizes["G"])
         columns, weights = tuple(slice(a, b) for a, b in pairwise(edges)), tuple(checked["weights"].tolist())
         groups.append(StreamGroup(streams, columns, mixtures_from_arrays(checked), weights, checked["tie"]))
@@ -248,9 +248,9 @@ def _regression(
     arrays: Arrays, structure: Structure, visual: tuple[VisualStream, ...]
 ) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
     of_inputs = arrays_under(arrays, "around/")
-    checked_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0])
+    check_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0])
     size = of_inputs["window_basis"].shape[1] + of_inputs["belief"].shape[1] * len(OFFSETS)
-    checked = checked_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0], I=size)
+    checked = check_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0], I=size)
     inputs = RegressionInputs(
         acoustic_context_from_arrays(checked), checked["belief"], checked["mean"], checked["basis"]
     )
@@ -258,7 +258,7 @@ def _regression(
     for number, stream in enumerate(visual):
         count = structure.state_counts[structure.chain_of(number + 1)]
         sizes = {"N": count, "F": checked.sizes["F"] + 1, "D": len(stream.mean)}
-        own = checked_arrays(arrays_under(arrays, f"following_{number}/"), VISUAL_REGRESSION, **sizes)
+        own = check_arrays(arrays_under(arrays, f"following_{number}/"), VISUAL_REGRESSION, **sizes)
         check_index(f"following_{number}/kind", own["kind"], own.sizes["E"])
         regressions.append(VisualRegression(own["kind"], own["coefficients"], own["variances"]))
     return inputs, tuple(regressions)

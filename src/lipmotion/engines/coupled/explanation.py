@@ -79,7 +79,7 @@ MOST_STATES = 3
 """Greatest number of states of a chain that an explanation names."""
 REST = "rest"
 """Name of what the mean comes from in silence away from speech."""
-LEAST_PROBABILITY = 0.005
+MIN_PROBABILITY = 0.005
 """States and regressions with less probability are not named."""
 
 
@@ -181,7 +181,7 @@ def _most_probable(names: Sequence[str], probability: NDArray[np.floating]) -> t
     """Return the most probable of some named states or regressions, the most probable first."""
     best = np.argsort(-probability, kind="stable")[:MOST_STATES]
     named = [NamedProbability(names[i], float(probability[i])) for i in best]
-    return (named[0], *(state for state in named[1:] if state.probability >= LEAST_PROBABILITY))
+    return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
 
 
 def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:

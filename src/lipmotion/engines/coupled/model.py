@@ -57,6 +57,10 @@ class CoupledModel:
     prior: ArticulationPrior | None = None
     modulation: ModulationFilter | None = None
 
+    def __repr__(self) -> str:
+        size = f"{self.chains.parameters} parameters, {self.space.dimensions} dimensions"
+        return f"CoupledModel({', '.join(self.chains.streams)}; {size})"
+
     @cached_property
     def limits(self) -> MotionLimits:
         """The limits of generated motion: those of the poses and of the rest pose, widened by a standard deviation."""

@@ -86,6 +86,11 @@ class JointModel:
     scaling: VarianceScaling | None = None
     modulation: ModulationFilter | None = None
 
+    def __repr__(self) -> str:
+        return (
+            f"JointModel({self.units.name} units, {len(self.hmm.models)} streams, {self.space.dimensions} dimensions)"
+        )
+
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of plausible motion."""

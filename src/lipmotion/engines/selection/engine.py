@@ -170,7 +170,7 @@ class SelectionEngine(Engine[SelectionModel]):
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
         guide = self.config.guide > 0
         conditions = count_conditions(self.config.predictor, motion_s, self.config.conditions) if guide else 0
-        return Inputs(self.config.joint_recogniser, conditions, prior=guide, posteriors=guide)
+        return Inputs(self.config.joint_recogniser, conditions, prior=guide, posteriors=guide, encoding=guide)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT

@@ -27,7 +27,7 @@ from lipmotion.storage.schema import (
     POSITIVE,
     Arrays,
     ArraySpec,
-    checked_arrays,
+    check_arrays,
     format_errors,
     refuse_undeclared,
 )
@@ -63,6 +63,9 @@ class SelectionModel:
     variances: Array
     guide: Guide | None
     phone_recogniser: OwnPhoneRecogniser | None
+
+    def __repr__(self) -> str:
+        return f"SelectionModel({len(self.inventory.names)} recordings, {len(self.inventory.usable)} recorded phones)"
 
     def costs(self, config: SelectionConfig) -> Costs:
         """Return the costs of units, for a configuration; those of the last one are kept."""
@@ -117,11 +120,11 @@ def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
         refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, list_predictor_arrays(arrays), UNITS, GUIDE, named)
         motion = learned_motion_from_arrays(arrays, filtered=filtered)
         dimensions = motion.space.dimensions
-        stored = checked_arrays(arrays, UNITS, Q=dimensions)
+        stored = check_arrays(arrays, UNITS, Q=dimensions)
         predictor = predictor_from_arrays(arrays, dimensions)
         guide, predicted = None, None
         if predictor is not None:
-            guided = checked_arrays(arrays, GUIDE, Q=dimensions, U=stored.sizes["U"])
+            guided = check_arrays(arrays, GUIDE, Q=dimensions, U=stored.sizes["U"])
             guide, predicted = Guide(predictor, *guided["guide_range"]), guided["unit_predicted"].astype(np.float16)
             if not (guide.expansion > 0).all():
                 raise ValueError("guide_range with an expansion that is not more than 0")

@@ -19,7 +19,7 @@ from lipmotion.motion.context_window import (
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
 from lipmotion.motion.limits import check_spread
 from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 
 Array = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -
             f"trees for {len(forest)} states, required {layout.speech} of speech and {layout.silence} of silence"
         )
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
-    densities = checked_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
+    densities = check_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(densities["means"][:, 0], densities["variances"][:, 0])
     regression = _regression_from_arrays(arrays, leaves, dimensions) if REGRESSION.keys() & arrays.keys() else None
     return Emission(forest, densities["means"], densities["variances"], regression)
@@ -174,7 +174,7 @@ EMISSION = (*TREES, *DENSITIES, *REGRESSION)
 
 
 def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
-    stored = checked_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
+    stored = check_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
     rows = stored["coefficient_rows"]
     if rows.max() >= stored.sizes["C"]:
         raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")

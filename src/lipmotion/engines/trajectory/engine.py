@@ -133,7 +133,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
         conditions = count_conditions(self.config.predictor, motion_s, self.config.conditions)
-        return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=True)
+        return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=True, encoding=True)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
@@ -174,6 +174,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             constraints,
             close=self.config.closures,
             reliability=experts.reliability,
+            encoded=None if model.network is None else model.network.predict_encoded(speech),
             voice=speech.voice,
         )
         return Generation(

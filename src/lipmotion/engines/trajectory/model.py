@@ -34,7 +34,7 @@ from lipmotion.motion.predictors import (
 )
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.units import UnitSet
 
 
@@ -64,6 +64,10 @@ class TrajectoryModel:
     prior: ArticulationPrior | None = None
     network_share: float = NETWORK_SHARE
     modulation: ModulationFilter | None = None
+
+    def __repr__(self) -> str:
+        states = f"{len(self.emission.means)} tied states"
+        return f"TrajectoryModel({self.units.name} units, {states}, {self.space.dimensions} dimensions)"
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -112,10 +116,10 @@ def model_from_arrays(
         refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, others, SHARE, joint, MODULATION)
         unit_set, space, closure, prior = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
-        factors = checked_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
+        factors = check_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
         recogniser, network = recogniser_from_arrays(arrays), predictor_from_arrays(arrays, space.dimensions)
         stored = "network_share" in arrays or any(name.startswith(ADDED) for name in others)  # not in former models
-        share = float(checked_arrays(arrays, SHARE)["network_share"][0]) if stored else NETWORK_SHARE
+        share = float(check_arrays(arrays, SHARE)["network_share"][0]) if stored else NETWORK_SHARE
         modulation = filter_from_arrays(arrays, space.dimensions, needed=filtered)
         model = TrajectoryModel(
             unit_set, space, emission, factors, closure, recogniser, network, prior, share, modulation

@@ -25,7 +25,7 @@ from lipmotion.storage.schema import (
     Arrays,
     ArraySpec,
     arrays_under,
-    checked_arrays,
+    check_arrays,
     format_errors,
     refuse_undeclared,
 )
@@ -209,7 +209,7 @@ def joint_to_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float1
 def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
     """Deserialise a model. Raises ModelFormatError: an array is missing, undeclared, inconsistent or out of range."""
     with format_errors("the joint model"):
-        named = checked_arrays(arrays, NAMES)
+        named = check_arrays(arrays, NAMES)
         units, free, streams = (tuple(named[key].tolist()) for key in ("units", "free", "streams"))
         refuse_undeclared(
             arrays, NAMES, TIMES, (name for name in arrays if name.partition("/")[0] in streams and "/" in name)
@@ -222,7 +222,7 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
             raise ValueError("silence did not occur in training")
         if SPEECH not in streams or not set(streams) <= set(STREAMS) or len(set(streams)) < len(streams):
             raise ValueError(f"streams {streams}")
-        stored = checked_arrays(arrays, TIMES, U=len(units), R=len(inventory.monophones))
+        stored = check_arrays(arrays, TIMES, U=len(units), R=len(inventory.monophones))
         models = {name: _restore_stream(name, arrays_under(arrays, f"{name}/"), inventory) for name in streams}
         bigram = bigram_from_array(units, stored["bigram"])
         return JointHmm(config, inventory, models, stored["log_stay"], stored["durations"], spoken, bigram)
@@ -235,7 +235,7 @@ def _restore_stream(name: str, arrays: Arrays, inventory: Inventory) -> StreamMo
         forest = Forest(inventory, trees_from_arrays(arrays))
         if list(forest.trees) != list(inventory.trees):
             raise ValueError(f"trees {' '.join(forest.trees)}, required {' '.join(inventory.trees)}")
-        stored = checked_arrays(arrays, table, G=forest.size)
+        stored = check_arrays(arrays, table, G=forest.size)
         if name == MOTION and stored.sizes["D"] % 3:
             raise ValueError(f"{stored.sizes['D']} dimensions")
         tied = TiedDensities(mixtures_from_arrays(stored), stored.arrays.get("voiced"))

@@ -16,7 +16,7 @@ from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.storage.checkpoint import Checkpoint
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
 from lipmotion.units import UNIT_SETS, is_silent
 
@@ -109,7 +109,7 @@ def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
     own = arrays_under(arrays, JOINT_PREFIX)
     if not own:
         return None
-    (score,) = checked_arrays(own, SCORE)["typical"].tolist()
+    (score,) = check_arrays(own, SCORE)["typical"].tolist()
     hmm = joint_from_arrays({name: array for name, array in own.items() if name not in SCORE}, CONFIG)
     if set(hmm.inventory.names) != set(PHONES.units):
         raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")

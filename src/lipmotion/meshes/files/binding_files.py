@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.errors import InputError, ModelFormatError, shortened
+from lipmotion.errors import InputError, ModelFormatError, shorten
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, ControlBinding
 from lipmotion.meshes.model.file_limits import MOST_VERTICES
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.storage.files import check_source, read_text_file, whole_file
-from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
+from lipmotion.storage.files import atomic_file, check_source, read_text_file
+from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors
 from lipmotion.storage.text_table import read_table
 from lipmotion.types.values import parse_whole
 
@@ -66,12 +66,12 @@ def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
         if not isinstance(header, dict) or header.get("format") != BINDING_FORMAT:
             raise ModelFormatError(f"{path}: is no binding; bind the character again")
         if header.get("version") != BINDING_VERSION:
-            version = shortened(str(header.get("version")))
+            version = shorten(str(header.get("version")))
             raise ModelFormatError(f"{path}: version {version}, required {BINDING_VERSION}; bind the character again")
         with format_errors(f"{path}: the binding", "bind the character again"):
-            arrays = checked_arrays(read_archive(path), BINDING_ARRAYS)
+            arrays = check_arrays(read_archive(path), BINDING_ARRAYS)
     except UNREADABLE as error:
-        raise ModelFormatError(f"{path}: is no binding ({shortened(str(error))}); bind the character again") from error
+        raise ModelFormatError(f"{path}: is no binding ({shorten(str(error))}); bind the character again") from error
     count = int(arrays["vertex_count"])
     if count != len(mesh.vertices):
         raise InputError(f"{path}: made for {count} vertices, the character has {len(mesh.vertices)}; bind it again")
@@ -91,7 +91,7 @@ def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
 
 def write_weights(path: Path, binding: ControlBinding) -> None:
     """Write the weights as a table ``vertex,point,weight``. Raises ExportError: it cannot be written."""
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(WEIGHT_COLUMNS) + "\n")
         for row, controls, weights in zip(binding.rows, binding.controls, binding.weights, strict=True):
             for control, weight in zip(controls.tolist(), weights.tolist(), strict=True):
@@ -114,13 +114,13 @@ def read_weights(path: Path) -> dict[int, dict[int, float]]:
         try:
             weights[point] = float(row[2])
         except ValueError as error:
-            raise InputError(f"{path}: line {number}: {shortened(row[2])!r} is no number") from error
+            raise InputError(f"{path}: line {number}: {shorten(row[2])!r} is no number") from error
     return paint
 
 
 def write_points(path: Path, placement: LipPlacement) -> None:
     """Write the vertex of each lip and jaw point, ``point,vertex``. Raises ExportError: it cannot be written."""
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(POINT_COLUMNS) + "\n")
         file.writelines(
             f"{point},{vertex}\n" for point, vertex in zip(placement.points, placement.vertices, strict=True)
@@ -149,9 +149,9 @@ def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(columns)}") from error
+        raise InputError(f"{path}: no table ({shorten(str(error))}); required {','.join(columns)}") from error
     if table.plain_names != list(columns):
-        names = shortened(",".join(table.plain_names))
+        names = shorten(",".join(table.plain_names))
         raise InputError(f"{path}: the columns are {names!r}, required {','.join(columns)}")
     for line, row in rows:
         if not row[0].startswith("#"):

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_scene import read_gltf
 from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
@@ -166,7 +166,7 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
                 f"{path}: {len(vertices)} vertices, required {len(mesh.vertices)} as in {neutral[0].name}; "
                 "move other meshes to another folder"
             )
-        shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=smallest))
+        shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, smallest=smallest))
         budget.spend("displacements", len(shapes[-1].rows))
     return replace(mesh, shapes=tuple(shapes))
 
@@ -176,9 +176,7 @@ def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
     text = str(error)
     if text.startswith(str(path)):
         return InputError(text)
-    return InputError(
-        f"{path}: {shortened(text)}{f' in line {number}' if number else ''}; export the mesh as OBJ again"
-    )
+    return InputError(f"{path}: {shorten(text)}{f' in line {number}' if number else ''}; export the mesh as OBJ again")
 
 
 def _lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
@@ -210,7 +208,7 @@ def _index(word: bytes, count: int) -> int:
     number = int(word)
     index = number - 1 if number > 0 else count + number
     if number == 0 or not 0 <= index < count:
-        raise ValueError(f"a polygon names vertex {shortened(_text([word]))} of {count}")
+        raise ValueError(f"a polygon names vertex {shorten(_text([word]))} of {count}")
     return index
 
 

@@ -14,12 +14,12 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_schema import ASSET, COMPONENTS, COMPRESSION, LARGEST_NUMBER, WIDTHS, gltf_schema
 from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
 from lipmotion.meshes.model.bones import bone_kind
 from lipmotion.meshes.model.file_limits import Budget
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import SchemaError
 
@@ -67,14 +67,14 @@ class GltfDocument:
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
             if not head.endswith(";base64"):
-                raise InputError(f"its {kind} is {shortened(head)!r}, required base64; export as .glb")
+                raise InputError(f"its {kind} is {shorten(head)!r}, required base64; export as .glb")
             try:
                 return base64.b64decode(body, validate=True)
             except (binascii.Error, ValueError) as error:
                 raise InputError(f"its {kind} is no base64 ({error}); export as .glb") from error
         name = unquote(uri) if len(uri) <= LONGEST_NAME_CHARACTERS else uri
         if not name or len(name) > LONGEST_NAME_CHARACTERS or Path(name).name != name or "\\" in name or "\0" in name:
-            raise InputError(f"its {kind} is {shortened(repr(name))}, required a file in the same folder")
+            raise InputError(f"its {kind} is {shorten(repr(name))}, required a file in the same folder")
         return self.budget.file_bytes(self.folder / name, kind)
 
 
@@ -93,7 +93,7 @@ def read_gltf_document(path: Path) -> GltfDocument:
     try:
         json: Any = from_json(plain)
     except ValueError as error:
-        raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
+        raise InputError(f"no glTF document ({shorten(str(error))}); give a .glb, .gltf or .vrm file") from error
     try:
         version = ASSET(json)["asset"]["version"]
     except SchemaError as error:
@@ -108,7 +108,7 @@ def read_gltf_document(path: Path) -> GltfDocument:
         if name == "KHR_draco_mesh_compression":
             raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
         if name not in READABLE and not name.startswith("KHR_materials_"):
-            raise InputError(f"it requires the extension {shortened(name)!r}, which is not read; export without it")
+            raise InputError(f"it requires the extension {shorten(name)!r}, which is not read; export without it")
     for number, buffer in enumerate(document.items("buffers")):
         if "uri" in buffer:
             document.buffers[number] = memoryview(document.linked(buffer["uri"], "buffer"))
@@ -151,7 +151,7 @@ def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
     text = as_json(json, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % 4)
     padded = body + b"\0" * (-len(body) % 4)
-    with whole_file(path) as unfinished, unfinished.open("wb") as file:
+    with atomic_file(path) as unfinished, unfinished.open("wb") as file:
         file.write(struct.pack("<4sII", MAGIC, VERSION, 28 + len(text) + len(padded)))
         file.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
         file.write(struct.pack("<II", len(padded), BINARY_CHUNK) + padded)
@@ -256,7 +256,7 @@ def _decode(data: memoryview, packed: dict[str, Any], budget: Budget) -> bytes:
     count, stride, mode, kind = packed["count"], packed["byteStride"], packed["mode"], packed.get("filter", "NONE")
     budget.spend("compressed bytes", count * stride + len(data))
     if kind not in {"NONE", "EXPONENTIAL"}:
-        raise InputError(f"a compressed array under the filter {shortened(kind)!r}, which is not read")
+        raise InputError(f"a compressed array under the filter {shorten(kind)!r}, which is not read")
     if mode == "ATTRIBUTES":
         elements = decode_attributes(bytes(data), count, stride)
         return decode_exponents(elements).tobytes() if kind == "EXPONENTIAL" else elements.tobytes()

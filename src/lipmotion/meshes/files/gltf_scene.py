@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_document import (
     GltfArrays,
     GltfDocument,
@@ -125,11 +125,7 @@ def _warn(what: str) -> None:
 
 
 def _read_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: int) -> Array:
-    """Return the light and the opacity by which those of a material are multiplied, 0 to 1 [shape=(N, 4)].
-
-    number : of the accessor of ``COLOR_0``: three or four numbers, of floats or of bytes or shorts without a sign;
-             whole numbers count as parts of the largest one, also where the file does not say so
-    """
+    """Return the light and the opacity by which those of a material are multiplied, 0 to 1 [shape=(N, 4)]."""
     accessor = document.items("accessors")[number]
     width, kind = WIDTHS[accessor["type"]], np.dtype(COMPONENTS[accessor["componentType"]])
     if width not in {3, 4} or not (kind.kind == "f" or (kind.kind == "u" and kind.itemsize < 4)):
@@ -138,7 +134,7 @@ def _read_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: 
             "floats, unsigned bytes or unsigned shorts; export it again"
         )
     values = arrays.floats(number, width, count)
-    if kind.kind == "u" and not accessor.get("normalized"):
+    if kind.kind == "u" and not accessor.get("normalized"):  # parts of the largest number, also where that is not said
         values = values / np.iinfo(kind).max
     tints = np.ones((count, 4))
     tints[:, :width] = np.clip(values, 0, 1)
@@ -374,7 +370,7 @@ class _SceneSurface:
                 continue
             size = self._arrays.count(target["POSITION"])
             if size != count:
-                raise InputError(f"the target {shortened(name)!r} moves {size} of {count} vertices; export it again")
+                raise InputError(f"the target {shorten(name)!r} moves {size} of {count} vertices; export it again")
             moved = _map_vectors(linear, self._arrays.floats(target["POSITION"], 3))
             rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > MIN_DISPLACEMENT)
             self._budget.spend("displacements", len(rows))
@@ -408,19 +404,15 @@ def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
 
 def name_mesh_targets(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the morph targets of a mesh; some of its primitives may have none."""
-    named = [tuple(name_targets(document, mesh, primitive)) for primitive in mesh.get("primitives", [])]
-    return max(named, key=len, default=())
+    named = [name_targets(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
+    longest: list[str] = max(named, key=len, default=[])
+    return tuple(longest)
 
 
 def _build_expression_shapes(
     document: GltfDocument, targets: Mapping[tuple[int, int], str], shapes: Sequence[Blendshape]
 ) -> Iterator[Blendshape]:
-    """Yield the expressions of a VRM as blendshapes, by the names of VRM 1.0; none for other files.
-
-    targets : the name of each morph target, by mesh and number
-    shapes  : the blendshapes of the targets; names that they have are left out
-    Binds that name no target are left out, as viewers do. Raises InputError: they move too many vertices.
-    """
+    """Yield the expressions of a VRM as blendshapes, by the names of VRM 1.0; none for other files."""
     extensions, expressions = document.parts.get("extensions", {}), dict[str, list[Bind]]()
     for group in extensions.get("VRM", {}).get("blendShapeMaster", {}).get("blendShapeGroups", []):
         preset = plain_name(group.get("presetName", "")).lower()

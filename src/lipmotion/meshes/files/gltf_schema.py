@@ -63,10 +63,19 @@ _VRM = {
 
 def gltf_schema(json: Mapping[str, Any]) -> Schema:
     """Return the schema of one document: its references must be to items that it has."""
-    counts = {name: len(found) for name in _LISTS if isinstance(found := json.get(name), list)}
+    counts = {name: len(listed) for name in _LISTS if isinstance(listed := json.get(name), list)}
 
     def to(name: str) -> Schema:
-        return _reference(name, counts.get(name, 0))
+        count = counts.get(name, 0)
+        exists = whole(0, count - 1)
+
+        def check(value: Any) -> int:
+            try:
+                return int(exists(value))
+            except SchemaError as error:
+                raise SchemaError(error.found, f"the number of one of its {count} {name}") from None
+
+        return check
 
     def vector(size: int) -> Schema:
         return items(_NUMBER, size, size)
@@ -97,6 +106,7 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
         **{**place, "componentType": one_of(COMPONENTS), "count": _SIZE, "type": one_of(WIDTHS), "normalized": truth},
         **{"name": _NAME, "sparse": members(sparse, list(sparse))},
     }
+    webp = members({"source": to("images")}, ["source"])
     lists = {
         "accessors": members(accessor, ["componentType", "count", "type"]),
         "animations": if_fits(members(_animation(to("nodes"), to("accessors")))),
@@ -108,16 +118,9 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
         "nodes": members(node),
         "scenes": members({"nodes": items(to("nodes"))}),
         "skins": members({"joints": items(to("nodes"), 1), "inverseBindMatrices": to("accessors")}, ["joints"]),
-        "textures": members(
-            {
-                "source": to("images"),
-                "extensions": members({"EXT_texture_webp": members({"source": to("images")}, ["source"])}),
-            }
-        ),
+        "textures": members({"source": to("images"), "extensions": members({"EXT_texture_webp": webp})}),
     }
-    table = {
-        name: items(schema, most=ALLOWANCE["nodes"] if name == "nodes" else None) for name, schema in lists.items()
-    }
+    table = {name: items(each, most=ALLOWANCE["nodes"] if name == "nodes" else None) for name, each in lists.items()}
     others = {"scene": to("scenes"), "extensionsRequired": items(_WORD), "extensions": members(_VRM)}
     return members(table | others)
 
@@ -132,18 +135,6 @@ def _animation(node: Schema, accessor: Schema) -> dict[str, Schema]:
         "channels": items(if_fits(channel)),
         "samplers": items(members({"input": accessor, "output": accessor, "interpolation": _WORD})),
     }
-
-
-def _reference(name: str, count: int) -> Schema:
-    exists = whole(0, count - 1)
-
-    def checked(value: Any) -> int:
-        try:
-            return int(exists(value))
-        except SchemaError as error:
-            raise SchemaError(error.found, f"the number of one of its {count} {name}") from None
-
-    return checked
 
 
 def _view(buffer: Schema) -> dict[str, Schema]:

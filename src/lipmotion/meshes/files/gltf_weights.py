@@ -105,7 +105,13 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     ]
     if not animations:
         raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
-    animation, tracks = next((each for each in animations if any(map(_moves_mouth, each[1]))), animations[0])
+
+    def moves_mouth(track: _Track) -> bool:
+        keys = track.keys[:, 1] if track.kind == CUBIC else track.keys
+        mouth = [spoken_name(name) is not None or arkit_name(name) in ARKIT_MOUTH for name in track.names]
+        return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
+
+    animation, tracks = next((each for each in animations if any(map(moves_mouth, each[1]))), animations[0])
     if len(animations) > 1:
         named = [plain_name(each.get("name", "")) or "without a name" for each, _ in animations]
         which = [each is animation for each, _ in animations].index(True)
@@ -118,12 +124,6 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
     return _merge_tracks(document, tracks, ordered), Timeline(())
-
-
-def _moves_mouth(track: _Track) -> bool:
-    keys = track.keys[:, 1] if track.kind == CUBIC else track.keys
-    mouth = [spoken_name(name) is not None or arkit_name(name) in ARKIT_MOUTH for name in track.names]
-    return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
 
 
 def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
@@ -151,20 +151,16 @@ def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[i
 
 
 def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:
-    """Return how the head is turned against its rest pose, in the axes of the scene, as quaternions [shape=(T, 4)].
-
-    turns : of the neck and the head, in this order, by the numbers of their nodes
-    Raises InputError: a rotation is none.
-    """
+    """Return how the head is turned against its rest pose, in the axes of the scene, as quaternions [shape=(T, 4)]."""
     from scipy.spatial.transform import Rotation
 
     placed, turned = place_nodes(document), Rotation.identity()
     try:
         for number, track in turns.items():
             if number in placed:
-                own = Rotation.from_quat(document.items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
+                local = Rotation.from_quat(document.items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
                 at_rest = Rotation.from_matrix(placed[number].matrix[:3, :3])
-                turned = turned * (at_rest * own.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
+                turned = turned * (at_rest * local.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
     except ValueError as error:  # a quaternion of zeros, a bone without size
         raise InputError(f"a rotation of the head is none ({error}); export the animation again") from error
     return np.asarray(np.broadcast_to(turned.as_quat(), (len(time_s), 4)))
@@ -180,10 +176,7 @@ def _rate(time_s: Array) -> float:
 
 
 def _targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tuple[int, str, dict[str, Any]]]:
-    """Yield the node, the path and the sampler of every channel of an animation that has keys.
-
-    What ``KHR_animation_pointer`` names is the same; ``weights/3`` is one of the weights.
-    """
+    """Yield the node, the path and the sampler of every channel of an animation that has keys."""
     samplers = animation.get("samplers", [])
     for channel in animation.get("channels", []):
         target, number = channel.get("target", {}), channel.get("sampler", -1)

@@ -92,12 +92,6 @@ class GltfBuffer:
         self.accessors.append(accessor)
         return len(self.accessors) - 1
 
-    def add_bytes(self, values: NDArray[np.uint8], kind: str, *, target: int) -> int:
-        """Add an array of small whole numbers [shape=(N, 4)] and return the number of its accessor."""
-        number = self.add(np.ascontiguousarray(values).view("<u4").reshape(-1), kind, target=target)
-        self.accessors[number] |= {"componentType": UNSIGNED_BYTE, "count": len(values)}
-        return number
-
     def add_few(self, values: NDArray[np.float64]) -> int:
         """Add displacements [shape=(N, 3)], most of them 0, as a sparse array; return the number of its accessor."""
         rows = np.flatnonzero(values.any(axis=1))
@@ -189,10 +183,9 @@ def _add_primitive(
         weights[:, 1] = share.astype("<f4")
         weights[:, 0] = 1 - weights[:, 1]
         joints[weights == 0] = 0
-        attributes |= {
-            "JOINTS_0": buffer.add_bytes(joints, "VEC4", target=VERTICES),
-            "WEIGHTS_0": buffer.add(weights, "VEC4", target=VERTICES),
-        }
+        number = buffer.add(joints.view("<u4").reshape(-1), "VEC4", target=VERTICES)  # four bytes each
+        buffer.accessors[number] |= {"componentType": UNSIGNED_BYTE, "count": len(joints)}
+        attributes |= {"JOINTS_0": number, "WEIGHTS_0": buffer.add(weights, "VEC4", target=VERTICES)}
     moved = np.zeros((len(mesh.vertices), 3))
     targets = []
     for shape, (turned, change) in zip(shapes, normals.turned, strict=False):

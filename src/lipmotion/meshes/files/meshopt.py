@@ -67,10 +67,10 @@ def _unpack(data: bytes, position: int, end: int, count: int) -> tuple[Bytes, in
             values[group] = np.frombuffer(packed, np.uint8)
         elif mode:
             bits = 2 * mode
-            whole = int.from_bytes(data[position : position + 2 * bits], "big")
+            packed_bits = int.from_bytes(data[position : position + 2 * bits], "big")
             position += 2 * bits
             escape = (1 << bits) - 1  # stands for a whole byte, which follows
-            row = [whole >> (bits * place) & escape for place in range(GROUP - 1, -1, -1)]
+            row = [packed_bits >> (bits * place) & escape for place in range(GROUP - 1, -1, -1)]
             for place, value in enumerate(row):
                 if value == escape:
                     if position >= end:
@@ -85,9 +85,9 @@ def _unpack(data: bytes, position: int, end: int, count: int) -> tuple[Bytes, in
 
 def decode_exponents(elements: Bytes) -> NDArray[np.float32]:
     """Return the numbers of elements under the filter EXPONENTIAL: 24 bits of mantissa and 8 of exponent."""
-    whole = np.ascontiguousarray(elements).view("<i4")
-    exponents = whole >> 24
-    mantissas = (whole << 8) >> 8
+    words = np.ascontiguousarray(elements).view("<i4")
+    exponents = words >> 24
+    mantissas = (words << 8) >> 8
     with np.errstate(over="ignore"):
         return np.ldexp(mantissas.astype(np.float32), exponents)
 
@@ -124,10 +124,10 @@ class _Reader:
     def varint(self) -> int:
         value = shift = 0
         for _ in range(5):
-            part = self.byte()
-            value |= (part & 127) << shift
+            byte = self.byte()
+            value |= (byte & 127) << shift
             shift += 7
-            if part < 128:
+            if byte < 128:
                 return value
         raise InputError(_DAMAGED)
 
@@ -158,14 +158,14 @@ class _Triangles:
         self.next += 1
         return self.next - 1
 
-    def on_edge(self, code: int, most: int) -> tuple[int, int, int]:
+    def on_edge(self, code: int, cached_codes: int) -> tuple[int, int, int]:
         """Return the triangle of a new vertex and an edge that another triangle had."""
         a, b = self.edges[(self.edge_count - 1 - (code >> 4)) % FIFO]
         which = code & 15
         if which == 0:
             c = self.fresh()
             self.push_vertex(c)
-        elif which < most:
+        elif which < cached_codes:
             c = self.vertices[(self.vertex_count - 1 - which) % FIFO]
         else:
             if which == 15:
@@ -211,14 +211,14 @@ def decode_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
     Raises InputError: another version, or data that is too short.
     """
     _check_header(data, TRIANGLES, (0, 1))
-    most = 13 if data[0] & 15 else 15
+    cached_codes = 13 if data[0] & 15 else 15
     end = len(data) - TRIANGLE_TAIL
     if count % 3 or 1 + count // 3 > end:
         raise InputError(_DAMAGED)
     state = _Triangles(data[end:], _Reader(data, 1 + count // 3, end))
     result = np.empty((count // 3, 3), np.uint32)
     for number, code in enumerate(data[1 : 1 + count // 3]):
-        result[number] = state.on_edge(code, most) if code < 0xF0 else state.apart(code)
+        result[number] = state.on_edge(code, cached_codes) if code < 0xF0 else state.apart(code)
     return result.reshape(-1)
 
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_52, CLOSED, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.files import atomic_file, read_text_file
 from lipmotion.storage.sources import is_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
 from lipmotion.types import Channel, Motion
@@ -64,10 +64,10 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
+        raise InputError(f"{path}: no table ({shorten(str(error))}); required {','.join(COLUMNS)}") from error
     names = table.plain_names
     if names[:2] != list(COLUMNS[:2]) or not set(names) <= set(COLUMNS):
-        raise InputError(f"{path}: the columns are {shortened(','.join(names))!r}, required {','.join(COLUMNS)}")
+        raise InputError(f"{path}: the columns are {shorten(','.join(names))!r}, required {','.join(COLUMNS)}")
     rows = []
     for line, fields in lines:
         texts = dict.fromkeys(COLUMNS, "") | dict(zip(names, map(from_field, map(str.strip, fields)), strict=False))
@@ -86,7 +86,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
                 )
             rows.append(RigRow(texts["control"], texts["source"], **numbers))
         except ValueError as error:
-            raise InputError(f"{path}: line {line}: {shortened(str(error))}") from error
+            raise InputError(f"{path}: line {line}: {shorten(str(error))}") from error
     if not rows or len(rows) > MAX_CONTROLS:
         raise InputError(f"{path}: {len(rows)} rows, required 1 to {MAX_CONTROLS}")
     return tuple(rows)
@@ -94,7 +94,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
 
 def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
     """Write a table, which ``read_rig_table`` reads. Raises ExportError: it cannot be written."""
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
         for row in rows:
@@ -109,7 +109,7 @@ def suggest_names(name: str, names: Iterable[str]) -> str:
     known = list(dict.fromkeys(names))
     by_lower = {each.lower(): each for each in reversed(known)}
     near = [by_lower[each] for each in get_close_matches(name.lower(), by_lower, 3)]
-    return f"nearest: {', '.join(near)}" if near else f"there are {shortened(', '.join(known)) or 'none'}"
+    return f"nearest: {', '.join(near)}" if near else f"there are {shorten(', '.join(known)) or 'none'}"
 
 
 def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
@@ -123,7 +123,7 @@ def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]]
     for row in rows:
         if row.source and row.source not in sources:
             raise InputError(
-                f"the control {shortened(row.control)!r} follows {shortened(row.source)!r}, which is no curve; "
+                f"the control {shorten(row.control)!r} follows {shorten(row.source)!r}, which is no curve; "
                 f"{suggest_names(row.source, sources)}"
             )
         value = row.gain * sources[row.source] if row.source else np.zeros(len(next(iter(sources.values()))))
@@ -158,7 +158,7 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
         return {}
     table: dict[str, RigRow] = {}
     for row in read_rig_table(path):
-        control, source = shortened(row.control), shortened(row.source)
+        control, source = shorten(row.control), shorten(row.source)
         if row.control not in mesh.shape_names:
             near = suggest_names(row.control, mesh.shape_names)
             raise InputError(f"{path}: there is no blendshape {control!r}; {near}")

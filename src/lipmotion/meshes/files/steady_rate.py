@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.shape_names import arkit_name, is_known
 from lipmotion.motion.rest import find_runs
 from lipmotion.types import WEIGHT, Channel, Motion
@@ -155,7 +155,7 @@ def resample_rows(
         raise InputError("0 rows with values, required two or more")
     if not measured.all():
         empty = ", ".join(name for name, there in zip(names, measured, strict=True) if not there)
-        LOG.warning("columns without any number are left out: %s", shortened(empty))
+        LOG.warning("columns without any number are left out: %s", shorten(empty))
     names = [name for name, there in zip(names, measured, strict=True) if there]
     values = values[:, measured]
     channels = [_channel(name, unit) for name in names]

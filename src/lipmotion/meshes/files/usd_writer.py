@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError, shortened
+from lipmotion.errors import ExportError, shorten
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
 from lipmotion.meshes.model.scene import Scene, ShadingNormals, compute_shading_normals
 from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion.printable import is_line
-from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.files import as_text, atomic_file
 
 INDENT = "    "
 _CONTROL = re.compile("[\x00-\x1f\x7f]")
@@ -62,11 +62,11 @@ def prim_names(names: Iterable[str]) -> list[str]:
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name) or "part"
         plain = f"_{plain}" if plain[0].isdigit() else plain
-        number, found = 1, plain
-        while found in taken:
+        number, unused = 1, plain
+        while unused in taken:
             number += 1
-            found = f"{plain}_{number}"
-        taken[found] = None
+            unused = f"{plain}_{number}"
+        taken[unused] = None
     return list(taken)
 
 
@@ -77,7 +77,7 @@ def tokens(names: Iterable[str]) -> str:
     ["a\\"b", "c\\x0ad"]
     """
     escaped = (as_text(name).replace("\\", "\\\\").replace('"', '\\"') for name in names)
-    plain = (_CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", name) for name in escaped)
+    plain = (_CONTROL.sub(lambda match: f"\\x{ord(match[0]):02x}", name) for name in escaped)
     return "[" + ", ".join(f'"{name}"' for name in plain) + "]"
 
 
@@ -90,7 +90,7 @@ def asset(path: str) -> str:
     ('@./welcome.flac@', '@@@../a@b.wav@@@', '@@@./a\\\\@@@b.wav@@@')
     """
     if not is_line(path):
-        raise ExportError(f"the name {shortened(path)!r} has a character that .usda cannot refer to; rename the file")
+        raise ExportError(f"the name {shorten(path)!r} has a character that .usda cannot refer to; rename the file")
     mark = "@@@" if "@" in path else "@"
     absolute = path.startswith(("/", "../")) or ":" in path
     return mark + ("" if absolute else "./") + path.replace("@@@", "\\@@@") + mark
@@ -135,42 +135,39 @@ def write_usda(path: Path, scene: Scene) -> None:
     """
     normals = compute_shading_normals(scene.mesh, split=scene.split)
     rate, last, bound = f"{_codes_hz(scene):.9g}", f"{_last_code(scene):.9g}", ("SkelBindingAPI",)
+    places = [np.eye(4), np.eye(4)][: len(_joints(scene))]
+    if scene.turn is not None:
+        places[1][3, :3] = scene.turn.pivot
+    matrices = ", ".join(map(_matrix, places))
+    skeleton = [
+        f"uniform matrix4d[] bindTransforms = [{matrices}]",
+        f"uniform token[] joints = {tokens(_joints(scene))}",
+        f"uniform matrix4d[] restTransforms = [{matrices}]",
+        f"rel skel:animationSource = <{ANIMATION}>",
+    ]
+    sound = [
+        'uniform token auralMode = "nonSpatial"',
+        f"uniform timecode endTime = {last}",
+        f"uniform asset filePath = {asset(scene.sound)}" if scene.sound else "",
+        *([f"uniform double mediaOffset = {-scene.sound_s:.9g}"] if scene.sound_s < 0 else []),
+        'uniform token playbackMode = "onceFromStart"',
+        f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _codes_hz(scene):.9g}",
+    ]
     character = chain(  # line by line: a long motion takes no memory for its text
-        prim("Skeleton", "Skeleton", _list_skeleton(scene), schemas=bound),
+        prim("Skeleton", "Skeleton", skeleton, schemas=bound),
         prim("SkelAnimation", "Animation", _list_animation(scene)),
         prim("Mesh", "Face", _list_mesh(scene, normals), schemas=(*bound, "MaterialBindingAPI")),
         prim("Scope", "Looks", _list_looks(scene.mesh)),
-        prim("SpatialAudio", "Sound", _list_sound(scene)) if scene.sound else (),
+        prim("SpatialAudio", "Sound", sound) if scene.sound else (),
     )
     head = [
         *("#usda 1.0", "(", f'    defaultPrim = "{ROOT}"', '    doc = "Written by lipmotion"'),
         *(f"    endTimeCode = {last}", f"    framesPerSecond = {rate}", f"    metersPerUnit = {scene.metres:.9g}"),
         *("    startTimeCode = 0", f"    timeCodesPerSecond = {rate}", '    upAxis = "Y"', ")", ""),
     ]
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
+    with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
         root = prim("SkelRoot", ROOT, character, schemas=bound, kind="component")
         file.writelines(line + "\n" for line in chain(head, root))
-
-
-def _list_sound(scene: Scene) -> Iterator[str]:
-    yield 'uniform token auralMode = "nonSpatial"'
-    yield f"uniform timecode endTime = {_last_code(scene):.9g}"
-    yield f"uniform asset filePath = {asset(scene.sound)}"
-    if scene.sound_s < 0:
-        yield f"uniform double mediaOffset = {-scene.sound_s:.9g}"
-    yield 'uniform token playbackMode = "onceFromStart"'
-    yield f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _codes_hz(scene):.9g}"
-
-
-def _list_skeleton(scene: Scene) -> Iterator[str]:
-    places = [np.eye(4), np.eye(4)][: len(_joints(scene))]
-    if scene.turn is not None:
-        places[1][3, :3] = scene.turn.pivot
-    matrices = ", ".join(map(_matrix, places))
-    yield f"uniform matrix4d[] bindTransforms = [{matrices}]"
-    yield f"uniform token[] joints = {tokens(_joints(scene))}"
-    yield f"uniform matrix4d[] restTransforms = [{matrices}]"
-    yield f"rel skel:animationSource = <{ANIMATION}>"
 
 
 def _list_animation(scene: Scene) -> Iterator[str]:
@@ -213,7 +210,13 @@ def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
     yield f"point3f[] points = {_numbers(mesh.vertices)}"
     if mesh.colours is not None:
         yield f"color3f[] primvars:displayColor = {_numbers(decode_srgb(mesh.colours))} ({PER_VERTEX})"
-    yield from _list_binding(scene)
+    count, joints = len(mesh.vertices), len(_joints(scene))
+    share = np.zeros(count) if scene.turn is None else scene.turn.share
+    weights = np.stack([1 - share, share], axis=1)[:, :joints]
+    hints = f"(elementSize = {joints}\n            {PER_VERTEX})"
+    yield f"matrix4d primvars:skel:geomBindTransform = {_matrix(np.eye(4))}"
+    yield f"int[] primvars:skel:jointIndices = {_whole(np.tile(np.arange(joints), count))} {hints}"
+    yield f"float[] primvars:skel:jointWeights = {_numbers(weights.reshape(-1))} {hints}"
     if names:
         yield f"uniform token[] skel:blendShapes = {tokens(mesh.shape_names)}"
         yield f"rel skel:blendShapeTargets = [{', '.join(f'<{FACE}/{name}>' for name in names)}]"
@@ -236,38 +239,26 @@ def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
         yield from prim("GeomSubset", f"{name}_faces", subset, schemas=("MaterialBindingAPI",))
 
 
-def _list_binding(scene: Scene) -> Iterator[str]:
-    """Yield which joints the vertices follow."""
-    count, joints = len(scene.mesh.vertices), len(_joints(scene))
-    share = np.zeros(count) if scene.turn is None else scene.turn.share
-    weights = np.stack([1 - share, share], axis=1)[:, :joints]
-    hints = f"(elementSize = {joints}\n            {PER_VERTEX})"
-    yield f"matrix4d primvars:skel:geomBindTransform = {_matrix(np.eye(4))}"
-    yield f"int[] primvars:skel:jointIndices = {_whole(np.tile(np.arange(joints), count))} {hints}"
-    yield f"float[] primvars:skel:jointWeights = {_numbers(weights.reshape(-1))} {hints}"
-
-
 def _list_looks(mesh: Mesh) -> Iterator[str]:
+    """Yield the materials: of one colour each, or of the colours of the vertices."""
     for name, part in _parts(mesh):
-        yield from prim("Material", name, _list_material(f"{LOOKS}/{name}", part, painted=mesh.colours is not None))
-
-
-def _list_material(place: str, part: MeshPart, *, painted: bool) -> Iterator[str]:
-    """Yield a material: of one colour, or of the colours of the vertices."""
-    material = part.material
-    colour = f".connect = <{place}/Colour.outputs:result>" if painted else f" = {_tuple(decode_srgb(material.colour))}"
-    surface = [
-        'uniform token info:id = "UsdPreviewSurface"',
-        f"color3f inputs:diffuseColor{colour}",
-        f"float inputs:opacity = {material.opacity:.6g}",
-        f"float inputs:roughness = {1 - material.gloss:.6g}",
-        "token outputs:surface",
-    ]
-    yield f"token outputs:surface.connect = <{place}/Surface.outputs:surface>"
-    yield from prim("Shader", "Surface", surface)
-    if painted:
+        place, painted = f"{LOOKS}/{name}", mesh.colours is not None
+        colour = f" = {_tuple(decode_srgb(part.material.colour))}"
+        colour = f".connect = <{place}/Colour.outputs:result>" if painted else colour
+        surface = [
+            'uniform token info:id = "UsdPreviewSurface"',
+            f"color3f inputs:diffuseColor{colour}",
+            f"float inputs:opacity = {part.material.opacity:.6g}",
+            f"float inputs:roughness = {1 - part.material.gloss:.6g}",
+            "token outputs:surface",
+        ]
         reader = ['uniform token info:id = "UsdPrimvarReader_float3"', 'string inputs:varname = "displayColor"']
-        yield from prim("Shader", "Colour", [*reader, "float3 outputs:result"])
+        shaders = [
+            f"token outputs:surface.connect = <{place}/Surface.outputs:surface>",
+            *prim("Shader", "Surface", surface),
+            *(prim("Shader", "Colour", [*reader, "float3 outputs:result"]) if painted else ()),
+        ]
+        yield from prim("Material", name, shaders)
 
 
 def _codes_hz(scene: Scene) -> float:

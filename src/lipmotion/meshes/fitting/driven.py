@@ -78,19 +78,21 @@ def _solve_with_table(
     parting = np.zeros(len(shapes.names))
     for row, parts in zip(rows, parted.tolist(), strict=True):
         parting[shapes.names.index(row.source)] += row.gain * parts
-    scaled, own = replace(shapes, gap=parting), dict[str, Array]()
+    scaled, stated = replace(shapes, gap=parting), dict[str, Array]()
     for row in rows:
-        if row.control in motion.names and row.gain and row.source not in own:
-            own[row.source] = (motion[row.control].astype(np.float64) - row.offset) / row.gain
-    if own:
-        kept = [name for name in motion.names if name not in {*own, *(row.control for row in rows)}]
-        values = np.stack([*(motion[name] for name in kept), *own.values()], axis=1)
-        channels = [motion.channels[motion.column(name)] for name in kept] + [Channel(name, WEIGHT) for name in own]
+        if row.control in motion.names and row.gain and row.source not in stated:
+            stated[row.source] = (motion[row.control].astype(np.float64) - row.offset) / row.gain
+    if stated:
+        others = [name for name in motion.names if name not in {*stated, *(row.control for row in rows)}]
+        values = np.stack([*(motion[name] for name in others), *stated.values()], axis=1)
+        channels = [motion.channels[motion.column(name)] for name in others] + [
+            Channel(name, WEIGHT) for name in stated
+        ]
         solved = solve_shape_weights(Motion(values, motion.rate_hz, tuple(channels)), units, scaled)
     else:
         solved = solve_shape_weights(motion, units, shapes)
     weights, gains = solved.values.astype(np.float64), [row.gain for row in rows]
-    if not own and set(gains) != {1}:
+    if not stated and set(gains) != {1}:
         before, after = weights @ shapes.gap, weights @ parting
         share = np.clip(after / np.maximum(before, 1e-9), min(gains), max(gains))
         # Closed after the gains where they closed the lips before.
@@ -201,11 +203,11 @@ class DrivenCharacter:
         moods = expression_weights(read_moods(motion)) if self._expressions else {}
         upper, lower = (self.placement.vertices[self.placement.row(point)] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
         curves = {}
-        for name, own in self._expressions.items():
+        for name, shape in self._expressions.items():
             if name in moods:
-                curve = self.table.get(own, plain_row(own, name)).alone(moods[name])
-                moved = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (own,)))[0]
-                curves[own] = curve * mouth.free if moved[0, 1] - moved[1, 1] > LEAST_GAP / 2 else curve
+                curve = self.table.get(shape, plain_row(shape, name)).alone(moods[name])
+                moved = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (shape,)))[0]
+                curves[shape] = curve * mouth.free if moved[0, 1] - moved[1, 1] > LEAST_GAP / 2 else curve
         return curves
 
     @cached_property
@@ -213,8 +215,8 @@ class DrivenCharacter:
         """The mesh's names of VRM's expressions, by VRM's; none where it has ARKit's blendshapes of brows."""
         if {"browDownLeft", "browInnerUp", "browDownRight"} & {row.source for row in self._other_rows}:
             return {}
-        own = {shape.called.lower(): shape.name for shape in self.mesh.shapes if len(shape.rows)}
-        return {name: own[name] for name in VRM_EMOTIONS if name in own}
+        by_name = {shape.called.lower(): shape.name for shape in self.mesh.shapes if len(shape.rows)}
+        return {name: by_name[name] for name in VRM_EMOTIONS if name in by_name}
 
     def vertices(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
@@ -296,10 +298,10 @@ class DrivenCharacter:
     def _other_rows(self) -> tuple[RigRow, ...]:
         """What moves ARKit's blendshapes of eyes and brows, in ARKit's order."""
         numbers = numbers_by_name(self.mesh, arkit_name)
-        found = [(known, self.mesh.shapes[number]) for known in ARKIT_OTHERS for number in numbers.get(known, ())]
+        pairs = [(known, self.mesh.shapes[number]) for known in ARKIT_OTHERS for number in numbers.get(known, ())]
         return tuple(
             replace(self.table.get(shape.name, plain_row(shape.name, known)), source=known)
-            for known, shape in found
+            for known, shape in pairs
             if len(shape.rows)
         )
 

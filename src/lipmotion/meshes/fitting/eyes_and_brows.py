@@ -59,44 +59,44 @@ def find_movements(motion: Motion, time_s: Array) -> dict[str, Array]:
     Blendshapes have ARKit's names, 0 to 1; angles of the head those of ``ANGLES``, in radians. Groups that never move
     are left out: exporters write curves that nothing was captured for as 0.
     """
-    found = {name: curve for name, curve in arkit_weights(motion).items() if name in (*ARKIT_OTHERS, *CORNERS)}
-    found |= {name: motion[name].astype(np.float64) for name in ANGLES if name in motion.names}
+    curves = {name: curve for name, curve in arkit_weights(motion).items() if name in (*ARKIT_OTHERS, *CORNERS)}
+    curves |= {name: motion[name].astype(np.float64) for name in ANGLES if name in motion.names}
     for group in GROUPS:
-        if any(found[name].any() for name in group if name in found):
-            found |= {name: np.zeros(len(motion.values)) for name in group if name not in found}
+        if any(curves[name].any() for name in group if name in curves):
+            curves |= {name: np.zeros(len(motion.values)) for name in group if name not in curves}
         else:
-            found = {name: curve for name, curve in found.items() if name not in group}
-    return {name: np.interp(time_s, motion.time_s, curve) for name, curve in found.items()}
+            curves = {name: curve for name, curve in curves.items() if name not in group}
+    return {name: np.interp(time_s, motion.time_s, curve) for name, curve in curves.items()}
 
 
-def moves_by_itself(part: str, given: Mapping[str, Array]) -> bool:
+def moves_by_itself(part: str, curves: Mapping[str, Array]) -> bool:
     """Return whether a face moves a part of ``MOVED_BY`` by itself, beside given movements."""
-    return not {*MOVED_BY[part]} & {*given}
+    return not {*MOVED_BY[part]} & {*curves}
 
 
-def with_movements(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
+def with_movements(moved: Liveliness, curves: Mapping[str, Array]) -> Liveliness:
     """Return movements of moods, and of what a face moves by itself, with those that are given.
 
     Faces that move both sides alike show the mean of both.
     """
-    if not given:
+    if not curves:
         return moved
     none = np.zeros(len(moved.lids))
 
     def of_both(name: str) -> Array:
-        return (given.get(f"{name}Left", none) + given.get(f"{name}Right", none)) / 2
+        return (curves.get(f"{name}Left", none) + curves.get(f"{name}Right", none)) / 2
 
-    inner, outer = given.get("browInnerUp", none), of_both("browOuterUp")
+    inner, outer = curves.get("browInnerUp", none), of_both("browOuterUp")
     raised = np.minimum(inner, outer / OUTER_BROW_SHARE)
     units = {1: inner - raised, 2: outer - OUTER_BROW_SHARE * raised}
     units |= {unit: of_both(name) for unit, name in GIVEN_UNITS.items()}
     units[12] = (of_both("mouthSmile") - SPOKEN_SMILE) / (FULL_SMILE - SPOKEN_SMILE)
     turn, gaze = moved.turn, moved.gaze
-    if not moves_by_itself("head", given):
-        turn = np.stack([given.get(name, none) for name in ANGLES], axis=1)
+    if not moves_by_itself("head", curves):
+        turn = np.stack([curves.get(name, none) for name in ANGLES], axis=1)
         gaze = gaze - np.clip(GAZE_COUNTER_SHARE * turn[:, :2], -LARGEST_COUNTER_RAD, LARGEST_COUNTER_RAD)
-    if not moves_by_itself("gaze", given):
-        gaze = weights_to_gaze(given)
+    if not moves_by_itself("gaze", curves):
+        gaze = weights_to_gaze(curves)
     of_mood = eye_and_brow_weights(moved)
     added = {unit: np.clip(moved.unit(unit) + units.get(unit, 0), 0, 1) for unit in {*moved.units, *units}}
     return replace(
@@ -108,18 +108,18 @@ def with_movements(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
         units={unit: curve for unit, curve in added.items() if unit in moved.units or curve.any()},
         given={
             name: curve if name.startswith("eyeLook") else np.clip(of_mood.get(name, 0) + curve, 0, 1)
-            for name, curve in given.items()
+            for name, curve in curves.items()
             if name in ARKIT_OTHERS
         },
     )
 
 
-def weights_to_gaze(given: Mapping[str, Array]) -> Array:
+def weights_to_gaze(weights: Mapping[str, Array]) -> Array:
     """Return where both eyes look in the mean, to the character's left and upwards, in radians [shape=(F, 2)].
 
-    given : the weights of ARKit's blendshapes that turn the eyes, all of them [each shape=(F,)]
+    weights : the weights of ARKit's blendshapes that turn the eyes, all of them [each shape=(F,)]
     """
-    looks = {name: given[f"eyeLook{name}"] for name in LOOKS}
+    looks = {name: weights[f"eyeLook{name}"] for name in LOOKS}
     across = looks["OutLeft"] - looks["InLeft"] + looks["InRight"] - looks["OutRight"]
     upwards = looks["UpLeft"] - looks["DownLeft"] + looks["UpRight"] - looks["DownRight"]
     return FULL_LOOK_RAD / 2 * np.stack([across, upwards], axis=1)
@@ -188,6 +188,6 @@ def stage_liveliness(
     motion, units, prosody : as of ``articulation.liveliness``; blinks, gaze, brows and angles of the head that the
                              motion itself has take the place of what would move on its own
     """
-    chosen, given = staging or Staging(), find_movements(motion, time_s)
-    moving = {part: getattr(chosen, part) and moves_by_itself(part, given) for part in MOVED_BY}
-    return with_movements(compute_liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving), given)
+    chosen, curves = staging or Staging(), find_movements(motion, time_s)
+    moving = {part: getattr(chosen, part) and moves_by_itself(part, curves) for part in MOVED_BY}
+    return with_movements(compute_liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving), curves)

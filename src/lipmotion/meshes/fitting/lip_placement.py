@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE, mouth_template
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import arkit_name, viseme_name, vowel_name
 from lipmotion.meshes.model.surface import MeshSurface, build_surface
@@ -89,7 +89,7 @@ def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     middle = _find_slit(mesh.vertices, surface, drop, skin)
     if len(middle) < 3:
         raise InputError(
-            f"the blendshape {shortened(shape.name)!r} parts no lips; name the lip points by their vertices "
+            f"the blendshape {shorten(shape.name)!r} parts no lips; name the lip points by their vertices "
             "(docs/meshes.md)"
         )
     template = mouth_template()
@@ -180,7 +180,7 @@ def find_opening_shape(mesh: Mesh) -> Blendshape:
         shape = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.called)), None)
         if shape is not None:
             return shape
-    names = shortened(", ".join(mesh.shape_names)) or "none"
+    names = shorten(", ".join(mesh.shape_names)) or "none"
     raise InputError(
         f"no blendshape opens the mouth, required jawOpen, viseme_aa or aa; the mesh has: {names}. Say which one "
         "does in a table beside the character, or name the lip points by their vertices (docs/meshes.md)"

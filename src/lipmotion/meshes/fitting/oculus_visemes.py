@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.crossfade import crossfade_phones
 from lipmotion.articulation.mouth import SpokenMouth
-from lipmotion.articulation.pauses import share_short_pauses
+from lipmotion.articulation.phone_targets import crossfade_phones
+from lipmotion.articulation.rest import share_short_pauses
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 

@@ -80,11 +80,7 @@ def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
 
 
 def _part_lips(heights: Array, across: Array, gap: Array) -> Array:
-    """Return how the points of both lips move up or down for a gap between their middles [shape=(T, 52)].
-
-    heights : displacements of all points [shape=(T, 52)];  across : where they are, -1 to 1 [shape=(52,)]
-    The opening keeps its shape from corner to corner; where there is none, it is half an ellipse.
-    """
+    """Return how the points of both lips move up or down for a gap between their middles [shape=(T, 52)]."""
     template = mouth_template()
     pairs = np.array([(template.row(upper), template.row(lower)) for upper, lower in FACING])
     pairs = pairs[np.argsort(across[pairs[:, 0]], kind="stable")]

@@ -110,9 +110,9 @@ def solve_shape_weights(
     options = options or SolverOptions()
     points = move_points(motion, units)
     mouth, channels = points.mouth, tuple(Channel(name, WEIGHT) for name in shapes.names)
-    own, mood = find_own_weights(motion, shapes), mood_weights(mouth, shapes)
-    if own is not None:
-        weights = _close_own_weights(own.values.astype(np.float64), with_mouth(motion), mouth, shapes, mood)
+    own_weights, mood = find_own_weights(motion, shapes), mood_weights(mouth, shapes)
+    if own_weights is not None:
+        weights = _close_own_weights(own_weights.values.astype(np.float64), with_mouth(motion), mouth, shapes, mood)
         return Motion(weights, motion.rate_hz, channels)
     matrix = _weigh_rows(shapes.moved, shapes.gap)
     if shapes.style == "visemes":
@@ -282,12 +282,7 @@ def expression_weights(moods: Mapping[str, Array]) -> dict[str, Array]:
 def _close_own_weights(
     weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes, mood: Array | None
 ) -> Array:
-    """Return weights that a motion has with the lips of the mesh in contact where the mouth's are [shape=(T, S)].
-
-    motion : with the channels of ``with_mouth``
-    mood   : weights that a mood adds [shape=(T, S)], by which the lips are no further apart than it parts them
-    Frames in which the lips of the mesh touch as they should, and that no closure is near, stay as they are.
-    """
+    """Return weights that a motion has with the lips of the mesh in contact where the mouth's are [shape=(T, S)]."""
     gap, motion_gap = weights @ shapes.gap, read_gap(motion)
     share = np.clip(mouth.gap / np.maximum(motion_gap, 1e-9), 0, 1)
     wanted = np.where(motion_gap > LEAST_GAP, share * gap, gap)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, FACING
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, spoken_name
@@ -86,7 +86,7 @@ def find_face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > MIN_DISPLACEMENT
     shapes, style = _choose_mouth(mesh, strong)
     if not shapes:
-        there = shortened(", ".join(mesh.shape_names)) or "none"
+        there = shorten(", ".join(mesh.shape_names)) or "none"
         raise InputError(f"no blendshape moves the mouth; the mesh has {there}. Drive it by control points")
     if len(shapes) > MAX_SHAPES:
         raise InputError(
@@ -153,8 +153,8 @@ def _choose_mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str
         }
         if len(those) >= enough:
             return list(those.items()), "visemes"
-    own = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
-    named = {number for _, numbers in own for number in numbers}
+    moving = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
+    named = {number for _, numbers in moving for number in numbers}
     others = [number for number in np.flatnonzero(strong).tolist() if mesh.shapes[number].called]
-    own += [("", [number]) for number in others if number not in named]
-    return sorted(own, key=lambda each: each[1]), "own"
+    moving += [("", [number]) for number in others if number not in named]
+    return sorted(moving, key=lambda each: each[1]), "own"

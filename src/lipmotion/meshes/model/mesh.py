@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.bones import Bone
 from lipmotion.meshes.model.textures import Texture
 
@@ -91,14 +91,14 @@ class Blendshape:
 
     @classmethod
     def between(
-        cls, name: str, neutral: NDArray[np.float64], shape: NDArray[np.float64], *, least: float = 0.0
+        cls, name: str, neutral: NDArray[np.float64], shape: NDArray[np.float64], *, smallest: float = 0.0
     ) -> Blendshape:
         """Return the blendshape that moves the vertices ``neutral`` to ``shape`` [shape=(V, 3), both].
 
-        least : vertices that move no further than this, in the unit of the mesh, are left where they are
+        smallest : vertices that move no further than this, in the unit of the mesh, are left where they are
         """
         moved = shape - neutral
-        rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > least)
+        rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > smallest)
         return cls(name, rows, moved[rows])
 
 
@@ -147,17 +147,15 @@ class Mesh:
         if [part.first for part in self.parts] != edges[:-1] or edges[-1] != len(self.triangles):
             raise InputError(f"the parts of the mesh end at {edges[1:]}, required ranges of {len(self.triangles)}")
         for shape in self.shapes:
-            _check_places(f"the blendshape {shortened(shape.name)!r}", shape.displacements)
-            _check_rows(f"the blendshape {shortened(shape.name)!r}", shape.rows, len(self.vertices))
+            _check_places(f"the blendshape {shorten(shape.name)!r}", shape.displacements)
+            _check_rows(f"the blendshape {shorten(shape.name)!r}", shape.rows, len(self.vertices))
             if shape.rows.shape != shape.displacements.shape[:1]:
                 raise InputError(
-                    f"the blendshape {shortened(shape.name)!r} moves {shape.rows.shape} vertices by "
+                    f"the blendshape {shorten(shape.name)!r} moves {shape.rows.shape} vertices by "
                     f"{shape.displacements.shape} displacements, required as many"
                 )
         if len(set(self.shape_names)) != len(self.shapes):
-            raise InputError(
-                f"two blendshapes have one name among {shortened(', '.join(self.shape_names))}; rename one"
-            )
+            raise InputError(f"two blendshapes have one name among {shorten(', '.join(self.shape_names))}; rename one")
 
     @property
     def shape_names(self) -> tuple[str, ...]:

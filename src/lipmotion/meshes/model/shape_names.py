@@ -65,14 +65,14 @@ def arkit_name(name: str) -> str | None:
 
 def viseme_name(name: str) -> str | None:
     """Return the Oculus name of a viseme as files spell it, or None: ``viseme_I`` and ``vrc.v_ih`` are ``ih``."""
-    found = re.search(r"(?:viseme|vrc\.v|v)[_.\-](\w+?)$", _COPY.sub("", name), re.IGNORECASE)
-    return _VISEME_SPELLINGS.get(found[1].lower()) if found else None
+    match = re.search(r"(?:viseme|vrc\.v|v)[_.\-](\w+?)$", _COPY.sub("", name), re.IGNORECASE)
+    return _VISEME_SPELLINGS.get(match[1].lower()) if match else None
 
 
 def vowel_name(name: str) -> str | None:
     """Return the VRM name of a vowel as files spell it, or None: ``Fcl_MTH_A``, ``あ`` and ``aa`` are ``aa``."""
-    found = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueoあいうえお])$", _COPY.sub("", name), re.IGNORECASE)
-    return _VOWEL_SPELLINGS[found[1].lower()] if found else None
+    match = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueoあいうえお])$", _COPY.sub("", name), re.IGNORECASE)
+    return _VOWEL_SPELLINGS[match[1].lower()] if match else None
 
 
 def spoken_name(name: str) -> str | None:
@@ -99,10 +99,7 @@ OPENS = "jawOpen"
 
 
 def _invert(forms: Mapping[str, str]) -> Sources:
-    """Return the sources of blendshapes, from what each one of another set is made of: ``jawOpen 0.5 …``.
-
-    A name that both sides of a face have, as ``mouthSmile``, stands for both.
-    """
+    """Return the sources of blendshapes, from what each one of another set is made of: ``jawOpen 0.5 …``."""
     sources: dict[str, tuple[tuple[str, float], ...]] = {}
     for name, form in forms.items():
         words = form.split()

@@ -67,7 +67,13 @@ def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSur
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
-    normals = vertex_normals(mesh.vertices, mesh.triangles)
+    corners = mesh.vertices[mesh.triangles]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # weighted by their areas
+    each = mesh.triangles.reshape(-1)
+    sums = [np.bincount(each, np.repeat(faces[:, axis], 3), len(mesh.vertices)) for axis in range(3)]
+    normals: NDArray[np.float64] = np.stack(sums, axis=1)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(lengths > 0, lengths, 1.0)
     places = _number_places(mesh, normals)
     if split is not None:
         places = np.unique(np.where(split, len(places) + np.arange(len(places)), places), return_inverse=True)[1]
@@ -78,26 +84,12 @@ def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSur
     pairs = np.stack(np.divmod(np.unique((low * count + high)[low != high]), max(count, 1)), axis=1)
     first = np.zeros(count, np.int64)
     first[places[::-1]] = np.arange(len(places))[::-1]
-    lengths = np.linalg.norm(mesh.vertices[first[pairs[:, 0]]] - mesh.vertices[first[pairs[:, 1]]], axis=1)
-    lengths = np.maximum(lengths, 1e-12)  # an edge of length 0 would be none
-    edges = csr_array((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
+    along = np.linalg.norm(mesh.vertices[first[pairs[:, 0]]] - mesh.vertices[first[pairs[:, 1]]], axis=1)
+    along = np.maximum(along, 1e-12)  # an edge of length 0 would be none
+    edges = csr_array((along, (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     edges = edges + edges.T
     _, pieces = connected_components(edges, directed=False)
     return MeshSurface(places, edges, pieces[places].astype(np.int64), normals)
-
-
-def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return unit normals [shape=(V, 3)], means of those of the triangles weighted by their areas.
-
-    vertices : [shape=(V, 3)]; triangles : [shape=(F, 3)]; vertices without a triangle have the normal 0
-    """
-    corners = vertices[triangles]
-    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.stack(
-        [np.bincount(triangles.reshape(-1), np.repeat(faces[:, axis], 3), len(vertices)) for axis in range(3)], axis=1
-    )
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.where(lengths > 0, lengths, 1.0)
 
 
 def compute_normals(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:

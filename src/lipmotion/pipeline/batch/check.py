@@ -11,16 +11,16 @@ from pathlib import Path
 from statistics import median
 
 from lipmotion.errors import CorpusError, InputError, LipMotionError
+from lipmotion.pipeline.analysis.language import detect_english
+from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
 from lipmotion.pipeline.batch.pool import WorkerDied, local_pool
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import read_request
-from lipmotion.pipeline.understand.spoken_language import english_spoken
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
-from lipmotion.types import Audio, Monitor, Progress, TimedTranscript, silent_monitor
+from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
 from lipmotion.types.audio import to_sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, script_of
 from lipmotion.units.languages_told import COMMON_WORDS, detect_language
@@ -29,7 +29,7 @@ from lipmotion.units.text_normalisation import find_words, split_written_words
 
 SILENT_DB = -60.0
 """A recording that is nowhere louder, in dB of full scale, is silent."""
-LEAST_SPOKEN_S = 0.1
+MIN_SPOKEN_S = 0.1
 """A recording with less sound above its quiet level has nothing said in it."""
 SHORTEST_TOLD_S, FEWEST_TOLD_WORDS = 8.0, 5
 """The language of shorter speech, or of fewer words, is not told: it takes a dozen long words to be sure."""
@@ -66,14 +66,14 @@ class CheckedLine:
     words: tuple[str, ...] = ()
 
 
-def checked_line(work: LineToCheck) -> CheckedLine:
+def check_line(work: LineToCheck) -> CheckedLine:
     """Return what is found in the recording of a line, and what is to be said in it."""
     line, path = work.line, Path(work.line.recording)
     if not path.exists():
         return CheckedLine(line.name, "missing", f"{path}: no such file")
     try:
         audio = read_audio(path, warn=False)
-        words = _words(work)
+        words = _read_words(work)
     except (LipMotionError, OSError) as error:
         return CheckedLine(line.name, "unreadable", str(error))
     levels = levels_db(audio)
@@ -81,55 +81,39 @@ def checked_line(work: LineToCheck) -> CheckedLine:
     if loudest_db < SILENT_DB:
         return CheckedLine(line.name, "silent", f"nowhere louder than {loudest_db:.0f} dB of full scale")
     spoken_s = sum(end_s - start_s for start_s, end_s in spoken_spans(levels))
-    if spoken_s < LEAST_SPOKEN_S:
+    if spoken_s < MIN_SPOKEN_S:
         return CheckedLine(line.name, "silent", "no sound longer than a click")
-    return CheckedLine(
-        line.name,
-        reason=_wrong_language(work.request.language, words, audio, spoken_s),
-        digest=hashlib.sha256(to_sixteen_bits(audio.samples).tobytes()).hexdigest(),
-        spoken_s=spoken_s,
-        letters=letters_of(words),
-        words=words,
-    )
+    detected = detect_language(words) if len(words) >= FEWEST_TOLD_WORDS else ""
+    required, reason = work.request.language if work.request.language != AUTO else detected, ""
+    if detected and required in COMMON_WORDS and detected != required:
+        reason = f"the words are in {detected}, required {required}"
+    elif required and spoken_s >= SHORTEST_TOLD_S:
+        english = detect_english(audio)
+        if english is not None and english != (required == ENGLISH):
+            reason = f"the speech is {'' if english else 'not '}English, required {required}"
+    digest = hashlib.sha256(to_sixteen_bits(audio.samples).tobytes()).hexdigest()
+    return CheckedLine(line.name, "", reason, digest, spoken_s, count_letters(words), words)
 
 
-def letters_of(words: Sequence[str]) -> float:
+def count_letters(words: Sequence[str]) -> float:
     """Return how many letters words have, those of other scripts as many as take as long to say.
 
-    >>> letters_of(["ab", "c"]), letters_of(["你"])
+    >>> count_letters(["ab", "c"]), count_letters(["你"])
     (3.0, 4.0)
     """
     return sum((LETTERS_OF.get(script_of(letter), 1.0) for word in words for letter in word), 0.0)
 
 
-def _words(work: LineToCheck) -> tuple[str, ...]:
+def _read_words(work: LineToCheck) -> tuple[str, ...]:
     """Return the words of a line without tags, numbers spelled out where they are English; none: they are not known."""
-    line, request = work.line, work.request
-    named = replace(request, recording=Path(line.recording), lexicon=None)
-    given = line.transcript or read_request(named, words_beside=True).transcript
-    if given is None or isinstance(given, TimedTranscript):
-        return given.words if given else ()
-    text = parse_tagged_text(str(given)).text
+    request = replace(work.request, recording=Path(work.line.recording), lexicon=None)
+    transcript = work.line.transcript or read_request(request, words_beside=True).transcript
+    if transcript is None or isinstance(transcript, TimedTranscript):
+        return transcript.words if transcript else ()
+    text = parse_tagged_text(str(transcript)).text
     if request.language == ENGLISH:
         return find_words(text)
     return split_written_words(text) if text.strip() else ()
-
-
-def _wrong_language(language: str, words: Sequence[str], audio: Audio, spoken_s: float) -> str:
-    """Return what is wrong with the language of words and speech; empty: nothing that is known.
-
-    language : that they should be in; ``AUTO``: both in the same one
-    """
-    told = detect_language(words) if len(words) >= FEWEST_TOLD_WORDS else ""
-    wanted = language if language != AUTO else told
-    if told and wanted in COMMON_WORDS and told != wanted:
-        return f"the words are in {told}, required {wanted}"
-    if not wanted or spoken_s < SHORTEST_TOLD_S:
-        return ""
-    english = english_spoken(audio)
-    if english is None or english == (wanted == ENGLISH):
-        return ""
-    return f"the speech is {'' if english else 'not '}English, required {wanted}"
 
 
 STAGE = "checking"
@@ -201,28 +185,35 @@ def check(
     checked: dict[str, CheckedLine] = {}
     try:
         with local_pool(jobs or os.cpu_count() or 1) as pool:
-            for each in pool(checked_line, [LineToCheck(line, job.request) for line in lines]):
+            for each in pool(check_line, [LineToCheck(line, job.request) for line in lines]):
                 checked[each.name] = each
                 monitor(Progress(STAGE, len(checked), len(lines), len(checked) / len(lines)))
     except WorkerDied as error:
         raise CorpusError(f"a process that listened to recordings died ({error}); run it with --jobs 1") from error
     in_order = [checked[line.name] for line in lines]
-    return CheckSummary(len(lines), tuple(_findings(in_order, _orphans(Path(source), lines))))
+    return CheckSummary(len(lines), tuple(_find_problems(in_order, _find_orphans(Path(source), lines))))
 
 
-def _findings(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> Iterator[Finding]:
+def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> Iterator[Finding]:
     """Yield what is wrong, line after line, and then what is there twice, and the recordings of no line."""
-    usual = _usual(checked)
+    rates = [each.spoken_s / expected_s(each.letters) for each in checked if each.letters]
+    usual = min(max(median(rates), 1 / SLOWEST), SLOWEST) if len(rates) >= FEWEST_LINES else 1.0
     for each in checked:
         if each.problem:
             yield Finding(each.problem, each.name, each.reason)
             continue
         if each.reason:
             yield Finding("language", each.name, each.reason)
-        if each.letters:
-            yield from _length(each, usual)
-    yield from _doubles("same sound", checked, lambda each: each.digest)
-    yield from _doubles("same words", checked, lambda each: each.words if len(each.words) >= FEWEST_SAME_WORDS else ())
+        wanted_s = usual * expected_s(each.letters)
+        text = f"{each.spoken_s:.1f} s of speech, about {wanted_s:.1f} s for its {len(each.words)} words"
+        if each.letters and each.spoken_s < SHORT * wanted_s:
+            yield Finding("too short", each.name, text)
+        elif each.letters and each.spoken_s > LONG * wanted_s + LONGER_S:
+            yield Finding("too long", each.name, text)
+    yield from _find_doubles("same sound", checked, lambda each: each.digest)
+    yield from _find_doubles(
+        "same words", checked, lambda each: each.words if len(each.words) >= FEWEST_SAME_WORDS else ()
+    )
     yield from (Finding("orphaned", path, "no line has this recording") for path in orphans)
 
 
@@ -235,46 +226,31 @@ def expected_s(letters: float) -> float:
     return PAUSE_S + letters / LETTERS_PER_S
 
 
-def _usual(checked: Sequence[CheckedLine]) -> float:
-    """Return how many times as long as usual the lines of a batch take; 1 where there are too few to tell."""
-    shares = [each.spoken_s / expected_s(each.letters) for each in checked if each.letters]
-    return min(max(median(shares), 1 / SLOWEST), SLOWEST) if len(shares) >= FEWEST_LINES else 1.0
-
-
-def _length(each: CheckedLine, usual: float) -> Iterator[Finding]:
-    wanted_s = usual * expected_s(each.letters)
-    text = f"{each.spoken_s:.1f} s of speech, about {wanted_s:.1f} s for its {len(each.words)} words"
-    if each.spoken_s < SHORT * wanted_s:
-        yield Finding("too short", each.name, text)
-    elif each.spoken_s > LONG * wanted_s + LONGER_S:
-        yield Finding("too long", each.name, text)
-
-
-def _doubles(kind: str, checked: Sequence[CheckedLine], key: Callable[[CheckedLine], object]) -> Iterator[Finding]:
+def _find_doubles(kind: str, checked: Sequence[CheckedLine], key: Callable[[CheckedLine], object]) -> Iterator[Finding]:
     """Yield the lines that have the same as an earlier one; where the key is empty, they have nothing."""
     first: dict[object, str] = {}
     for each in checked:
-        if found := key(each):
-            if found in first:
-                yield Finding(kind, each.name, f"as of {first[found]}")
-            first.setdefault(found, each.name)
+        value = key(each)
+        if value and value in first:
+            yield Finding(kind, each.name, f"as of {first[value]}")
+        first.setdefault(value, each.name)
 
 
-def _orphans(source: Path, lines: Sequence[BatchLine]) -> list[str]:
+def _find_orphans(source: Path, lines: Sequence[BatchLine]) -> list[str]:
     """Return the paths of recordings that no line of a list has; of a folder, every recording is a line."""
     if source.is_dir():
         return []
     used = {os.path.realpath(line.recording) for line in lines}
     folders = {Path(line.recording).parent for line in lines}
-    own = Path(os.path.abspath(source)).parent  # noqa: PTH100 # links are not followed
-    is_inside = all(folder.is_relative_to(own) for folder in folders)
+    list_folder = Path(os.path.abspath(source)).parent  # noqa: PTH100 # links are not followed
+    is_inside = all(folder.is_relative_to(list_folder) for folder in folders)
     roots, depth = ([Path(os.path.commonpath(folders))], "**/*") if is_inside else (sorted(folders), "*")
-    found = (path for root in roots for path in sorted(root.glob(depth)) if is_recording(path) and path.is_file())
-    return [str(path) for path in found if os.path.realpath(path) not in used and not _is_output(path, roots)]
-
-
-def _is_output(path: Path, roots: Sequence[Path]) -> bool:
-    """Return whether a recording is hidden, or lies in a folder that a batch has written."""
-    inner = next(path.relative_to(root) for root in roots if path.is_relative_to(root))
-    folders = path.parents[: len(inner.parts)]
-    return any(part.startswith(".") for part in inner.parts) or any((folder / LEDGER).exists() for folder in folders)
+    orphans = []
+    for root in roots:
+        for path in sorted(root.glob(depth)):
+            parts = path.relative_to(root).parts
+            is_written = any((folder / LEDGER).exists() for folder in path.parents[: len(parts)])  # by a batch
+            is_hidden = any(part.startswith(".") for part in parts)
+            if is_recording(path) and path.is_file() and os.path.realpath(path) not in used:
+                orphans += [] if is_hidden or is_written else [str(path)]
+    return orphans

@@ -20,17 +20,17 @@ from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, BatchLine
-from lipmotion.pipeline.batch.settings import InputFile, input_paths, line_fingerprint
+from lipmotion.pipeline.batch.settings import InputFile, fingerprint_line, input_paths
 from lipmotion.storage.files import (
     TEMPORARY,
+    atomic_file,
     check_own,
-    confined,
-    locked,
+    confine,
+    lock_folder,
     make_folder,
     open_own,
     remove,
     sha256_of,
-    whole_file,
 )
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, whole
@@ -140,13 +140,8 @@ def read_receipt(path: Path) -> Record | None:
 
 def write_receipt(path: Path, record: Mapping[str, Any]) -> None:
     """Write the receipt of a line. Raises ExportError: it cannot be written."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_text(as_json(record), encoding="utf-8")
-
-
-def are_in_place(out: Path, record: Record) -> bool:
-    """Return whether all outputs of a record have the content that it states."""
-    return all(is_in_place(out / name, digest) for name, digest in record["outputs"].items())
 
 
 def is_in_place(path: Path, digest: str) -> bool:
@@ -155,6 +150,11 @@ def is_in_place(path: Path, digest: str) -> bool:
         return sha256_of(path) == digest
     except (OSError, InputError):  # there is none, or a folder or a pipe in its place
         return False
+
+
+def are_in_place(out: Path, record: Record) -> bool:
+    """Return whether all outputs of a record have the content that it states."""
+    return all(is_in_place(out / name, digest) for name, digest in record["outputs"].items())
 
 
 class Ledger:
@@ -168,29 +168,34 @@ class Ledger:
         self._path, self._file = path, file
         ours = {_key(line.name) for line in lines}
         places: dict[str, int] = {}
-        whole = damaged = 0
-        for start, row in _whole_rows(file):
-            whole = file.tell()
-            name = _name_in(row)
+        start, damaged = file.seek(0), 0
+        while row := file.readline(LARGEST_RECORD_BYTES):
+            is_long = not row.endswith(b"\n")
+            while row and not row.endswith(b"\n"):
+                row = file.readline(LARGEST_RECORD_BYTES)
+            if not row:
+                break
+            match, name = NAME.match(b"" if is_long else row), None
+            with suppress(ValueError):
+                name = str(json.loads(match[1])) if match else None
             damaged += name is None
             if name is not None and _key(name) in ours:
                 places[_key(name)] = start
-        file.seek(whole)
+            start = file.tell()
+        file.seek(start)
         file.truncate()  # a row that was being written when the run was killed
         self._last: dict[str, tuple[str, int]] = {}
-        for key, start in places.items():
-            record = self._record_at(start)
+        for key, place in places.items():
+            record = self._record_at(place)
             damaged += record is None
             if record is not None:
-                self._last[key] = record["fingerprint"], start
+                self._last[key] = record["fingerprint"], place
         if damaged:
             LOG.warning("%s: %d damaged rows are passed over; what they say was done is done again", path, damaged)
 
     def record_of(self, name: str) -> Record | None:
         """Return the last record of a line; None: it has none."""
-        if _key(name) not in self._last:
-            return None
-        return self._record_at(self._last[_key(name)][1])
+        return self._record_at(self._last[_key(name)][1]) if _key(name) in self._last else None
 
     def _record_at(self, start: int) -> Record | None:
         self._file.seek(start)
@@ -214,7 +219,7 @@ class Ledger:
 
         It need not if it was done with the same settings from the same files, and all its outputs exist.
         """
-        fingerprint = line_fingerprint(line, of_settings)
+        fingerprint = fingerprint_line(line, of_settings)
         if self._last.get(_key(line.name), ("", 0))[0] != fingerprint:
             return None
         record = self.finished(line, out)
@@ -235,29 +240,8 @@ def are_same_inputs(line: BatchLine, record: Record) -> bool:
     return same and all(each.is_unchanged() for each in inputs)
 
 
-def _whole_rows(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yield position and content of every row that has an end; of a row that is too long, nothing as its content."""
-    start = file.seek(0)
-    while row := file.readline(LARGEST_RECORD_BYTES):
-        is_long = not row.endswith(b"\n")
-        while row and not row.endswith(b"\n"):
-            row = file.readline(LARGEST_RECORD_BYTES)
-        if row:
-            yield start, b"" if is_long else row
-        start = file.tell()
-
-
-def _name_in(row: bytes) -> str | None:
-    """Return the name of the line that a row is of; None: it begins as no row does."""
-    found = NAME.match(row)
-    try:
-        return str(json.loads(found[1])) if found else None
-    except ValueError:
-        return None
-
-
 @contextmanager
-def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
+def open_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     """Open the ledger of a folder of outputs for a new run, and end what an earlier one left undone.
 
     lines : those of the batch: what earlier runs did of others stays in the ledger and is not looked at
@@ -268,10 +252,10 @@ def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     """
     for path in (place.own / RUN, *(Path(place.out) / name for name in OWN_FILES)):
         check_own(path)
-    with confined(Path(place.out)), locked(place.own):
+    with confine(Path(place.out)), lock_folder(place.own):
         for folder in (place.own / RECEIPTS, place.own / WORK):
             make_folder(folder)
-        with whole_file(place.own / RUN) as temporary:  # from now on, workers of earlier runs finish nothing
+        with atomic_file(place.own / RUN) as temporary:  # from now on, workers of earlier runs finish nothing
             temporary.write_text(place.run, encoding="ascii")
         path = Path(place.out) / LEDGER
         try:
@@ -280,7 +264,15 @@ def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
             raise ExportError(f"{path}: cannot be written: {error.strerror or error}") from error
         with file:
             ledger = Ledger(path, file, lines)
-            _settle(place, ledger)
+            for receipt in sorted((place.own / RECEIPTS).iterdir()):
+                record = read_receipt(receipt) if receipt.suffix == ".json" else None
+                is_done = record is not None and are_in_place(Path(place.out), record)
+                if record is not None and is_done and ledger.record_of(record["name"]) != record:
+                    ledger.append(record)
+                remove(receipt)
+            for folder in (place.own / WORK).iterdir():
+                if folder.name != place.run:
+                    remove(folder)
             _sweep(place, lines)
             yield ledger
         _sweep(place, lines)  # what a worker had begun that died
@@ -295,16 +287,4 @@ def _sweep(place: Place, lines: Iterable[BatchLine]) -> None:
     """Delete outputs that were never finished, beside those that were."""
     for inner in {PurePosixPath(line.name).parent for line in lines}:
         for path in (Path(place.out) / inner).glob(f"{STAGED}*"):
-            remove(path)
-
-
-def _settle(place: Place, ledger: Ledger) -> None:
-    """Enter the receipts of earlier runs into the ledger, and delete these runs' unfinished work."""
-    for path in sorted((place.own / RECEIPTS).iterdir()):
-        record = read_receipt(path) if path.suffix == ".json" else None
-        if record is not None and are_in_place(Path(place.out), record) and ledger.record_of(record["name"]) != record:
-            ledger.append(record)
-        remove(path)
-    for path in (place.own / WORK).iterdir():
-        if path.name != place.run:
             remove(path)

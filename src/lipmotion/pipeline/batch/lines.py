@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
-from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.storage.files import check_listable, portable_name, read_text_file
 from lipmotion.storage.text_table import read_table
@@ -26,11 +26,11 @@ OWN_FILES = ("batch.jsonl", "report.csv", "report.html", "marks.csv")
 """Files of a batch itself beside the outputs of its lines."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
-LARGEST_LIST_BYTES, MOST_LINES = 1 << 27, 200_000
+LARGEST_LIST_BYTES, MAX_LINES = 1 << 27, 200_000
 """Most bytes of a list, and most lines of a batch: the words of a very long game."""
 LONGEST_PART_BYTES = 255
 """Most bytes of the name of a file or a folder, on the usual file systems."""
-MOST_NAMED_LINES = 3
+MAX_NAMED_LINES = 3
 CONTROL = re.compile(r"[\x00-\x1f]")
 
 
@@ -61,9 +61,9 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     Raises ExportError: two lines would have the same output, or one would lie outside the folder of the outputs.
     """
     if source.is_dir():
-        lines = _in_folder(source)
+        lines = _list_folder(source)
     elif source.exists():
-        lines = _in_list(source, kinds)
+        lines = _read_list(source, kinds)
     else:
         raise InputError(f"{source}: no such file or folder; give a list of recordings, or a folder of them")
     if not lines:
@@ -88,7 +88,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
             raise InputError(f"{line.recording!r}, {line.name!r}: control characters in a name; rename the recording")
         path = PurePosixPath(line.name)
         is_inside = path.name and not path.is_absolute() and ".." not in path.parts
-        if not is_inside or str(path) != line.name or any(map(_is_hidden, path.parts)):
+        if not is_inside or str(path) != line.name or any(part.startswith(".") for part in path.parts):
             raise ExportError(
                 f"{line.recording}: the output {line.name!r} lies outside the folder of the outputs, or is hidden; "
                 "give a relative name without '..' and '//' and without names that begin with a dot"
@@ -105,7 +105,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
             file = f"{line.name}.{kind}"
             if any(len(os.fsencode(part)) > LONGEST_PART_BYTES for part in file.split("/")):
                 raise ExportError(
-                    f"{line.recording}: the output {shortened(file)!r} has a part of more than {LONGEST_PART_BYTES} "
+                    f"{line.recording}: the output {shorten(file)!r} has a part of more than {LONGEST_PART_BYTES} "
                     "bytes; give a shorter name in a column 'output' of the list"
                 )
             other = next((each for each in longer[kind] if file.lower().endswith(each)), None)
@@ -133,21 +133,16 @@ def _key(name: str) -> str:
     return unicodedata.normalize("NFD", unicodedata.normalize("NFD", name).casefold())
 
 
-def _is_hidden(part: str) -> bool:
-    return part.startswith(".")
-
-
-def _in_folder(folder: Path) -> list[BatchLine]:
+def _list_folder(folder: Path) -> list[BatchLine]:
     check_listable(folder)
-    found = []
+    lines = []
     for root, folders, names in os.walk(folder):
-        folders[:] = sorted(name for name in folders if not _is_hidden(name))
-        for name in sorted(names):
-            path = Path(root) / name
-            if not _is_hidden(name) and is_recording(path) and path.is_file():
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        for path in (Path(root) / name for name in sorted(names) if not name.startswith(".")):
+            if is_recording(path) and path.is_file():
                 inner = path.relative_to(folder).with_suffix("").as_posix()
-                found.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
-    return sorted(found, key=lambda line: line.name)
+                lines.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
+    return sorted(lines, key=lambda line: line.name)
 
 
 def is_recording(path: Path) -> bool:
@@ -155,52 +150,39 @@ def is_recording(path: Path) -> bool:
     return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
 
 
-def _in_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
+def _read_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     text = read_text_file(source, "list of recordings", LARGEST_LIST_BYTES)
     _check_count(source, max(map(text.count, "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029")))
-    rows = _table(source, text)
+    rows = _read_table(source, text)
     if rows is None:
         rows = [{"file": row.strip()} for row in text.splitlines() if row.strip()]
+    suffixes = [f".{kind}" for kind in sorted(kinds, key=len, reverse=True)]
     base = os.path.dirname(os.path.abspath(source))  # noqa: PTH100, PTH120 # texts: there may be many
-    paths = [os.path.normpath(os.path.join(base, row["file"])) for row in rows]  # noqa: PTH118
-    names = [_output_name(row.get("output", ""), kinds) for row in rows]
-    unnamed = [path for path, name in zip(paths, names, strict=True) if not name]
-    shared = _shared_folder(unnamed, base)
-    return [
-        BatchLine(
-            name or os.path.splitext(path[len(shared) :].lstrip(os.sep))[0].replace(os.sep, "/"),  # noqa: PTH122
-            path,
-            row.get("transcript", ""),
-            row.get("speaker", ""),
-        )
-        for row, path, name in zip(rows, paths, names, strict=True)
-    ]
+    paths, names = [], []
+    for row in rows:
+        paths.append(os.path.normpath(os.path.join(base, row["file"])))  # noqa: PTH118
+        name = row.get("output", "").strip().replace("\\", "/")
+        name = name.removesuffix(next((suffix for suffix in suffixes if name.endswith(suffix)), ""))
+        names.append(str(PurePosixPath(name)) if name else "")
+    folders = {os.path.dirname(path) for path, name in zip(paths, names, strict=True) if not name}  # noqa: PTH120
+    try:  # names of outputs are counted from the folder of the list, if it holds all recordings
+        shared = os.path.commonpath([base, *folders])
+        shared = shared if shared == base or not folders else os.path.commonpath(list(folders))
+    except ValueError as error:  # several drives
+        raise InputError("the recordings are on several drives; name the outputs in a column 'output'") from error
+    lines = []
+    for row, path, name in zip(rows, paths, names, strict=True):
+        inner = os.path.splitext(path[len(shared) :].lstrip(os.sep))[0].replace(os.sep, "/")  # noqa: PTH122
+        lines.append(BatchLine(name or inner, path, row.get("transcript", ""), row.get("speaker", "")))
+    return lines
 
 
 def _check_count(source: Path, count: int) -> None:
-    if count > MOST_LINES:
-        raise InputError(f"{source}: {count} lines, required at most {MOST_LINES} in one batch; divide the list")
+    if count > MAX_LINES:
+        raise InputError(f"{source}: {count} lines, required at most {MAX_LINES} in one batch; divide the list")
 
 
-def _shared_folder(paths: Sequence[str], base: str) -> str:
-    """Return the folder from which the names of outputs are counted: that of the list, if it holds all recordings."""
-    folders = {os.path.dirname(path) for path in paths}  # noqa: PTH120 # a hundred thousand of them
-    try:
-        common = os.path.commonpath([base, *folders])
-        return common if common == base or not folders else os.path.commonpath(list(folders))
-    except ValueError as error:  # several drives
-        raise InputError("the recordings are on several drives; name the outputs in a column 'output'") from error
-
-
-def _output_name(text: str, kinds: Sequence[str]) -> str:
-    """Return the name of an output without the suffix, if it has that of one of the outputs."""
-    name = text.strip().replace("\\", "/")
-    suffix = next((f".{kind}" for kind in sorted(kinds, key=len, reverse=True) if name.endswith(f".{kind}")), "")
-    name = name.removesuffix(suffix)
-    return str(PurePosixPath(name)) if name else ""
-
-
-def _table(source: Path, text: str) -> list[dict[str, str]] | None:
+def _read_table(source: Path, text: str) -> list[dict[str, str]] | None:
     """Return the rows of a table with a header by the names of its columns; None: it has no header.
 
     Raises InputError: a row without a recording, or one that is longer than the header.
@@ -211,23 +193,23 @@ def _table(source: Path, text: str) -> list[dict[str, str]] | None:
         file = next((name for name in header if name in FILE_COLUMNS), None)
         if file is None:
             return None
-        rows = list(table.rows)
+        cells_of = list(table.rows)
     except ValueError as error:
         raise InputError(f"{source}: not a readable table ({error}); export it again as CSV") from error
-    unused = [name for name in header if name and name != file and name not in COLUMNS]
-    if unused:
-        named = ", ".join(map(shortened, unused[:MOST_NAMED_LINES]))
-        LOG.warning("%s: columns that are not used: %s; used are %s", source, named, ", ".join((file, *COLUMNS)))
-    return [_row(source, number, header, file, cells) for number, cells in rows]
-
-
-def _row(source: Path, number: int, header: Sequence[str], file: str, cells: Sequence[str]) -> dict[str, str]:
-    if len(cells) > len(header):
-        raise InputError(
-            f"{source}, row {number}: {len(cells)} columns, required at most the {len(header)} of the header; put "
-            "texts with commas into quotes"
-        )
-    row = {name: cell.strip() for name, cell in zip(header, cells, strict=False)}
-    if not row.get(file):
-        raise InputError(f"{source}, row {number}: no recording in the column {file!r}; fill it in, or remove the row")
-    return {"file": row[file]} | {name: row.get(name, "") for name in COLUMNS}
+    if unused := [name for name in header if name and name != file and name not in COLUMNS]:
+        names = ", ".join(map(shorten, unused[:MAX_NAMED_LINES]))
+        LOG.warning("%s: columns that are not used: %s; used are %s", source, names, ", ".join((file, *COLUMNS)))
+    rows = []
+    for number, cells in cells_of:
+        if len(cells) > len(header):
+            raise InputError(
+                f"{source}, row {number}: {len(cells)} columns, required at most the {len(header)} of the header; put "
+                "texts with commas into quotes"
+            )
+        row = {name: cell.strip() for name, cell in zip(header, cells, strict=False)}
+        if not row.get(file):
+            raise InputError(
+                f"{source}, row {number}: no recording in the column {file!r}; fill it in, or remove the row"
+            )
+        rows.append({"file": row[file]} | {name: row.get(name, "") for name in COLUMNS})
+    return rows

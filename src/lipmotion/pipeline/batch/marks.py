@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.batch.ledger import Record
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.files import atomic_file, read_text_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
 
 APPROVE, REDO, NO_MARK = "approve", "redo", ""
@@ -52,9 +52,9 @@ def read_marks(path: Path) -> dict[str, Mark]:
             name, kind, when = (from_field(row.get(column, "")) for column in COLUMNS)
             kind = kind.strip().lower()
             if kind not in KINDS:
-                raise InputError(f"{path}, row {number}: the mark is {shortened(kind)!r}, required approve or redo")
+                raise InputError(f"{path}, row {number}: the mark is {shorten(kind)!r}, required approve or redo")
             if name in marks:
-                raise InputError(f"{path}, row {number}: {shortened(name)!r} is marked twice; remove one of the rows")
+                raise InputError(f"{path}, row {number}: {shorten(name)!r} is marked twice; remove one of the rows")
             marks[name] = Mark(kind, when)
     except ValueError as error:
         if isinstance(error, InputError):
@@ -65,13 +65,13 @@ def read_marks(path: Path) -> dict[str, Mark]:
 
 def write_marks(path: Path, marks: Mapping[str, Mark]) -> None:
     """Write marks as a table that ``read_marks`` reads. Raises ExportError: it cannot be written."""
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(COLUMNS)
         rows.writerows([as_field(text) for text in (name, mark.kind, mark.when)] for name, mark in marks.items())
 
 
-def merged(kept: Mapping[str, Mark], given: Mapping[str, Mark]) -> dict[str, Mark]:
+def merge_marks(kept: Mapping[str, Mark], given: Mapping[str, Mark]) -> dict[str, Mark]:
     """Return marks with later ones in their place; of lines whose mark was taken back, none."""
     return {name: mark for name, mark in {**kept, **given}.items() if mark.kind}
 

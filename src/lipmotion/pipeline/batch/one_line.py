@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 
 from lipmotion.errors import ExportError, LipMotionError
-from lipmotion.extensions import failed_extension, provided
+from lipmotion.extensions import describe_failed_extension, load_provided
 from lipmotion.formats.base import motion_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, find_closable_ranges
 from lipmotion.motion.rest import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     FAILED,
@@ -34,17 +35,16 @@ from lipmotion.pipeline.batch.ledger import (
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.batch.settings import CUES, input_files, line_fingerprint
+from lipmotion.pipeline.batch.settings import CUES, fingerprint_line, input_files
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.understand.read_request import lexicon_of, read_request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import (
     check_target,
-    confined,
+    confine,
     make_folder,
     put_in_place,
     remove,
@@ -55,7 +55,7 @@ from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
-MOST_WARNINGS = 10
+MAX_WARNINGS = 10
 SILENCE_S = 0.5
 """Seconds of silence with which the settings are tried out."""
 
@@ -64,7 +64,7 @@ SILENCE_S = 0.5
 class LineWork:
     """What a worker needs to know of a line.
 
-    of_settings : from ``fingerprint_of``
+    of_settings : from ``fingerprint_job``
     """
 
     line: BatchLine
@@ -77,7 +77,7 @@ class RunReplacedError(ExportError):
     """A later run has begun in the same folder."""
 
 
-def finished_line(work: LineWork) -> Record:
+def finish_line(work: LineWork) -> Record:
     """Return the record of a line, whose outputs are in place; or that of an error, without outputs.
 
     A line whose receipt is there, because another worker died after it had finished it, is not done again.
@@ -87,166 +87,143 @@ def finished_line(work: LineWork) -> Record:
     if receipt is not None and receipt["run"] == work.place.run and are_in_place(Path(work.place.out), receipt):
         return receipt
     folder = work.place.work(work.line.name)
-    with confined(Path(work.place.out)):
+    with confine(Path(work.place.out)):
         remove(folder)
         make_folder(folder)
         try:
-            return _finished(work)
+            return _animate_line(work)
         finally:
             for kind in work.job.outputs.kinds:
                 remove(work.place.staged(work.line.name, kind))
             remove(folder)
 
 
-def _finished(work: LineWork) -> Record:
+def _animate_line(work: LineWork) -> Record:
     start_s = time.perf_counter()
+    line, place, kinds = work.line, work.place, work.job.outputs.kinds
     record: Record = {
-        "name": work.line.name,
-        "recording": work.line.recording,
-        "run": work.place.run,
-        "fingerprint": line_fingerprint(work.line, work.of_settings),
+        "name": line.name,
+        "recording": line.recording,
+        "run": place.run,
+        "fingerprint": fingerprint_line(line, work.of_settings),
         "outcome": DONE,
         "inputs": [],
         "outputs": {},
     }
-    with _kept_warnings() as warnings:
+    with _capture_warnings() as warnings:
         try:
-            record["inputs"] = [asdict(each) for each in input_files(work.line)]
-            generation = _written(work)
-            record |= _findings(generation) | _taken(start_s, warnings)
-            _put_in_place(work, record)
+            record["inputs"] = [asdict(each) for each in input_files(line)]
+            record |= _describe_motion(_write_line(work))
+            staged = {f"{line.name}.{kind}": place.staged(line.name, kind) for kind in kinds}
+            record["outputs"] = {name: sha256_of(path) for name, path in staged.items()}
+            record |= _describe_work(start_s, warnings)
+            if not place.is_current():
+                raise RunReplacedError(f"{place.out}: another run of this batch has begun; this one ends")
+            write_receipt(place.receipt(line.name), record)
+            for name, path in staged.items():
+                target = Path(place.out) / name
+                if not is_in_place(target, record["outputs"][name]):  # by an earlier run
+                    put_in_place(path, target)
         except (Exception, SystemExit) as error:  # also a bug that one recording meets: the other lines go on
-            if _is_final(error):
+            cause = error if isinstance(error, OSError) else error.__cause__
+            is_full = isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
+            if is_full or isinstance(error, RunReplacedError):  # every line that follows would meet it, too
                 raise
-            record |= {"outcome": FAILED, "outputs": {}, "error": _reason(error)} | _taken(start_s, warnings)
+            reason = str(error) or type(error).__name__
+            if not isinstance(error, LipMotionError | OSError | MemoryError):
+                reason = describe_failed_extension(error) or (
+                    f"unexpected {type(error).__name__}: {error}; this is a bug of lipmotion: please report it"
+                )
+            record |= {"outcome": FAILED, "outputs": {}, "error": reason} | _describe_work(start_s, warnings)
     return record
 
 
-def _taken(start_s: float, warnings: list[str]) -> Record:
-    return {"warnings": warnings[:MOST_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
+def _describe_work(start_s: float, warnings: list[str]) -> Record:
+    return {"warnings": warnings[:MAX_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
 
 
-def _reason(error: BaseException) -> str:
-    if isinstance(error, LipMotionError | OSError | MemoryError):
-        return str(error) or type(error).__name__
-    unexpected = f"unexpected {type(error).__name__}: {error}; this is a bug of lipmotion: please report it"
-    return failed_extension(error) or unexpected
+def _write_line(work: LineWork) -> Generation:
+    """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``.
 
-
-def _is_final(error: BaseException) -> bool:
-    """Return whether an error would befall every line that follows: a full disk, or the end of the run."""
-    if isinstance(error, RunReplacedError):
-        return True
-    cause = error if isinstance(error, OSError) else error.__cause__
-    return isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
-
-
-def _put_in_place(work: LineWork, record: Record) -> None:
-    """Write the receipt, and rename the outputs; one that is in place from an earlier run is left alone."""
-    out = Path(work.place.out)
-    staged = {f"{work.line.name}.{kind}": work.place.staged(work.line.name, kind) for kind in work.job.outputs.kinds}
-    record["outputs"] = {name: sha256_of(path) for name, path in staged.items()}
-    if not work.place.is_current():
-        raise RunReplacedError(f"{out}: another run of this batch has begun; this one ends")
-    write_receipt(work.place.receipt(work.line.name), record)
-    for name, path in staged.items():
-        target = out / name
-        if not is_in_place(target, record["outputs"][name]):
-            put_in_place(path, target)
-
-
-def _written(work: LineWork) -> Generation:
-    """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
-    line, kinds = work.line, work.job.outputs.kinds
+    The labels beside the recording are used where the row has no words. Where a filmed face of another person is shown,
+    the motion is mapped onto it, as ``lipmotion animate`` does.
+    """
+    line, kinds, given = work.line, work.job.outputs.kinds, work.job.request
     make_folder((Path(work.place.out) / line.name).parent)
     staged = tuple(str(work.place.staged(line.name, kind)) for kind in kinds)
     for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
-    shared = _cached(work.job, work.place.run)
-    request = _request(line, work.job.request, shared)
+    shared, speaker = _share(work.job, work.place.run), line.speaker or given.speaker
+    request = replace(given, recording=Path(line.recording), speaker=speaker, lexicon=shared.lexicon)
+    request = read_request(request, words_beside=not line.transcript)
+    request = replace(request, transcript=line.transcript or request.transcript)
+    face = shared.face.other_person(shared.model, speaker) if given.onto is None else None
+    if face is not None:
+        request = replace(request, onto=_map_onto(shared.model, face, speaker))
     job = replace(work.job.of(None, staged), request=request)
     return run(job, face=shared.face, model=shared.model, is_typed=False)
 
 
-def _request(line: BatchLine, named: Request, shared: _Shared) -> Request:
-    """Return the request of a line, with the labels beside its recording where the row has no words.
-
-    Where a filmed face of another person is shown, the motion is mapped onto it, as ``lipmotion animate`` does.
-    """
-    speaker = line.speaker or named.speaker
-    named = replace(named, recording=Path(line.recording), speaker=speaker, lexicon=shared.lexicon)
-    request = read_request(named, words_beside=not line.transcript)
-    request = replace(request, transcript=line.transcript or request.transcript)
-    face = shared.face.other_person(shared.model, speaker) if named.onto is None else None
-    return request if face is None else replace(request, onto=_map_onto(shared.model, face, speaker))
-
-
-def _findings(generation: Generation) -> Record:
+def _describe_motion(generation: Generation) -> Record:
     """Return what the report says of generated motion."""
-    outlook, motion = generation.outlook, generation.motion
-    found: Record = {"duration_s": round(max(len(motion.values) - 1, 0) / motion.rate_hz, 3)}
+    outlook, motion, confidence = generation.outlook, generation.motion, generation.confidence
+    record: Record = {"duration_s": round(max(len(motion.values) - 1, 0) / motion.rate_hz, 3)}
     if outlook is not None:
-        found |= {
+        record |= {
             "words": outlook.words,
             "confidence": round(float(outlook.confidence), 3),
             "voice": None if outlook.voice is None else round(float(outlook.voice), 3),
             "range_db": round(float(outlook.range_db), 1),
             "advice": list(outlook.advice),
         }
-    found |= _confidence_of_motion(generation)
+    spoken = np.zeros(len(motion.values), bool)
+    for start_s, end_s in list_speech_intervals(generation.units):
+        spoken[round(start_s * motion.rate_hz) : round(end_s * motion.rate_hz)] = True
+    if confidence is not None and spoken.any():
+        record["motion"] = round(float(confidence[spoken].mean()), 3)
+        second = np.flatnonzero(spoken) // round(motion.rate_hz)
+        means = np.bincount(second, confidence[spoken]) / np.maximum(np.bincount(second), 1)
+        means[np.bincount(second) < motion.rate_hz / 2] = np.inf
+        if np.isfinite(means).any():
+            record["least_sure_s"] = int(means.argmin())
     if OPENING in motion.names and len(motion.values):
         opening = motion[OPENING]
         closed = CLOSED_SHARE * float(np.percentile(opening, 95))
         ranges = find_closable_ranges(generation.units, len(opening))
-        found |= {
+        record |= {
             "widest": round(float(opening.max()), 4),
             "closures_heard": len(ranges),
             "closures_made": sum(bool(opening[frames].min() <= closed) for frames in ranges),
         }
-    return found
+    return record
 
 
-def _confidence_of_motion(generation: Generation) -> Record:
-    """Return the mean confidence of the motion in speech, and where the least sure second begins, if they are known."""
-    confidence, rate_hz = generation.confidence, generation.motion.rate_hz
-    spoken = np.zeros(len(generation.motion.values), bool)
-    for start_s, end_s in list_speech_intervals(generation.units):
-        spoken[round(start_s * rate_hz) : round(end_s * rate_hz)] = True
-    if confidence is None or not spoken.any():
-        return {}
-    second = np.flatnonzero(spoken) // round(rate_hz)
-    means = np.bincount(second, confidence[spoken]) / np.maximum(np.bincount(second), 1)
-    means[np.bincount(second) < rate_hz / 2] = np.inf
-    least = {"least_sure_s": int(means.argmin())} if np.isfinite(means).any() else {}
-    return {"motion": round(float(confidence[spoken].mean()), 3), **least}
-
-
-_KEPT: ContextVar[list[str] | None] = ContextVar("warnings of the line that this thread works on", default=None)
+_WARNINGS: ContextVar[list[str] | None] = ContextVar("warnings of the line that this thread works on", default=None)
 
 
 @contextmanager
-def _kept_warnings() -> Iterator[list[str]]:
+def _capture_warnings() -> Iterator[list[str]]:
     """Give a list that receives this thread's warnings of the package inside the block, instead of the terminal.
 
     Each is kept once. What other threads log goes where it went before.
     """
-    kept: list[str] = []
-    LOG.addFilter(_keep)  # which a logger has once, however often it is added
-    before = _KEPT.set(kept)
+    warnings: list[str] = []
+    LOG.addFilter(_capture)  # which a logger has once, however often it is added
+    before = _WARNINGS.set(warnings)
     try:
-        yield kept
+        yield warnings
     finally:
-        _KEPT.reset(before)
+        _WARNINGS.reset(before)
 
 
-def _keep(record: logging.LogRecord) -> bool:
+def _capture(record: logging.LogRecord) -> bool:
     """Keep a warning of a thread that works on a line; return whether a record goes on to the handlers."""
-    kept = _KEPT.get()
-    if kept is None:
+    warnings = _WARNINGS.get()
+    if warnings is None:
         return True
     text = record.getMessage()
-    if record.levelno >= logging.WARNING and text not in kept:
-        kept.append(text)
+    if record.levelno >= logging.WARNING and text not in warnings:
+        warnings.append(text)
     return False
 
 
@@ -260,16 +237,16 @@ class _Shared:
 
 
 @lru_cache(maxsize=1)
-def _cached(job: Job, of_run: str) -> _Shared:  # noqa: ARG001 (files may change between two runs)
+def _share(job: Job, of_run: str) -> _Shared:  # noqa: ARG001 (files may change between two runs)
     """Return what the lines of a run share. Raises as ``open_face``, ``Lexicon.from_file`` and ``load_model``."""
-    lexicon = None if job.request.lexicon is None else lexicon_of(job.request)
+    lexicon = None if job.request.lexicon is None else read_lexicon(job.request)
     return _Shared(load_model(job.request.model), open_face(job.outputs), lexicon)
 
 
 @lru_cache(maxsize=8)
 def _map_onto(model: Model, face: Any, speaker: str) -> SpeakerMap:
     """Return the map of the motion of a speaker onto a face: the same for all lines, and slow to make."""
-    return provided("map_onto")(model, face, speaker=speaker)
+    return load_provided("map_onto")(model, face, speaker=speaker)
 
 
 def check_line_job(job: Job, of_run: str) -> None:
@@ -278,7 +255,7 @@ def check_line_job(job: Job, of_run: str) -> None:
     Motion files of a moment of silence are made and deleted, so that channels, curves and formats are tried out.
     Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``open_face``.
     """
-    shared, anywhere = _cached(job, of_run), Path(tempfile.gettempdir())
+    shared, anywhere = _share(job, of_run), Path(tempfile.gettempdir())
     files = tuple(str(anywhere / f"line.{kind}") for kind in job.outputs.kinds)
     check_outputs(job.of(anywhere, files), shared.face)
     kinds = [kind for kind in job.outputs.kinds if motion_suffix(Path(f"line.{kind}")) and not kind.startswith(CUES)]

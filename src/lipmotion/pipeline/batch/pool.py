@@ -12,8 +12,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from lipmotion.errors import CorpusError, InputError, MissingDependencyError
-from lipmotion.extensions import install_command
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.extensions import install_command, installed_version
 from lipmotion.kernels.threads import one_thread
 
 ItemT = TypeVar("ItemT")
@@ -46,48 +46,47 @@ def local_pool(jobs: int) -> Iterator[Pool]:
     jobs : number of processes
     """
     from joblib.externals.loky import get_reusable_executor
+    from joblib.externals.loky.backend.resource_tracker import ensure_running
 
     if jobs == 1:
         with one_thread():
             yield _pool({"backend": "sequential"})
         return
-    _start_tracker()
-    shown, ended = threading.excepthook, threading.Event()
-    threading.excepthook = _reporter(shown, ended)
-    try:
-        yield _pool({"backend": "loky", "n_jobs": jobs, "initializer": _begin_worker, "initargs": (os.getpid(),)})
-    finally:
-        get_reusable_executor(max_workers=jobs).shutdown(wait=True, kill_workers=True)
-        ended.set()
-        threading.excepthook = shown
-
-
-def _start_tracker() -> None:
-    """Start loky's process that deletes what killed processes leave, and let it do so without a word."""
-    from joblib.externals.loky.backend.resource_tracker import ensure_running
-
     before = os.environ.get("PYTHONWARNINGS")
     os.environ["PYTHONWARNINGS"] = "ignore"
     try:
-        ensure_running()
+        ensure_running()  # loky's process, which deletes what killed processes leave, without a word
     finally:
-        if before is None:
-            del os.environ["PYTHONWARNINGS"]
-        else:
+        del os.environ["PYTHONWARNINGS"]
+        if before is not None:
             os.environ["PYTHONWARNINGS"] = before
+    report, ended = threading.excepthook, threading.Event()
 
-
-def _reporter(shown: Callable[[Any], object], ended: threading.Event) -> Callable[[Any], None]:
-    """Return a hook for errors of threads that reports them by ``shown``, unless the pool ends within ``GRACE_S``.
-
-    A thread of loky's fails when it meets work that was withdrawn, because a signal has come.
-    """
-
-    def report(error: Any) -> None:
+    def report_late(error: Any) -> None:
+        """Report an error of a thread unless the pool ends soon: a signal withdraws work that loky's threads meet."""
         if not ended.wait(GRACE_S):
-            shown(error)
+            report(error)
 
-    return lambda error: threading.Thread(target=report, args=(error,), daemon=True).start()
+    threading.excepthook = lambda error: threading.Thread(target=report_late, args=(error,), daemon=True).start()
+    try:
+        yield _pool({"backend": "loky", "n_jobs": jobs, "initializer": begin_worker, "initargs": (os.getpid(),)})
+    finally:
+        get_reusable_executor(max_workers=jobs).shutdown(wait=True, kill_workers=True)
+        ended.set()
+        threading.excepthook = report
+
+
+def begin_worker(parent: int) -> None:
+    """Prepare a worker process: Ctrl-C is for the first process, and no worker outlives it."""
+
+    def end_with_parent() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECK_S)
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform != "win32":
+        threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 @contextmanager
@@ -110,35 +109,27 @@ def cluster_pool(address: str, out: Path) -> Iterator[Pool]:
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
         except (OSError, TimeoutError, ValueError) as error:
             raise InputError(f"{address}: no Dask scheduler answers ({error}); start one: dask scheduler") from error
-        _check_workers(client, address, out)
+        try:
+            answers = client.run(describe_worker, str(out), on_error="return")
+        except Exception as error:  # what the scheduler could not send
+            raise InputError(f"{address}: the workers cannot be asked ({error})") from error
+        if not answers:
+            raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
+        for worker, answer in answers.items():
+            if isinstance(answer, BaseException):
+                raise InputError(
+                    f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
+                ) from answer
+            version, sees_folder = answer
+            if version != installed_version():
+                raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
+            if not sees_folder:
+                raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
         yield _pool({"backend": "dask", "client": client, "pure": False})
 
 
-def _check_workers(client: Any, address: str, out: Path) -> None:
-    """Raise InputError unless there are workers, and all of them can do the work."""
-    from lipmotion.extensions import installed_version
-
-    try:
-        found = client.run(_ability, str(out), on_error="return")
-    except Exception as error:  # what the scheduler could not send
-        raise InputError(f"{address}: the workers cannot be asked ({error})") from error
-    if not found:
-        raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
-    for worker, answer in found.items():
-        if isinstance(answer, BaseException):
-            raise InputError(
-                f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
-            ) from answer
-        version, sees = answer
-        if version != installed_version():
-            raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
-        if not sees:
-            raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
-
-
-def _ability(out: str) -> tuple[str, bool]:
-    from lipmotion.extensions import installed_version
-
+def describe_worker(out: str) -> tuple[str, bool]:
+    """Return a worker's version of lipmotion, and whether it sees a folder."""
     return installed_version(), os.path.isdir(out)  # noqa: PTH112
 
 
@@ -164,21 +155,3 @@ def _pool(chosen: dict[str, Any]) -> Pool:
                 results.close()
 
     return each
-
-
-def _begin_worker(parent: int) -> None:
-    """Prepare a worker process: Ctrl-C is for the first process, and no worker outlives it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform != "win32":
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(PARENT_CHECK_S)
-    os._exit(1)
-
-
-def died_alone(name: str) -> CorpusError:
-    """Return the error of a line whose worker died twice, once while it had no other work."""
-    return CorpusError(f"{name}: the process that worked on it died (out of memory?); is the recording damaged?")

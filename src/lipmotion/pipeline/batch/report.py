@@ -6,7 +6,7 @@ import csv
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from importlib import resources
 from pathlib import Path
@@ -19,7 +19,7 @@ from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.marks import APPROVE, Mark, is_due
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
-from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.files import as_text, atomic_file
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.text_table import as_field
 from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
@@ -45,31 +45,36 @@ def write_reports(
     Raises ExportError: they cannot be written.
     Memory: a number and a reference a line; the records are read one by one.
     """
-    doubts = [doubt_of(ledger.record_of(line.name) or {}) for line in lines]
+    doubts = [rate_doubt(ledger.record_of(line.name) or {}) for line in lines]
     order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
     table, page = out / CSV_REPORT, out / HTML_REPORT
     marks = marks or {}
     page_text = colour_code(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
-    page_text = page_text.replace(BASIS, _digest(marks))
+    rows_of_marks = as_json([[name, mark.kind, mark.when] for name, mark in marks.items()])
+    page_text = page_text.replace(BASIS, hashlib.sha256(rows_of_marks.encode()).hexdigest())
     before, _, after = page_text.partition(ROWS)
     with ExitStack() as stack:
-        paths = [stack.enter_context(whole_file(path)) for path in (table, page)]
+        paths = [stack.enter_context(atomic_file(path)) for path in (table, page)]
         table_file = stack.enter_context(paths[0].open("w", encoding="utf-8", newline=""))
         page_file = stack.enter_context(paths[1].open("w", encoding="utf-8"))
         rows = csv.writer(table_file)
         rows.writerow(COLUMNS)
         page_file.write(before)
-        for number, record in enumerate(_records(lines, ledger, order)):
-            mark = _shown_mark(marks.get(record["name"]), record)
-            record["mark"] = mark.kind if mark else None
+        for place, number in enumerate(order):
+            record = ledger.record_of(lines[number].name) or {"name": lines[number].name, "outcome": "missing"}
+            mark = marks.get(record["name"])
+            if mark is not None and mark.kind != APPROVE and not is_due(mark, record):
+                mark = None  # what it asked for is done
+            outputs = list(record.get("outputs", ()))
+            record |= {"doubt": rate_doubt(record), "outputs": outputs, "mark": mark.kind if mark else None}
             values = [record.get(name) for name in COLUMNS]
             rows.writerow([_field(value) for value in values])
-            page_file.write(f"{',' if number else ''}\n{_for_page(record, values, out, mark)}")
+            page_file.write(f"{',' if place else ''}\n{_for_page(record, values, out, mark)}")
         page_file.write(after)
     return table, page
 
 
-def doubt_of(record: Record) -> float:
+def rate_doubt(record: Record) -> float:
     """Return how much a line deserves to be looked at, 0 (nothing is known against it) to 100 (it failed)."""
     if record.get("outcome") in (FAILED, None):
         return 100.0
@@ -88,21 +93,6 @@ def doubt_of(record: Record) -> float:
     return round(min(doubt, 99.0), 1)
 
 
-def _records(lines: Sequence[BatchLine], ledger: Ledger, order: Sequence[int]) -> Iterator[Record]:
-    for number in order:
-        record = ledger.record_of(lines[number].name) or {"name": lines[number].name, "outcome": "missing"}
-        yield record | {"doubt": doubt_of(record), "outputs": list(record.get("outputs", ()))}
-
-
-def _shown_mark(mark: Mark | None, record: Record) -> Mark | None:
-    """Return the mark of a line as the reports show it; None: it has none, or what it asked for is done."""
-    return mark if mark is not None and (mark.kind == APPROVE or is_due(mark, record)) else None
-
-
-def _digest(marks: Mapping[str, Mark]) -> str:
-    return hashlib.sha256(as_json([[name, mark.kind, mark.when] for name, mark in marks.items()]).encode()).hexdigest()
-
-
 def _field(value: Any) -> str:
     """Return a value as a field of the CSV file."""
     if value is None:
@@ -116,9 +106,8 @@ def _for_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | Non
     """Return a row of the page: its values, the addresses of outputs and recording, and when it was marked."""
     links = [quote(as_text(name)) for name in record["outputs"]]
     sound = _address(record["recording"], out) if "recording" in record else None
-    text = json.dumps(
-        [*map(_visible, values), links, sound, mark.when if mark else None], ensure_ascii=True, separators=(",", ":")
-    )
+    row = [*map(_visible, values), links, sound, mark.when if mark else None]
+    text = json.dumps(row, ensure_ascii=True, separators=(",", ":"))
     return text.replace("<", "\\u003c")  # nothing that a name says ends the script
 
 

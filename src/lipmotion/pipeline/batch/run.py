@@ -10,14 +10,14 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import CorpusError, ExportError, shortened
-from lipmotion.pipeline.batch.ledger import DONE, FAILED, Ledger, Place, Record, are_same_inputs, opened_ledger
-from lipmotion.pipeline.batch.lines import MOST_NAMED_LINES, BatchLine, check_names, read_lines
-from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merged, read_marks, write_marks
-from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finished_line
-from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
+from lipmotion.errors import CorpusError, ExportError, shorten
+from lipmotion.pipeline.batch.ledger import DONE, FAILED, Ledger, Place, Record, are_same_inputs, open_ledger
+from lipmotion.pipeline.batch.lines import MAX_NAMED_LINES, BatchLine, check_names, read_lines
+from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merge_marks, read_marks, write_marks
+from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finish_line
+from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, local_pool
 from lipmotion.pipeline.batch.report import write_reports
-from lipmotion.pipeline.batch.settings import check_job, fingerprint_of, line_fingerprint
+from lipmotion.pipeline.batch.settings import check_job, fingerprint_job, fingerprint_line
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.workers import process_count
 from lipmotion.storage.sources import Source, check_apart
@@ -25,7 +25,7 @@ from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
 LOG = logging.getLogger("lipmotion")
 STAGE = "animating"
-MOST_DEATHS = 3
+MAX_DEATHS = 3
 """After so many deaths of workers in a row that no line explains, the batch ends."""
 
 
@@ -99,127 +99,105 @@ def batch(
     else:
         lines = list(source)
         check_names(lines, job.outputs.kinds)
-    _check_outside(lines, place)
-    chosen = _chosen_marks(Path(place.out), marks, lines)
+    inside = os.path.realpath(place.out) + os.sep
+    for line in lines:
+        if os.path.realpath(line.recording).startswith(inside):  # an output could replace it
+            raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
+    chosen = _choose_marks(Path(place.out), marks, lines)
     check_line_job(job, place.run)
-    of_settings = fingerprint_of(job)
-    with opened_ledger(place, lines) as ledger:
+    of_settings = fingerprint_job(job)
+    with open_ledger(place, lines) as ledger:
         if marks is not None:
             write_marks(Path(place.out) / MARKS, chosen)
         counter = _Counter(len(lines), monitor)
-        kept = _kept_names(lines, ledger, place, of_settings, chosen)
-        waiting = [LineWork(line, job, of_settings, place) for line in lines if line.name not in kept]
+        finished = _find_finished(lines, ledger, place, of_settings, chosen)
+        waiting = [LineWork(line, job, of_settings, place) for line in lines if line.name not in finished]
         for line in lines:
-            if line.name in kept:
+            if line.name in finished:
                 counter.count(line.name, "kept")
         pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(processes)
         if waiting:
-            with pool as each, closing(_finished(each, waiting)) as records:
+            with pool as each, closing(_finish_lines(each, waiting)) as records:
                 for record in records:
-                    ledger.append(_with_mark(record, chosen))
-                    _forget(place, record)
+                    mark = chosen.get(record["name"])
+                    if mark is not None and mark.kind == REDO and record["outcome"] == DONE:
+                        record["redone"] = mark.when  # so that it is redone once
+                    ledger.append(record)
+                    place.receipt(record["name"]).unlink(missing_ok=True)
                     counter.count(record["name"], record["outcome"], record.get("error", ""))
         csv, html = write_reports(lines, ledger, Path(place.out), chosen)
     return BatchSummary(counter.done, counter.kept, counter.failed, csv, html)
 
 
-def _check_outside(lines: Sequence[BatchLine], place: Place) -> None:
-    """Raise ExportError if a recording lies in the folder of the outputs, where an output could replace it."""
-    inside = os.path.realpath(place.out) + os.sep
-    for line in lines:
-        if os.path.realpath(line.recording).startswith(inside):
-            raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
-
-
-def _chosen_marks(out: Path, given: str | Path | None, lines: Sequence[BatchLine]) -> dict[str, Mark]:
+def _choose_marks(out: Path, table: str | Path | None, lines: Sequence[BatchLine]) -> dict[str, Mark]:
     """Return the marks in a folder of outputs, with those of a further file in their place. Raises InputError."""
-    kept = read_marks(out / MARKS) if (out / MARKS).is_file() else {}
-    later = read_marks(Path(given)) if given is not None else {}
-    marks = merged(kept, later)
+    earlier = read_marks(out / MARKS) if (out / MARKS).is_file() else {}
+    later = read_marks(Path(table)) if table is not None else {}
     names = {line.name for line in lines}
-    unknown = [name for name in later if name not in names]
-    if unknown:
-        LOG.warning("%s: %d marks of lines that are not in this batch: %s", given, len(unknown), _some(unknown))
-    return marks
+    if unknown := [name for name in later if name not in names]:
+        LOG.warning("%s: %d marks of lines that are not in this batch: %s", table, len(unknown), _some(unknown))
+    return merge_marks(earlier, later)
 
 
-def _kept_names(
+def _find_finished(
     lines: Sequence[BatchLine], ledger: Ledger, place: Place, of_settings: str, marks: Mapping[str, Mark]
 ) -> set[str]:
     """Return the names of the lines that need not be done; a warning names approved ones that are out of date."""
-    out, kept, outdated = Path(place.out), set(), []
+    out, finished, outdated = Path(place.out), set(), []
     for line in lines:
         mark = marks.get(line.name)
         if mark is not None and is_due(mark, ledger.record_of(line.name)):
             continue
         approved = ledger.finished(line, out) if mark is not None and mark.kind == APPROVE else None
         if approved is not None or ledger.kept(line, of_settings, out) is not None:
-            kept.add(line.name)
+            finished.add(line.name)
         if approved is not None and not are_same_inputs(line, approved):
             outdated.append(line.name)
     if outdated:
         LOG.warning(
             "%d approved lines have another recording or other words now, and are kept: %s; mark them redo",
-            len(outdated),
-            _some(outdated),
+            *(len(outdated), _some(outdated)),
         )
-    return kept
+    return finished
 
 
 def _some(names: Sequence[str]) -> str:
-    return ", ".join(map(shortened, names[:MOST_NAMED_LINES])) + ", ..." * (len(names) > MOST_NAMED_LINES)
+    return ", ".join(map(shorten, names[:MAX_NAMED_LINES])) + ", ..." * (len(names) > MAX_NAMED_LINES)
 
 
-def _with_mark(record: Record, marks: Mapping[str, Mark]) -> Record:
-    """Return a record that says which mark it was done again for, so that it is done once."""
-    mark = marks.get(record["name"])
-    if mark is None or mark.kind != REDO or record["outcome"] != DONE:
-        return record
-    return record | {"redone": mark.when}
-
-
-def _forget(place: Place, record: Record) -> None:
-    """Delete the receipt of a line that is in the ledger."""
-    place.receipt(record["name"]).unlink(missing_ok=True)
-
-
-def _finished(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
+def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
     """Yield the record of every line. Where a worker dies, the lines go on that it had; one that kills again fails."""
     left, deaths = {work.line.name: work for work in waiting}, 0
     while left:
         try:
-            for record in each(finished_line, list(left.values())):
+            for record in each(finish_line, list(left.values())):
                 del left[record["name"]]
                 deaths = 0
                 yield record
         except WorkerDied as error:
             deaths += 1
             suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
-            if not suspects and deaths >= MOST_DEATHS:
+            if not suspects and deaths >= MAX_DEATHS:
                 raise CorpusError(
                     f"the worker processes die before they begin ({error}); is there enough memory? what is finished "
                     "is kept: run it again, with fewer --jobs"
                 ) from error
             for work in suspects:
                 del left[work.line.name]
-                yield _alone(each, work)
-
-
-def _alone(each: Pool, work: LineWork) -> Record:
-    """Return the record of a line that was being done when a worker died, done while nothing else is."""
-    try:
-        return next(iter(each(finished_line, [work])))
-    except WorkerDied:
-        return {
-            "name": work.line.name,
-            "recording": work.line.recording,
-            "run": work.place.run,
-            "fingerprint": line_fingerprint(work.line, work.of_settings),
-            "outcome": FAILED,
-            "inputs": [],
-            "outputs": {},
-            "error": str(died_alone(work.line.recording)),
-        }
+                try:
+                    yield next(iter(each(finish_line, [work])))  # while nothing else is done
+                except WorkerDied:
+                    yield {
+                        "name": work.line.name,
+                        "recording": work.line.recording,
+                        "run": work.place.run,
+                        "fingerprint": fingerprint_line(work.line, work.of_settings),
+                        "outcome": FAILED,
+                        "inputs": [],
+                        "outputs": {},
+                        "error": f"{work.line.recording}: the process that worked on it died (out of memory?); is the "
+                        "recording damaged?",
+                    }
 
 
 class _Counter:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.extensions import installed_version, provided
+from lipmotion.extensions import installed_version, load_provided
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files
@@ -36,59 +36,48 @@ def check_job(job: Job) -> None:
     check_kinds(job.outputs.kinds)
     alone = {name: getattr(job.request, name) for name in ("recording", "transcript", "units", "edits")}
     alone |= {name: getattr(job.outputs, name) for name in ("files", "overlay", "posteriors")}
-    found = next((name for name, value in alone.items() if value), None)
-    if found:
-        raise InputError(f"the job of a batch has {found!r}, which belongs to one recording; leave it out")
-    found = next(
-        (name for name in ("lexicon", "onto") if not isinstance(getattr(job.request, name), Path | None)), None
-    )
-    if found:
-        raise InputError(f"the job of a batch has a value as {found!r}, required a file, whose content can be compared")
-
-
-def possible_kinds() -> tuple[str, ...]:
-    """Return the kinds of outputs that a batch can write, without the first dot."""
-    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *provided("video_suffixes"), *provided("scene_suffixes"))
-    return (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
+    if used := next((name for name, value in alone.items() if value), None):
+        raise InputError(f"the job of a batch has {used!r}, which belongs to one recording; leave it out")
+    for name in ("lexicon", "onto"):
+        if not isinstance(getattr(job.request, name), Path | None):
+            raise InputError(
+                f"the job of a batch has a value as {name!r}, required a file, whose content can be compared"
+            )
 
 
 def check_kinds(kinds: Sequence[str]) -> None:
     """Raise ExportError for a kind of output that a batch cannot write, one that is given twice, or none at all."""
-    known = possible_kinds()
+    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *load_provided("video_suffixes"), *load_provided("scene_suffixes"))
+    known = (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
     unknown = [kind for kind in kinds if kind not in known]
     if unknown or not kinds:
-        found = repr(unknown[0]) if unknown else "nothing"
-        raise ExportError(f"the outputs are to be {found}; required some of: {', '.join(known)}, with commas")
+        given = repr(unknown[0]) if unknown else "nothing"
+        raise ExportError(f"the outputs are to be {given}; required some of: {', '.join(known)}, with commas")
     if len(set(kinds)) < len(kinds):
         raise ExportError(f"the outputs are {', '.join(kinds)}: one is given twice; give every kind once")
 
 
-def fingerprint_of(job: Job) -> str:
+def fingerprint_job(job: Job) -> str:
     """Return a digest of a job, with the content of the files that it names, and of what is installed: the version of
     lipmotion, and the recogniser of phones."""
+
+    def describe(value: Any) -> Any:
+        if isinstance(value, str | Path) and is_file(Path(value)):
+            return sha256_of(Path(value))
+        return str(value) if isinstance(value, Path) else value
+
     request = replace(job.request, model=job.request.model or shipped_path())
-    parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
+    parts = [{name: describe(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
     parts += [job.delivery.as_mapping(), job.staging.as_mapping()]
-    if provided("is_drawings")(job.outputs.face):
-        parts.append({path.name: sha256_of(path) for path in provided("picture_files")(Path(job.outputs.face))})
-    parts += _table(job.outputs.character)
+    if load_provided("is_drawings")(job.outputs.face):
+        parts.append({path.name: sha256_of(path) for path in load_provided("picture_files")(Path(job.outputs.face))})
+    table = table_path(job.outputs.character) if job.outputs.character else None
+    if table and is_file(table):
+        parts.append({"table": sha256_of(table)})
     return _digest(as_json([*parts, installed_version(), installed_phone_recogniser()]))
 
 
-def _table(character: Path | None) -> list[dict[str, str]]:
-    """Return the digest of the table beside a character; none where there is no such table."""
-    path = table_path(character) if character else None
-    return [{"table": sha256_of(path)}] if path and is_file(path) else []
-
-
-def _told(value: Any) -> Any:
-    """Return the value of an option, or the digest of the file that it names."""
-    if isinstance(value, str | Path) and is_file(Path(value)):
-        return sha256_of(Path(value))
-    return str(value) if isinstance(value, Path) else value
-
-
-def line_fingerprint(line: BatchLine, of_settings: str) -> str:
+def fingerprint_line(line: BatchLine, of_settings: str) -> str:
     """Return a digest of what a line's row says, and of the settings; not of the content of its files."""
     return _digest(as_json([of_settings, line.name, line.recording, line.transcript, line.speaker]))
 
@@ -134,8 +123,5 @@ def input_files(line: BatchLine) -> list[InputFile]:
     Raises InputError: the recording is missing, empty, a folder, a pipe or a device. OSError: one cannot be read.
     """
     check_source(Path(line.recording), "recording")
-    found = []
-    for path in input_paths(line):
-        status = path.stat()
-        found.append(InputFile(str(path), status.st_size, _changed_ns(status), sha256_of(path)))
-    return found
+    status = [(path, path.stat()) for path in input_paths(line)]
+    return [InputFile(str(path), each.st_size, _changed_ns(each), sha256_of(path)) for path, each in status]

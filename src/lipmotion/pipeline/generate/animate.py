@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import InputError
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import Session
 from lipmotion.types import Constraints, Generation, Monitor, TimedTranscript, silent_monitor
 
@@ -27,7 +27,7 @@ def animate(  # noqa: PLR0913
     edits: EditFile | Edits | str | Path | None = None,
     workers: int = 1,
     monitor: Monitor = silent_monitor,
-    meanwhile: Callable[[], None] | None = None,
+    background: Callable[[], None] | None = None,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -36,13 +36,13 @@ def animate(  # noqa: PLR0913
     transcript  : the spoken words, or a Path of a file with them; the same as a ``Request`` with this transcript
     language    : that is spoken; the same as a ``Request`` with this language (None: its own, or English)
     constraints : values that the motion must take exactly, in the units of the request's speaker; also of curves that
-                  follow from it (``Session.generated``)
+                  follow from it (``Session.generate``)
     edits       : what is changed of the motion, or the path of a file of edits (docs/edit.md), whose phones are used
                   where the request has no words and no phones. None: those of the request
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
     monitor     : receives reports of the progress
-    meanwhile   : is called while these processes work, where there are several: to prepare what is done next
+    background  : is called while these processes work, where there are several: to prepare what is done next
     Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -57,16 +57,16 @@ def animate(  # noqa: PLR0913
     """
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
-    request = request_of(speech, transcript, language)
+    request = as_request(speech, transcript, language)
     model = model if isinstance(model, Model) else load_model(model or request.model)
     edits = request.edits if edits is None else edits
     if edits is None or isinstance(edits, Edits):
-        session = Session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
+        session = Session(request, model=model, workers=workers, monitor=monitor, background=background)
     else:
         from lipmotion.pipeline.edit_files import edit_file
 
         file = edit_file(edits)
-        session = file.session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
+        session = file.session(request, model=model, workers=workers, monitor=monitor, background=background)
         edits = file.edits
     pins = Edits.of_pins(constraints.pins if constraints else ())
-    return session.generated((edits or Edits()).then(*pins.steps))
+    return session.generate((edits or Edits()).then(*pins.steps))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,7 @@ def speak_from_corpus(  # noqa: PLR0913
             f"the corpus {corpus.path} lacks {len(missing)} of {len(names)} recordings of the model, {missing[0]} "
             "among them; give the corpus that it was trained on"
         )
-    target = _target(text, lexicon or Lexicon(), engine, model)
+    target = _plan_phones(text, lexicon or Lexicon(), engine, model)
     utterances = {name: corpus.utterance(name) for name in names}
     people = sorted({utterance.speaker for utterance in utterances.values()})
     if len(people) > 1:
@@ -79,12 +79,18 @@ def speak_from_corpus(  # noqa: PLR0913
     recorded_features = {
         name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()
     }
-    _warn_of_stand_ins(engine.stand_ins(model.learned), target)
+    stand_ins = engine.stand_ins(model.learned)
+    absent = dict.fromkeys(span.label.phone for span in target if span.label.phone in stand_ins)
+    if absent:
+        LOG.warning(
+            "phones that the recordings do not have, and what is said instead: %s; see lipmotion corpus coverage",
+            ", ".join(f"{phone} ({stand_ins[phone]})" for phone in absent),
+        )
     pieces, units = engine.source_pieces(model.learned, target, recorded_features)
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
     rate_hz = utterances[names[0]].audio.rate_hz
     joined = overlapped(sounds, [(piece.start_s, piece.end_s) for piece in pieces], rate_hz)
-    begin_s = _begin_s(len(units), pieces, joined, rate_hz)
+    begin_s = _find_starts(len(units), pieces, joined, rate_hz)
     first, last = (round(begin_s[number] * rate_hz) for number in (0, -1))
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
@@ -93,7 +99,7 @@ def speak_from_corpus(  # noqa: PLR0913
     return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 
-def _target(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:
+def _plan_phones(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:
     """Return the phones of a text, each as long as it typically is."""
     spans: list[Span[Unit]] = []
     now_s = 0.0
@@ -112,17 +118,7 @@ def _target(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model
     return Timeline(tuple(spans))
 
 
-def _warn_of_stand_ins(stand_ins: Mapping[str, str], target: Timeline[Unit]) -> None:
-    """Log a warning that names the phones which were never recorded."""
-    missing = dict.fromkeys(span.label.phone for span in target if span.label.phone in stand_ins)
-    if missing:
-        named = ", ".join(f"{phone} ({stand_ins[phone]})" for phone in missing)
-        LOG.warning(
-            "phones that the recordings do not have, and what is said instead: %s; see lipmotion corpus coverage", named
-        )
-
-
-def _begin_s(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:
+def _find_starts(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:
     """Return when each of some phones begins in the joined sound, and when the last one ends [shape=(count + 1,)].
 
     Of the silences at both ends, ``REST_S`` are kept.

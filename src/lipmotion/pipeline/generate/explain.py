@@ -13,21 +13,18 @@ from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.generation import explanation_for
+from lipmotion.pipeline.generation import map_explanation
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import NO_EDITS, Session
 from lipmotion.printable import printable
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChainPosteriors,
-    ChainStates,
     ChannelValue,
-    DominantGaussian,
     Explanation,
     Generation,
     NamedProbability,
-    RegressedMean,
     SpeechPart,
     frame_of,
 )
@@ -36,8 +33,6 @@ LINE = 110
 """Width of the text of a row, without its name, in characters."""
 SHOWN_CHANNELS = 6
 """Largest number of channels in a text; points are left out if there are other channels."""
-SUFFIX = ".png"
-"""Pictures of posteriors end so."""
 
 
 def explain(
@@ -60,7 +55,7 @@ def explain(
     >>> first.state, second.frame
     ('rest', 100)
     """
-    session = Session(request_of(speech, transcript), model=model)
+    session = Session(as_request(speech, transcript), model=model)
     return explain_session(session, NO_EDITS, [at] if isinstance(at, int | float) else at)
 
 
@@ -69,43 +64,37 @@ def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> t
     """Return what determined the frames nearest to some times, in seconds, of a session's motion with some edits.
 
     Of what pins, gains and locks change it says nothing: it is what the model did with the phones.
-    Raises InputError: a time lies outside the recording; else as ``Session.generated``.
+    Raises InputError: a time lies outside the recording; else as ``Session.generate``.
     """
-    speech, person = session.understood(edits).speech, session.speaker
-    frames = [_frame(time_s, len(speech.features.values)) for time_s in times]
-    generation = session.generated(edits)
-    found = []
-    for frame in frames:
-        whole = [] if speech.parts is not None else [SpeechPart(0, slice(0, len(speech.features.values)), speech)]
-        within = [each for each in speech.parts or whole if each.own.start <= frame < each.own.stop]
-        first, _, part = within[0] if within else (frame + 1, None, speech)
+    speech = session.analyse(edits).speech
+    count = len(speech.features.values)
+    places = [(time_s, frame_of(time_s, count, FRAME_RATE_HZ)) for time_s in times]
+    for time_s, frame in places:
+        if frame is None:
+            raise InputError(f"{time_s} s lies outside the recording (0 to {(count - 1) / FRAME_RATE_HZ:.2f} s)")
+    generation, explanations = session.generate(edits), []
+    parts = speech.parts if speech.parts is not None else [SpeechPart(0, slice(0, count), speech)]
+    for frame in (frame for _, frame in places if frame is not None):
+        first, part = next(
+            ((each.first, each.speech) for each in parts if each.own.start <= frame < each.own.stop),
+            (frame + 1, speech),
+        )
         by_engine = None
         if 0 <= frame - first < len(part.features.values):  # not in the silence between passages
             part = replace(part, times_given=speech.times_given)
             by_engine = session.model.engine.explain(session.model.learned, part, [frame - first])
         if by_engine is None:
-            found.append(explain_by_trace(generation, frame))
-        else:
-            found.append(_placed(explanation_for(person, by_engine[0], part), first))
-    if generation.confidence is None:
-        return tuple(found)
-    return tuple(replace(each, confidence=float(generation.confidence[each.frame])) for each in found)
-
-
-def _placed(explanation: Explanation, first: int) -> Explanation:
-    """Return an explanation of a passage that begins in a frame, with times of the recording."""
-    offset_s, span = first / FRAME_RATE_HZ, explanation.span
-    if span is not None:
-        span = replace(span, start_s=max(span.start_s + offset_s, 0.0), end_s=span.end_s + offset_s)
-    return replace(explanation, time_s=explanation.time_s + offset_s, frame=explanation.frame + first, span=span)
-
-
-def _frame(time_s: float, frames: int) -> int:
-    """Return the frame nearest to a time. Raises InputError: the time lies outside the recording."""
-    frame = frame_of(time_s, frames, FRAME_RATE_HZ)
-    if frame is None:
-        raise InputError(f"{time_s} s lies outside the recording (0 to {(frames - 1) / FRAME_RATE_HZ:.2f} s)")
-    return frame
+            explanation = explain_by_trace(generation, frame)
+        else:  # with the times of its passage
+            explanation = map_explanation(session.speaker, by_engine[0], part)
+            offset_s, span = first / FRAME_RATE_HZ, explanation.span
+            if span is not None:
+                span = replace(span, start_s=max(span.start_s + offset_s, 0.0), end_s=span.end_s + offset_s)
+            explanation = replace(explanation, time_s=explanation.time_s + offset_s, frame=frame, span=span)
+        if generation.confidence is not None:
+            explanation = replace(explanation, confidence=float(generation.confidence[frame]))
+        explanations.append(explanation)
+    return tuple(explanations)
 
 
 def explanation_document(explanation: Explanation) -> dict[str, Any]:
@@ -129,62 +118,49 @@ def explanation_text(explanation: Explanation) -> str:
 
 
 def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
-    yield "phone", _phone(explanation)
+    phone, span = "none", explanation.span
+    if span is not None:
+        word = f" in {span.label.word!r}" if span.label.word else ""
+        times = f"{span.start_s:.2f} to {span.end_s:.2f} s"
+        phone = f"{span.label.phone or 'not known'}{word}, {times}, modelled by {span.label.unit}"
+    yield "phone", phone
     yield "state", explanation.state
     for number, chain in enumerate(explanation.chains):
-        yield f"chain {number + 1}: {chain.name}", _listed(chain.states)
+        yield f"chain {number + 1}: {chain.name}", _list_probabilities(chain.states)
     if explanation.joint is not None and len(explanation.chains) > 1:
-        yield "together", _listed([explanation.joint])
+        yield "together", _list_probabilities([explanation.joint])
     for chain in explanation.chains:
         if chain.lead:
-            yield "asynchrony", _lead(chain, explanation.chains[0].name)
+            shares = (
+                f"{states:+d}: {share:.2f}" if states else f"0: {share:.2f}" for states, share in chain.lead.items()
+            )
+            side = f"states {'ahead of' if chain.expected_lead >= 0 else 'behind'} {explanation.chains[0].name}"
+            yield "asynchrony", f"{chain.name} {abs(chain.expected_lead):.2f} {side}   ({'   '.join(shares)})"
     for gaussian in explanation.gaussians:
-        yield f"Gaussian of {gaussian.stream}", _gaussian(gaussian)
-        yield from _values(gaussian.channels)
+        parse_number = f" number {gaussian.component} of {gaussian.components}" if gaussian.components > 1 else ""
+        distance = f", {gaussian.distance:.2f} deviations away" if gaussian.distance is not None else ""
+        text = f"{gaussian.density}{parse_number}, responsible for {gaussian.responsibility:.2f}{distance}"
+        yield f"Gaussian of {gaussian.stream}", text
+        yield from _list_values(gaussian.channels)
     for regression in explanation.regressions:
-        yield f"mean of {regression.stream}", _regression(regression)
-        yield from _values(regression.channels)
-    values = _values(explanation.motion)
+        shown = _list_probabilities(regression.shares)
+        text = f"regression on the acoustic features and posteriors around the frame: {shown}"
+        if regression.shares[0].name == "rest":
+            text = "the rest pose: silence away from speech"
+        yield f"mean of {regression.stream}", text
+        yield from _list_values(regression.channels)
+    values = _list_values(explanation.motion)
     yield "generated", next(values)[1]
     yield from values
     if explanation.confidence is not None:
         yield "confidence", f"{explanation.confidence:.2f}"
 
 
-def _phone(explanation: Explanation) -> str:
-    span = explanation.span
-    if span is None:
-        return "none"
-    word = f" in {span.label.word!r}" if span.label.word else ""
-    phone = span.label.phone or "not known"
-    return f"{phone}{word}, {span.start_s:.2f} to {span.end_s:.2f} s, modelled by {span.label.unit}"
-
-
-def _listed(probabilities: Sequence[NamedProbability]) -> str:
+def _list_probabilities(probabilities: Sequence[NamedProbability]) -> str:
     return "   ".join(f"{item.name} {item.probability:.2f}" for item in probabilities)
 
 
-def _lead(chain: ChainStates, first: str) -> str:
-    shares = "   ".join(
-        f"{states:+d}: {share:.2f}" if states else f"0: {share:.2f}" for states, share in chain.lead.items()
-    )
-    side = "ahead of" if chain.expected_lead >= 0 else "behind"
-    return f"{chain.name} {abs(chain.expected_lead):.2f} states {side} {first}   ({shares})"
-
-
-def _gaussian(gaussian: DominantGaussian) -> str:
-    number = f" number {gaussian.component} of {gaussian.components}" if gaussian.components > 1 else ""
-    distance = f", {gaussian.distance:.2f} deviations away" if gaussian.distance is not None else ""
-    return f"{gaussian.density}{number}, responsible for {gaussian.responsibility:.2f}{distance}"
-
-
-def _regression(regression: RegressedMean) -> str:
-    if regression.shares[0].name == "rest":
-        return "the rest pose: silence away from speech"
-    return f"regression on the acoustic features and posteriors around the frame: {_listed(regression.shares)}"
-
-
-def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
+def _list_values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
     names = [name for name in channels if name[:2] not in ("x_", "y_", "z_")] or list(channels)
     for start in range(0, min(len(names), SHOWN_CHANNELS), 3):
         shown = names[start : min(start + 3, SHOWN_CHANNELS)]
@@ -198,7 +174,7 @@ def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
 def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
     """Return the motion of a session with some edits, and the posterior probabilities of every chain of its model.
 
-    Raises InputError: as ``Session.generated``, or the model's engine has no chains of states.
+    Raises InputError: as ``Session.generate``, or the model's engine has no chains of states.
     """
     engine, learned = session.model.engine, session.model.learned
     if type(engine).posteriors is Engine.posteriors:
@@ -207,4 +183,4 @@ def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"
         )
-    return session.generated(edits), engine.posteriors(learned, session.understood(edits).speech)
+    return session.generate(edits), engine.posteriors(learned, session.analyse(edits).speech)

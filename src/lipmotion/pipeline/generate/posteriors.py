@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.kernels.threads import one_thread
-from lipmotion.storage.files import check_target, whole_file
+from lipmotion.storage.files import atomic_file, check_target
 from lipmotion.types import ChainPosteriors, Generation
 from lipmotion.types.audio import Audio
 from lipmotion.units import is_silent
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from PIL import Image, ImageDraw, ImageFont
 
 SUFFIX = ".png"
-MOST_COLUMNS = 2000
+MAX_COLUMNS = 2000
 """Most columns of a plot; in a longer recording, each column is the mean of several frames."""
-LEAST_COLUMNS = 600
+MIN_COLUMNS = 600
 ROW_PX, GAP_PX, LEFT_PX, RIGHT_PX, TITLE_PX = 16, 14, 120, 16, 20
 CURVE_PX = 90
 """Height of the plot of the opening."""
-LEAST_PROBABILITY = 0.05
+MIN_PROBABILITY = 0.05
 """Units whose posterior probability never reaches this have no row."""
 STEPS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600, 1800)
-LEAST_PHONE_WIDTH = 8
+MIN_PHONE_WIDTH = 8
 """Mean pixels per phone that are needed to write the phones."""
-LEAST_TICK_DISTANCE = 80
+MIN_TICK_DISTANCE = 80
 """Least distance between two times on the axis, in pixels."""
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
 COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
@@ -54,7 +54,7 @@ def write_posteriors(path: Path, generation: Generation, posteriors: tuple[Chain
     Raises ExportError: another suffix, or the file cannot be written.
     """
     check_picture(path)
-    with whole_file(path) as unfinished:
+    with atomic_file(path) as unfinished:
         draw_posteriors(generation, posteriors).save(unfinished, optimize=True)
 
 
@@ -90,18 +90,22 @@ def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors
     from PIL import Image, ImageChops, ImageDraw
 
     frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
-    axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, LEAST_COLUMNS, MOST_COLUMNS)))
-    leader = posteriors[0].name if posteriors else ""
-    panels = [panel for number, chain in enumerate(posteriors) for panel in _panels(axis, chain, leader, number)]
+    axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, MIN_COLUMNS, MAX_COLUMNS)))
+    panels = []  # of each: title, names of the rows, colours [shape=(columns, rows, 3)]
+    for number, chain in enumerate(posteriors):
+        highest = chain.probability.max(axis=0)
+        units = np.flatnonzero(highest >= min(MIN_PROBABILITY, highest.max()))
+        first = (chain.probability[:, units] >= highest[units] / 2).argmax(axis=0)
+        units = units[np.argsort(first, kind="stable")]
+        colours = _shade(axis, chain.probability[:, units], COLOURS[number % len(COLOURS)])
+        panels.append((f"chain {number + 1}: {chain.name}", [chain.units[unit] for unit in units], colours))
+        if chain.leads:
+            leads = [f"{lead:+d}" if lead else "0" for lead in chain.leads]
+            title = f"asynchrony: states that {chain.name} is ahead of {posteriors[0].name}"
+            panels.append((title, leads, _shade(axis, chain.lead, INK)))
     channels = generation.motion.names
     curve = "opening" if "opening" in channels else channels[0]
-    height = (
-        TITLE_PX
-        + sum(TITLE_PX + ROW_PX * len(names) + GAP_PX for _, names, _ in panels)
-        + TITLE_PX
-        + CURVE_PX
-        + 2 * TITLE_PX
-    )
+    height = 4 * TITLE_PX + CURVE_PX + sum(TITLE_PX + ROW_PX * len(names) + GAP_PX for _, names, _ in panels)
     picture = Image.new("RGB", (LEFT_PX + axis.columns + RIGHT_PX, height), WHITE)
     pen = PlotPainter(ImageDraw.Draw(picture), axis)
     pen.phones(generation, height - 2 * TITLE_PX)
@@ -120,25 +124,7 @@ def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors
     return picture
 
 
-def _panels(
-    axis: TimeAxis, chain: ChainPosteriors, leader: str, number: int
-) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
-    """Return title, names of the rows and colours [shape=(columns, rows, 3)] of each panel of a chain."""
-    colour = COLOURS[number % len(COLOURS)]
-    most = chain.probability.max(axis=0)
-    shown = np.flatnonzero(most >= min(LEAST_PROBABILITY, most.max()))
-    first = (chain.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
-    shown = shown[np.argsort(first, kind="stable")]
-    names = [chain.units[unit] for unit in shown]
-    panels = [(f"chain {number + 1}: {chain.name}", names, _shaded(axis, chain.probability[:, shown], colour))]
-    if chain.leads:
-        named = [f"{lead:+d}" if lead else "0" for lead in chain.leads]
-        title = f"asynchrony: states that {chain.name} is ahead of {leader}"
-        panels.append((title, named, _shaded(axis, chain.lead, INK)))
-    return panels
-
-
-def _shaded(axis: TimeAxis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
+def _shade(axis: TimeAxis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
     share = np.clip(axis.averaged(probability), 0, 1)[:, :, None]
     return np.round(255 + share * (np.array(colour, float) - 255)).astype(np.uint8)
 
@@ -182,7 +168,7 @@ class PlotPainter:
 
     def phones(self, generation: Generation, bottom: float) -> None:
         """Write the phones at the top, and draw lines where they begin, if there is room for them."""
-        if len(generation.units) * LEAST_PHONE_WIDTH > self.axis.columns:
+        if len(generation.units) * MIN_PHONE_WIDTH > self.axis.columns:
             return
         free = 0.0
         for span in generation.units:
@@ -197,7 +183,7 @@ class PlotPainter:
     def times(self, y: float) -> None:
         """Draw the time axis."""
         length_s = self.axis.frames / self.axis.rate_hz
-        step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= LEAST_TICK_DISTANCE), STEPS_S[-1])
+        step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= MIN_TICK_DISTANCE), STEPS_S[-1])
         for number in range(int(length_s / step_s) + 1):
             x = self.axis.x(number * step_s)
             self.on.line([(x, y), (x, y + 5)], fill=INK)

@@ -46,7 +46,6 @@ SENTENCES_PER_RUN = 20
 """Sentences that one run of a synthesiser speaks; only their files are on the disk at a time."""
 BLOCK = 1 << 20
 """Samples of noise that are drawn at a time."""
-_Part = tuple[int, NDArray[np.float32]]
 LARGEST_TEXT_BYTES = 4 * MOST_CHARACTERS
 """Most bytes of a text file: a character takes up to four."""
 
@@ -108,13 +107,13 @@ def speak(  # noqa: PLR0913
             pauses=pauses,
             asymmetry=asymmetry,
         )
-        return spoken._replace(generation=_tagged(spoken.generation, tags))
+        return spoken._replace(generation=_with_moods(spoken.generation, tags))
     sentences = split_sentences(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
     loaded = model if isinstance(model, Model) else load_model(model)
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
-    sound, units = _said(sentences, chosen, lexicon)
-    sound = quantise(_with_floor(sound, units))
+    sound, units = _speak_sentences(sentences, chosen, lexicon)
+    sound = quantise(sound)
     request = Request(
         at_speech_rate(sound),
         units=units,
@@ -126,10 +125,10 @@ def speak(  # noqa: PLR0913
         manner=ASKED,
         spoken_so=True,
     )
-    return SpokenText(sound, _tagged(animate(request, model=loaded, constraints=constraints), tags))
+    return SpokenText(sound, _with_moods(animate(request, model=loaded, constraints=constraints), tags))
 
 
-def _tagged(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
+def _with_moods(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
     """Return a generation with the moods of tags in its text."""
     return replace(generation, moods=time_moods(tags, generation.units))
 
@@ -139,14 +138,16 @@ def read_text(path: Path) -> str:
     return read_text_file(path, "text", LARGEST_TEXT_BYTES)
 
 
-def _said(sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None) -> tuple[Audio, Timeline[Unit]]:
+def _speak_sentences(
+    sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None
+) -> tuple[Audio, Timeline[Unit]]:
     """Return sentences one after the other, at the synthesiser's rate or 16 kHz, and their phones in time."""
-    sounds: list[_Part] = []
+    sounds: list[tuple[int, NDArray[np.float32]]] = []
     spans: list[Span[Unit]] = []
     rate_hz, at = SPEECH_RATE_HZ, 0
     for start in range(0, len(sentences), SENTENCES_PER_RUN):
-        with closing(voiced_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as said:
-            for sentence in said:
+        with closing(voiced_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
+            for sentence in voiced:
                 sound = sentence.own_sound()
                 sound = sentence.audio if sound.rate_hz < SPEECH_RATE_HZ else sound
                 if not spans:
@@ -156,7 +157,20 @@ def _said(sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | No
                 spans += sentence.units.shifted(at / rate_hz)
                 at += len(sound.samples)
     count = at + _rest_samples(spans[-1], rate_hz)
-    return Audio(_placed(sounds, count), rate_hz), Timeline(tuple(_joined(spans, count / rate_hz)))
+    samples = np.zeros(count, np.float32)
+    while sounds:  # each is freed at once
+        first, part = sounds.pop()
+        samples[first : first + len(part)] = part[: max(count - first, 0)]
+    units = Timeline(tuple(_join_silences(spans, count / rate_hz)))
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    slices = [samples[round(span.start_s * rate_hz) : round(span.end_s * rate_hz)] for span in spoken]
+    power = sum(float(part @ part) for part in slices) / max(sum(map(len, slices)), 1)
+    gain = np.float32(np.sqrt(power * rate_hz / SPEECH_RATE_HZ) * 10 ** (-FLOOR_DB / 20))
+    rng = np.random.default_rng(0)
+    for start in range(0, count, BLOCK):
+        part = samples[start : start + BLOCK]
+        part += gain * rng.standard_normal(len(part), np.float32)
+    return Audio(samples, rate_hz), units
 
 
 def _rest_samples(edge: Span[Unit], rate_hz: int) -> int:
@@ -165,30 +179,7 @@ def _rest_samples(edge: Span[Unit], rate_hz: int) -> int:
     return max(round(rest_s * rate_hz), 0)
 
 
-def _placed(parts: list[_Part], count: int) -> NDArray[np.float32]:
-    """Return parts of sound as one sound [shape=(count,)], silent between them; the list is empty afterwards."""
-    samples = np.zeros(count, np.float32)
-    while parts:
-        first, part = parts.pop()
-        samples[first : first + len(part)] = part[: max(count - first, 0)]
-    return samples
-
-
-def _with_floor(speech: Audio, units: Timeline[Unit]) -> Audio:
-    """Return speech with white noise ``FLOOR_DB`` under its phones; the samples are changed in place."""
-    samples, rate_hz = speech.samples, speech.rate_hz
-    spoken = [span for span in units if not is_silent(span.label.phone)]
-    slices = [samples[round(span.start_s * rate_hz) : round(span.end_s * rate_hz)] for span in spoken]
-    power = sum(float(part @ part) for part in slices) / max(sum(map(len, slices)), 1)
-    gain = np.float32(np.sqrt(power * rate_hz / SPEECH_RATE_HZ) * 10 ** (-FLOOR_DB / 20))
-    rng = np.random.default_rng(0)
-    for start in range(0, len(samples), BLOCK):
-        part = samples[start : start + BLOCK]
-        part += gain * rng.standard_normal(len(part), np.float32)
-    return speech
-
-
-def _joined(spans: Sequence[Span[Unit]], duration_s: float) -> Iterator[Span[Unit]]:
+def _join_silences(spans: Sequence[Span[Unit]], duration_s: float) -> Iterator[Span[Unit]]:
     """Yield phones from 0 s to the end of the sound, every gap and every row of silences as one silence."""
     now_s, last_s = 0.0, 0.0  # where the silence begins, and where the next phone
     for span in spans:

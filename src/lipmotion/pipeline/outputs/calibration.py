@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.rig_tables import RigRow, suggest_names
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
-from lipmotion.pipeline.outputs.curve_sets import rig_sources
+from lipmotion.pipeline.outputs.curve_sets import make_rig_sources
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 Sources = Mapping[str, Sequence[float]]
@@ -25,11 +25,11 @@ OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
 """Their openings, in eye distances (the first is as wide as talkers open their mouths), and widths, that at rest 1."""
 RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
 DIGITS = 6
-LEAST_CHANGE = 1e-3
+MIN_CHANGE = 1e-3
 """A control that changes by less between two poses does not follow them."""
 
 
-def calibrated(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
+def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
     """Return the rows of a table with gains and offsets by which controls have the stated values.
 
     sources : of the curves that the rows follow
@@ -37,37 +37,50 @@ def calibrated(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Ma
               through what is stated allows
     Raises InputError: no such control, or one that does not change between the poses.
     """
-    values = _values(rows, sources)
+    values: dict[str, np.ndarray] = {}  # of each control in the poses, without its limits
+    for row in rows:
+        followed = np.array(sources.get(row.source, np.zeros(len(POSES))))
+        values[row.control] = values.get(row.control, 0.0) + row.offset + row.gain * followed
     lines = {}
-    for control in dict.fromkeys(name for given in stated.values() for name in given):
+    for control in dict.fromkeys(name for controls in stated.values() for name in controls):
         if control not in values:
-            raise InputError(f"the table has no {shortened(control)!r}; {suggest_names(control, values)}")
+            raise InputError(f"the table has no {shorten(control)!r}; {suggest_names(control, values)}")
         now = values[control]
-        wanted = {number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})}
-        if len(wanted) == 1:
-            only = next(iter(wanted))
+        targets = {
+            number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})
+        }
+        if len(targets) == 1:
+            only = next(iter(targets))
             other = int(np.abs(now - now[only]).argmax())
-            wanted[other] = float(now[other])
-        lines[control] = _line(control, now[list(wanted)], np.array(list(wanted.values())))
-    moved, seen = [], set[str]()
+            targets[other] = float(now[other])
+        before, wanted = now[list(targets)], np.array(list(targets.values()))
+        apart = before - before.mean()
+        if np.abs(apart).max() < MIN_CHANGE:
+            raise InputError(
+                f"{shorten(control)!r} follows no curve that tells these poses apart; give it another source in the "
+                "table"
+            )
+        gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
+        lines[control] = gain, round(float(wanted.mean() - gain * before.mean()), DIGITS)
+    calibrated, seen = [], set[str]()
     for row in rows:
         if row.control in lines:
             gain, offset = lines[row.control]
             first = offset if row.control not in seen else 0.0
             row = replace(row, gain=gain * row.gain, offset=gain * row.offset + first)  # noqa: PLW2901
             seen.add(row.control)
-        moved.append(row)
-    return moved
+        calibrated.append(row)
+    return calibrated
 
 
-def posed_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
+def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
     """Return the values of curves in ``POSES``: those of a character, or those that the rows of a rig follow.
 
     Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
     """
-    motion, units, frames = _spoken()
+    motion, units, frames = _pose_motion()
     if isinstance(curves, Path):
-        found = rig_sources(motion, units, rows)
+        found = make_rig_sources(motion, units, rows)
         return {name: curve[frames].tolist() for name, curve in found.items()}
     if curves.shapes is None:
         raise InputError("the character is moved by control points, which have no weights to calibrate")
@@ -76,7 +89,7 @@ def posed_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sou
     return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}
 
 
-def _spoken() -> tuple[Motion, Timeline[Unit], list[int]]:
+def _pose_motion() -> tuple[Motion, Timeline[Unit], list[int]]:
     """Return a motion with its phones, and the frames of the poses."""
     edges = PAUSE_S + PHONE_S * np.arange(len(PHONES) + 1)
     spans = [Span(0.0, PAUSE_S, Unit("sil"))]
@@ -89,23 +102,3 @@ def _spoken() -> tuple[Motion, Timeline[Unit], list[int]]:
     width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * mouth_template().width
     motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
     return motion, Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
-
-
-def _values(rows: Sequence[RigRow], sources: Sources) -> dict[str, np.ndarray]:
-    """Return the value of each control in ``POSES``, without its limits [each shape=(3,)]."""
-    values: dict[str, np.ndarray] = {}
-    for row in rows:
-        followed = np.array(sources.get(row.source, np.zeros(len(POSES))))
-        values[row.control] = values.get(row.control, 0.0) + row.offset + row.gain * followed
-    return values
-
-
-def _line(control: str, now: np.ndarray, wanted: np.ndarray) -> tuple[float, float]:
-    """Return gain and offset that bring a control's values nearest to the wanted ones."""
-    apart = now - now.mean()
-    if np.abs(apart).max() < LEAST_CHANGE:
-        raise InputError(
-            f"{shortened(control)!r} follows no curve that tells these poses apart; give it another source in the table"
-        )
-    gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
-    return gain, round(float(wanted.mean() - gain * now.mean()), DIGITS)

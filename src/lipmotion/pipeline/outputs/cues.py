@@ -128,7 +128,7 @@ class CueOutput(Output):
     def check(self) -> None:  # noqa: D102
         check_cue_options(self._fps, None, OPTIONAL)
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         sheet = cues(performance.generation, fps=self._fps, delivery=self.settings.delivery)
         recording = self.settings.recording
         said = "" if recording is None else as_text(recording)

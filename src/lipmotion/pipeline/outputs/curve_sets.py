@@ -38,7 +38,7 @@ and MPEG-4's facial animation parameters of lips and jaw."""
 
 
 def check_curve_set(curves: str | Path) -> None:
-    """Raise InputError unless there is such a set of curves, or such a table of a rig, for ``curves_of``."""
+    """Raise InputError unless there is such a set of curves, or such a table of a rig, for ``make_curves``."""
     if Path(curves).suffix.lower() == ".csv":
         read_rig_table(Path(curves))
     elif curves not in SHAPE_SETS:
@@ -52,7 +52,7 @@ def curve_names(curves: str | Path | DrivenCharacter) -> tuple[str, ...]:
     return () if curves in SHAPE_SETS else tuple(row.control for row in read_rig_table(Path(curves)))
 
 
-def curves_of(
+def make_curves(
     motion: Motion,
     units: Timeline[Unit],
     curves: str | Path | DrivenCharacter,
@@ -71,17 +71,17 @@ def curves_of(
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
     if isinstance(curves, DrivenCharacter):
-        return edited_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
+        return edit_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
     check_curve_set(curves)
     if curves in SHAPE_SETS:
-        return apply_curve_edits(_curves_of(motion, units, str(curves), staging, prosody), units, edits)
+        return apply_curve_edits(_make_set(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
-    sources = rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
+    sources = make_rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
     own = [edit for edit in edits if edit.channel not in sources]
     return apply_curve_edits(apply_rig(rows, sources, motion.rate_hz), units, own)
 
 
-def rig_sources(
+def make_rig_sources(
     motion: Motion,
     units: Timeline[Unit],
     rows: Sequence[RigRow],
@@ -93,11 +93,11 @@ def rig_sources(
     """Return the curves that controls of a rig may follow, by their names [each shape=(T,)].
 
     Channels of motion, ARKit's blendshapes, visemes; where rows ask for others, also vowels, moods, eyes, brows and the
-    head. staging, prosody, edits : as of ``curves_of``
+    head. staging, prosody, edits : as of ``make_curves``
     """
 
     def plain(name: str) -> Motion:
-        return apply_curve_edits(_curves_of(motion, units, name, staging, prosody), units, edits)
+        return apply_curve_edits(_make_set(motion, units, name, staging, prosody), units, edits)
 
     sets = [with_mouth(motion), plain(ARKIT), plain("visemes")]
     if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
@@ -106,7 +106,7 @@ def rig_sources(
     return {name: np.zeros(len(motion.values)) for name in ARKIT_OTHERS} | sources
 
 
-def edited_weights(
+def edit_weights(
     weights: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit], known: Mapping[str, str] | None = None
 ) -> Motion:
     """Return weights of a character with pins and gains, which name its blendshapes as it does or as ``known``.
@@ -124,7 +124,7 @@ def known_names(mesh: Mesh) -> dict[str, str]:
     return {arkit_name(shape.called) or shape.called: shape.name for shape in reversed(mesh.shapes) if shape.called}
 
 
-def _curves_of(
+def _make_set(
     motion: Motion, units: Timeline[Unit], name: str, staging: Staging | None, prosody: Prosody | None
 ) -> Motion:
     """Return the curves of one of ``SHAPE_SETS``."""
@@ -133,35 +133,29 @@ def _curves_of(
     motion = with_mouth(motion)
     if name == WHOLE_FACE:
         mouth = solve_shape_weights(motion, units, arkit_mouth())
-        return beside(mouth, compute_living_curves(motion, units, staging, prosody))
-    if name == VOWELS:
-        return beside(_vowel_motion(motion, units), compute_living_curves(motion, units, staging, prosody))
+        return join_channels(mouth, compute_living_curves(motion, units, staging, prosody))
+    if name == VOWELS:  # with how far the lips are pressed together, and VRM's expressions of moods
+        lips, moods = spoken_mouth(motion, units), expression_weights(read_moods(motion))
+        curves = {CLOSED: lips.closing if CLOSED not in motion.names else motion[CLOSED]}
+        curves |= {
+            mood: curve * lips.free for mood, curve in moods.items()
+        }  # only the model knows which parts the lips
+        channels = tuple(Channel(curve, WEIGHT) for curve in curves)
+        pressed = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
+        vowels = join_channels(solve_shape_weights(motion, units, vowel_mouth()), pressed)
+        return join_channels(vowels, compute_living_curves(motion, units, staging, prosody))
     return weigh_visemes(units, spoken_mouth(motion, units)) if name == "visemes" else move_faps(motion, units)
 
 
-def _vowel_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
-    """Return the weights of the vowels of VRM, how far the lips are pressed together, and VRM's expressions of moods.
-
-    Expressions vanish where the lips are pressed: whether one parts them, the model alone knows.
-    """
-    mouth, shown = spoken_mouth(motion, units), expression_weights(read_moods(motion))
-    curves = {CLOSED: mouth.closing if CLOSED not in motion.names else motion[CLOSED]}
-    curves |= {name: curve * mouth.free for name, curve in shown.items()}
-    channels = tuple(Channel(name, WEIGHT) for name in curves)
-    added = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
-    return beside(solve_shape_weights(motion, units, vowel_mouth()), added)
-
-
-def beside(first: Motion, second: Motion) -> Motion:
+def join_channels(first: Motion, second: Motion) -> Motion:
     """Return two motions of the same frames as one, the channels of the first one before those of the second one.
 
     Raises InputError: other numbers of frames, or a channel that both have.
     """
     if len(first.values) != len(second.values):
         raise InputError(f"motions have {len(first.values)} and {len(second.values)} frames, required the same number")
-    return Motion(
-        np.concatenate([first.values, second.values], axis=1), first.rate_hz, first.channels + second.channels
-    )
+    values = np.concatenate([first.values, second.values], axis=1)
+    return Motion(values, first.rate_hz, first.channels + second.channels)
 
 
 def with_curves(
@@ -171,20 +165,20 @@ def with_curves(
     staging: Staging | None = None,
     prosody: Prosody | None = None,
 ) -> tuple[Generation, tuple[str, ...]]:
-    """Return a generation with the channels of ``curves_of`` after its own, and the names of those channels.
+    """Return a generation with the channels of ``make_curves`` after its own, and the names of those channels.
 
-    Channels that the motion has already are replaced. The variance of all channels of ``curves_of`` is 0.
-    Raises InputError: as ``curves_of``.
+    Channels that the motion has already are replaced. The variance of all channels of ``make_curves`` is 0.
+    Raises InputError: as ``make_curves``.
     """
     edits = generation.curve_edits
-    added = curves_of(generation.motion, generation.units, curves, staging=staging, prosody=prosody, edits=edits)
+    added = make_curves(generation.motion, generation.units, curves, staging=staging, prosody=prosody, edits=edits)
     kept = [name for name in generation.motion.names if name not in added.names]
     if len(kept) < len(generation.motion.names):
         generation = generation.selected(kept)
-    return generation.with_motion(beside(generation.motion, added)), added.names
+    return generation.with_motion(join_channels(generation.motion, added)), added.names
 
 
-def described(character: DrivenCharacter) -> Iterator[str]:
+def describe_character(character: DrivenCharacter) -> Iterator[str]:
     """Yield what was found in a character's files, line by line."""
     mesh, placement = character.mesh, character.placement
     parts = ", ".join(part.name or "(no name)" for part in mesh.parts)

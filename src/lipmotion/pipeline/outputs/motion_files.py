@@ -25,10 +25,17 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
-from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves
-from lipmotion.pipeline.outputs.delivered import delivered, held_mouth
+from lipmotion.pipeline.outputs.curve_sets import (
+    ARKIT,
+    LIVING_SETS,
+    WHOLE_FACE,
+    join_channels,
+    make_curves,
+    with_curves,
+)
+from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
-from lipmotion.pipeline.outputs.prosody import recorded_prosody
+from lipmotion.pipeline.outputs.prosody import measure_recorded_prosody
 from lipmotion.storage.files import as_text, sound_reference
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 from lipmotion.types.motion import RADIAN
@@ -44,7 +51,7 @@ OPENING = "opening"
 
 
 class MotionOutput(Output):
-    """``.json``, ``.csv``, ``.livelink.csv``, …: the motion, or curves that follow from it (``export.base``)."""
+    """``.json``, ``.csv``, ``.livelink.csv``, …: the motion, or curves that follow from it (``formats.base``)."""
 
     @classmethod
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
@@ -55,28 +62,34 @@ class MotionOutput(Output):
         return bool(motion_suffix(path))
 
     def check(self) -> None:  # noqa: D102
-        settings = self.settings
-        check_rate(self.path, settings.outputs.rate_hz)
+        check_rate(self.path, self.settings.outputs.rate_hz)
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
-        settings = self.settings
-        spoken, chosen, asked = performance.cached(_chosen)
-        lives = motion_format(self.path).curves in LIVING_SETS or settings.curves in LIVING_SETS
-        prosody = performance.cached(recorded_prosody) if lives else None
-        rate_hz, named = settings.outputs.rate_hz, settings.outputs.channels
-        held = in_format(self.path, spoken, chosen, rate_hz, settings.staging, prosody, named)
-        warn_of_unused(self.path, held, asked)
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        settings, form = self.settings, motion_format(self.path)
+        spoken, chosen, requested = performance.cached(_choose)
+        lives = form.curves in LIVING_SETS or settings.curves in LIVING_SETS
+        prosody = performance.cached(measure_recorded_prosody) if lives else None
+        rate_hz, channels = settings.outputs.rate_hz, settings.outputs.channels
+        held = fit_to_format(self.path, spoken, chosen, rate_hz, settings.staging, prosody, channels)
+        names = held.motion.names
+        is_replaced = form.mouth and OPENING in names and OPENING not in requested
+        if requested and (is_replaced or not {*requested} & {*names}):
+            suffix = motion_suffix(self.path)
+            LOG.warning(
+                "%s: %s holds channels of its own, none of those that were asked for", *(self.path.name, suffix)
+            )
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
-        held = held_mouth(held, frames, performance.cached(_closed_s))
-        if motion_format(self.path).keyed and settings.delivery.key_tolerance:
-            held = thinned(held, Thinning(settings.delivery.key_tolerance, tuple(find_closed_times(held))))
+        held = hold_mouth(held, frames, performance.cached(_find_closed_s))
+        if form.keyed and settings.delivery.key_tolerance:
+            held = thin_keys(held, Thinning(settings.delivery.key_tolerance, tuple(find_closed_times(held))))
         check_motion(self.path, held.motion)
         return partial(self._write, held, performance)
 
     def _write(self, held: Generation, performance: Performance) -> None:
-        about = performance.model.about if performance.model else performance.generation.about
-        kept = ("name", "corpus", "licence", "attribution")
-        model = {key: _text(about[key]) for key in kept if about.get(key)}
+        about, model = performance.model.about if performance.model else performance.generation.about, {}
+        for key in ("name", "corpus", "licence", "attribution"):
+            if value := about.get(key):
+                model[key] = as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
         speech, sound_s = performance.sound_file, self.settings.delivery.offset_ms / 1000
         source = {"file": as_text(speech.name)} if speech else {}
         if speech and sound_s:
@@ -86,7 +99,7 @@ class MotionOutput(Output):
         write_motion(self.path, held, source=source, model=model)
 
 
-def thinned(held: Generation, thinning: Thinning) -> Generation:
+def thin_keys(held: Generation, thinning: Thinning) -> Generation:
     """Return a generation whose weights go straight between the keys that are kept of each.
 
     Weights that never exceed the tolerance are left out, and held poses stay as they are.
@@ -103,35 +116,35 @@ def thinned(held: Generation, thinning: Thinning) -> Generation:
     return replace(held, motion=replace(motion, values=values)).selected(kept)
 
 
-def _delivered(performance: Performance) -> Generation:
+def _deliver(performance: Performance) -> Generation:
     """Return the motion as delivered, with the articulatory channels that were asked for."""
     generation, settings = performance.generation, performance.settings
     if {*settings.outputs.channels} & {*GESTURES}:
         generation = with_articulation(generation, settings.outputs.channels)
-    return delivered(generation, settings.delivery)
+    return deliver(generation, settings.delivery)
 
 
-def _closed_s(performance: Performance) -> list[float]:
+def _find_closed_s(performance: Performance) -> list[float]:
     """Return the times of p, b and m that held poses show; none, where poses are not held."""
-    return find_closed_times(performance.cached(_delivered)) if performance.settings.delivery.hold_ms else []
+    return find_closed_times(performance.cached(_deliver)) if performance.settings.delivery.hold_ms else []
 
 
-def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[str]]:
+def _choose(performance: Performance) -> tuple[Generation, Generation, Sequence[str]]:
     """Return the motion, what motion files hold of it unless their format says more, and the channels asked for."""
-    settings, spoken = performance.settings, performance.cached(_delivered)
+    settings, spoken = performance.settings, performance.cached(_deliver)
     rate_hz, curves, channels = settings.outputs.rate_hz, settings.curves, settings.outputs.channels or None
-    if rate_hz is not None and (performance.cached(_closed_s) or rate_hz < spoken.motion.rate_hz):
+    if rate_hz is not None and (performance.cached(_find_closed_s) or rate_hz < spoken.motion.rate_hz):
         spoken = close_on_frame_grid(spoken, rate_hz)
     asked: Sequence[str] = channels or ()
     names: Sequence[str] | None = channels
     if curves is not None:
-        prosody = performance.cached(recorded_prosody) if curves in LIVING_SETS else None
+        prosody = performance.cached(measure_recorded_prosody) if curves in LIVING_SETS else None
         spoken, found = with_curves(spoken, curves, staging=settings.staging, prosody=prosody)
         asked = asked if channels or isinstance(curves, DrivenCharacter) else found
         names = found if channels is None else channels
     chosen = spoken.selected(names) if names is not None else spoken
     if rate_hz is not None:
-        chosen = chosen.resampled(rate_hz) if curves is None else resampled_curves(chosen, spoken, rate_hz)
+        chosen = chosen.resampled(rate_hz) if curves is None else resample_curves(chosen, spoken, rate_hz)
     return spoken, chosen, asked
 
 
@@ -143,11 +156,7 @@ def with_articulation(generation: Generation, channels: Sequence[str] = GESTURES
     return generation.with_motion(with_gestures(generation.motion, generation.units, channels))
 
 
-def _text(value: object) -> str:
-    return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
-
-
-def in_format(
+def fit_to_format(
     path: Path,
     generation: Generation,
     chosen: Generation,
@@ -169,14 +178,14 @@ def in_format(
     """
     form = motion_format(path)
     held = chosen
-    whole = held.motion.names == generation.motion.names and _blendshapes(generation.motion) is not None
-    others = form.other_curves and not whole and all(channel.unit in CURVES for channel in held.motion.channels)
+    is_all = held.motion.names == generation.motion.names and _blendshapes(generation.motion) is not None
+    others = form.other_curves and not is_all and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
-        curves = _curves(generation, form.curves, staging, prosody)
+        curves = _make_curves(generation, form.curves, staging, prosody)
         curves = apply_curve_edits(curves, generation.units, generation.curve_edits)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
-        own = [name for name in channels or () if name in curves.names]
-        held = held.selected(own) if own else held
+        named = [name for name in channels or () if name in curves.names]
+        held = held.selected(named) if named else held
     elif form.mouth and OPENING not in held.motion.names:
         held = generation
     of_format = form.fixed_rate or abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ
@@ -185,10 +194,10 @@ def in_format(
         return held
     if held is chosen or held is generation:
         return held.resampled(hertz)
-    return resampled_curves(held, generation, hertz)
+    return resample_curves(held, generation, hertz)
 
 
-def resampled_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
+def resample_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
     """Return curves at another rate, in whose frames the lips touch as in pictures of the motion at that rate.
 
     held       : the curves;  generation : the motion that they are of, with as many frames
@@ -201,18 +210,6 @@ def resampled_curves(held: Generation, generation: Generation, rate_hz: float) -
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 
-def warn_of_unused(path: Path, held: Generation, asked: Sequence[str]) -> None:
-    """Log a warning if a motion file holds none of the channels that were asked for: its format says what it holds.
-
-    asked : the channels, or the curves, that the user named
-    """
-    names = held.motion.names
-    replaced = motion_format(path).mouth and OPENING in names and OPENING not in asked
-    if asked and (replaced or not {*asked} & {*names}):
-        kind = motion_suffix(path)
-        LOG.warning("%s: %s holds channels of its own, none of those that were asked for", path.name, kind)
-
-
 def check_rate(path: Path, rate_hz: float | None) -> None:
     """Raise ExportError if a motion file cannot have a rate that the user asks for."""
     form = motion_format(path)
@@ -221,43 +218,29 @@ def check_rate(path: Path, rate_hz: float | None) -> None:
         raise ExportError(f"{path}: {rate_hz:g} frames a second in {motion_suffix(path)}, {required}")
 
 
-def _curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
+def _make_curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
     """Return a set of curves, with those that the motion has already."""
-    motion, units = generation.motion, generation.units
-    own = _held_already(motion, name)
-    if own is None:
-        return curves_of(motion, units, name, staging=staging, prosody=prosody)
-    if name in (ARKIT, WHOLE_FACE):
-        moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
-        own = _closed(own, curves_of(beside(own, generation.selected(moods).motion) if moods else own, units, ARKIT))
-    if name != WHOLE_FACE:
-        return own
-    living = compute_living_curves(with_mouth(motion), units, staging, prosody)
-    added = [column for column, name in enumerate(living.names) if name not in own.names]
-    channels = tuple(living.channels[column] for column in added)
-    return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
-
-
-def _closed(own: Motion, mouth: Motion) -> Motion:
-    """Return blendshapes with those of the mouth as another motion has them, and those that this one has in addition.
-
-    mouth : the same weights, but where lips close that would not (``solve_shape_weights``)
-    """
-    curves = {name: own[name] for name in own.names}
+    motion, units, is_arkit = generation.motion, generation.units, name in (ARKIT, WHOLE_FACE)
+    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == name == FAP]
+    shapes = _blendshapes(motion) if is_arkit else None
+    if shapes is None and not columns:
+        return make_curves(motion, units, name, staging=staging, prosody=prosody)
+    if shapes is None:
+        return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+    moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
+    shown = join_channels(shapes, generation.selected(moods).motion) if moods else shapes
+    mouth = make_curves(shown, units, ARKIT)  # the same weights, but where lips close that would not, and more of them
+    curves = {name: shapes[name] for name in shapes.names}
     curves |= {name: mouth[name] for name in mouth.names if name in curves or mouth[name].any()}
-    channels = {channel.name: channel for channel in (*mouth.channels, *own.channels)}
+    known = {channel.name: channel for channel in (*mouth.channels, *shapes.channels)}
     values = np.stack([curve.astype(np.float64) for curve in curves.values()], axis=1)
-    return Motion(values, own.rate_hz, tuple(channels[name] for name in curves))
-
-
-def _held_already(motion: Motion, curves: str) -> Motion | None:
-    """Return the channels of a motion that are curves of a set already; None: there are none."""
-    if curves in (ARKIT, WHOLE_FACE):
-        return _blendshapes(motion)
-    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == curves == FAP]
-    if not columns:
-        return None
-    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+    face = Motion(values, motion.rate_hz, tuple(known[name] for name in curves))
+    if name != WHOLE_FACE:
+        return face
+    living = compute_living_curves(with_mouth(motion), units, staging, prosody)
+    columns = [column for column, name in enumerate(living.names) if name not in face.names]
+    channels = tuple(living.channels[column] for column in columns)
+    return join_channels(face, Motion(living.values[:, columns], motion.rate_hz, channels))
 
 
 def _blendshapes(motion: Motion) -> Motion | None:

@@ -14,7 +14,7 @@ from lipmotion.formats.base import read_motion
 from lipmotion.formats.cues import read_cue_motion
 from lipmotion.meshes.files.steady_rate import match_sound_rate
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.pipeline.understand.read_request import read_units
+from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")
@@ -66,7 +66,7 @@ def read_generation(
     return Generation(replace(motion, channels=channels), nothing, phones, StateTrace((STATE,), states))
 
 
-def in_step(motion: Motion, duration_s: float, advice: str = "") -> Motion:
+def correct_rate(motion: Motion, duration_s: float, advice: str = "") -> Motion:
     """Return motion at the rate of its sound, where it is off by 1001 / 1000 (``match_sound_rate``); a warning."""
     rate_hz = match_sound_rate(motion.rate_hz, len(motion.values), duration_s)
     if rate_hz != motion.rate_hz:
@@ -78,7 +78,7 @@ def in_step(motion: Motion, duration_s: float, advice: str = "") -> Motion:
     return replace(motion, rate_hz=rate_hz)
 
 
-def as_long_as(generation: Generation, duration_s: float, *, keeps_rate: bool = False) -> Generation:
+def match_duration(generation: Generation, duration_s: float, *, keeps_rate: bool = False) -> Generation:
     """Return a generation that lasts as long as its sound: the last pose stays, or the rest is cut.
 
     keeps_rate : whether its rate is right; otherwise one that is off by 1001 / 1000 is corrected, if it has no phones
@@ -86,7 +86,7 @@ def as_long_as(generation: Generation, duration_s: float, *, keeps_rate: bool = 
     """
     motion = generation.motion
     if not keeps_rate and not len(generation.units):
-        motion = in_step(motion, duration_s, "; --motion-rate says another")
+        motion = correct_rate(motion, duration_s, "; --motion-rate says another")
     lasts_s = (len(motion.values) - 1) / motion.rate_hz
     if abs(lasts_s - duration_s) > TOLERATED_S:
         what = "the last pose stays" if lasts_s < duration_s else "what comes after the sound is left out"

@@ -150,7 +150,7 @@ class Output(ABC):
         return
 
     @abstractmethod
-    def prepared(self, performance: Performance) -> Callable[[], None]:
+    def prepare(self, performance: Performance) -> Callable[[], None]:
         """Return a function that writes the file; whole or not at all.
 
         Raises ExportError or InputError: the motion does not suit the file. So nothing is written if one of several
@@ -191,7 +191,7 @@ def output_suffixes(settings: OutputSettings) -> tuple[str, ...]:
     return tuple(suffix for kind in _kinds() for suffix in kind.suffixes(settings))
 
 
-def checked_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> list[Output]:
+def create_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> list[Output]:
     """Return the outputs of some paths. Raises ExportError or InputError: one cannot be written as the settings say."""
     settings.face.check(settings)
     planned = [plan(path, settings) for path in paths]

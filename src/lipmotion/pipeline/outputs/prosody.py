@@ -17,7 +17,7 @@ from lipmotion.speech.sound.decimation import decimated
 from lipmotion.types import Audio, Prosody
 
 
-def prosody_of_speech(speech: str | Path | Audio) -> Prosody:
+def measure_prosody(speech: str | Path | Audio) -> Prosody:
     """Return loudness and pitch of a recording or a sound, for movements of brows and head.
 
     A sound that is shorter than one frame of speech is followed by silence. One that keeps its features keeps this.
@@ -42,7 +42,7 @@ def _prosody(sound: Audio) -> Prosody:
     return prosody_of(Audio(np.pad(samples, (0, missing)), SPEECH_RATE_HZ))
 
 
-def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
+def shift_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
     """Return loudness and pitch on the timeline of files: later by the offset."""
     frames = round(delivery.offset_ms / 10)
     if frames <= 0:
@@ -51,7 +51,7 @@ def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
     return Prosody(np.concatenate([quiet, prosody.level_db]), np.concatenate([quiet * np.nan, prosody.log_f0]))
 
 
-def recorded_prosody(performance: Performance) -> Prosody | None:
+def measure_recorded_prosody(performance: Performance) -> Prosody | None:
     """Return loudness and pitch of what is performed, on the timeline of files; None: there is no sound."""
     speech = performance.speech
-    return None if speech is None else moved_prosody(prosody_of_speech(speech), performance.settings.delivery)
+    return None if speech is None else shift_prosody(measure_prosody(speech), performance.settings.delivery)

@@ -10,17 +10,12 @@ from typing import Any
 
 from lipmotion.articulation.delivery import Delivery, delay_units
 from lipmotion.errors import ExportError
-from lipmotion.extensions import provided
+from lipmotion.extensions import load_provided
 from lipmotion.formats.label_files import LABEL_SUFFIXES, write_labels
 from lipmotion.formats.sound import SOUND_CODECS, write_sound
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outputs.output import (
-    Output,
-    OutputSettings,
-    Performance,
-    checked_outputs,
-)
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, create_outputs
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
 from lipmotion.types.staging import Staging
@@ -33,7 +28,7 @@ class LabelOutput(Output):
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
         return LABEL_SUFFIXES
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         generation = performance.generation
         end_s = float(generation.motion.time_s[-1])
         return partial(write_labels, self.path, delay_units(generation.units, self.settings.delivery, end_s))
@@ -46,7 +41,7 @@ class SoundOutput(Output):
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102
         return tuple(SOUND_CODECS) if settings.sounded else ()
 
-    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+    def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         if performance.sound is None:
             raise ExportError(f"{self.path}: there is no sound to write; give one: write(..., speech=Audio(...))")
         return partial(write_sound, self.path, performance.sound)
@@ -110,7 +105,7 @@ def write(  # noqa: PLR0913
     sound = speech if isinstance(speech, Audio) else None
     how = replace(film or Outputs(), channels=tuple(channels or ()), rate_hz=rate_hz, fps=fps)
     settings = OutputSettings(
-        provided("shown_face")(face),
+        load_provided("shown_face")(face),
         None if speech is None or sound is not None else Path(str(speech)),
         sound is not None,
         how,
@@ -118,7 +113,7 @@ def write(  # noqa: PLR0913
         staging or Staging(),
         delivery or Delivery(),
     )
-    planned = checked_outputs([outputs] if isinstance(outputs, str | Path) else outputs, settings)
+    planned = create_outputs([outputs] if isinstance(outputs, str | Path) else outputs, settings)
     write_planned(generation, planned, settings, sound=sound, model=model, temporary=temporary, monitor=monitor)
 
 
@@ -132,7 +127,7 @@ def write_planned(
     temporary: bool = False,
     monitor: Monitor = silent_monitor,
 ) -> None:
-    """Write generated motion to the outputs of ``checked_outputs``.
+    """Write generated motion to the outputs of ``create_outputs``.
 
     sound : the sound, where it is in no file
     model, temporary, monitor : as of ``write``. Raises as ``write``.
@@ -140,5 +135,5 @@ def write_planned(
     sounds = (output.path for output in planned if isinstance(output, SoundOutput))
     sound_file = next(sounds, None) if settings.recording is None or temporary else settings.recording
     performance = Performance(generation, settings, sound, sound_file, model, monitor)
-    for write_file in [output.prepared(performance) for output in planned]:  # nothing, if the motion does not suit one
+    for write_file in [output.prepare(performance) for output in planned]:  # nothing, if the motion does not suit one
         write_file()

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
 from lipmotion.printable import printable
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.types import Channel, Motion, Track, Utterance
+from lipmotion.types import Channel, Motion, Utterance
 
 LOG = logging.getLogger("lipmotion")
 PICTURES = 980
@@ -64,9 +64,12 @@ def with_visual_channels(utterance: Utterance, visual: str, eigenlips: Eigenlips
         return utterance
     if eigenlips is None:
         raise InputError(f"visual {visual!r} without eigenlips; required: those of train_eigenlips, or of the model")
-    return replace(
-        utterance, track=_with_eigenlips(utterance.track, eigenlips.project(_crops(utterance)), visual, eigenlips)
-    )
+    motion = utterance.track.motion
+    values, channels = eigenlips.project(_crops(utterance)).astype(float), eigenlips.channels
+    if visual == BOTH:
+        values = np.concatenate([motion.values, values], axis=1)
+        channels = (*motion.channels, *channels)
+    return replace(utterance, track=replace(utterance.track, motion=Motion(values, motion.rate_hz, channels)))
 
 
 def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
@@ -75,44 +78,32 @@ def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
     Utterances that have the same channels are returned as they are; else a warning says which are left out.
     Raises CorpusError: they have no channel in common.
     """
+
+    def names_of(channels: Sequence[Channel]) -> str:
+        return printable(shorten(", ".join(channel.name for channel in channels)))
+
     kinds = list(dict.fromkeys(utterance.track.motion.channels for utterance in utterances))
     if len(kinds) < 2:
         return list(utterances)
     common = tuple(channel for channel in kinds[0] if all(channel in kind for kind in kinds))
     if not common:
         raise CorpusError(
-            f"{len(kinds)} kinds of motion without a common channel: {'; '.join(map(_some, kinds))}; train on one kind "
-            "at a time (--speaker), or give their channels the same names and units"
+            f"{len(kinds)} kinds of motion without a common channel: {'; '.join(map(names_of, kinds))}; train on one "
+            "kind at a time (--speaker), or give their channels the same names and units"
         )
     left_out = sorted({channel.name for kind in kinds for channel in kind if channel not in common})
     LOG.warning(
         "%d kinds of motion: training on the %d channels that all have (%s); left out: %s",
-        *(len(kinds), len(common), _some(common), printable(shortened(", ".join(left_out)))),
+        *(len(kinds), len(common), names_of(common), printable(shorten(", ".join(left_out)))),
     )
-    return [_with_channels(utterance, common) for utterance in utterances]
-
-
-def _some(channels: Sequence[Channel]) -> str:
-    """Return the names of some channels, for a message."""
-    return printable(shortened(", ".join(channel.name for channel in channels)))
-
-
-def _with_channels(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
-    motion = utterance.track.motion
-    if motion.channels == channels:
-        return utterance
-    columns = [motion.channels.index(channel) for channel in channels]
-    chosen = Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, channels)
-    return replace(utterance, track=replace(utterance.track, motion=chosen))
-
-
-def _with_eigenlips(track: Track, coefficients: NDArray[np.float32], visual: str, eigenlips: Eigenlips) -> Track:
-    """Return a track whose channels are eigenlips, after those of the track if ``visual`` is ``BOTH``."""
-    values, channels = coefficients.astype(float), eigenlips.channels
-    if visual == BOTH:
-        values = np.concatenate([track.motion.values, values], axis=1)
-        channels = (*track.motion.channels, *channels)
-    return replace(track, motion=Motion(values, track.motion.rate_hz, channels))
+    reduced = []
+    for utterance in utterances:
+        motion = utterance.track.motion
+        columns = [motion.channels.index(channel) for channel in common]
+        chosen = Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, common)
+        same = motion.channels == common
+        reduced.append(utterance if same else replace(utterance, track=replace(utterance.track, motion=chosen)))
+    return reduced
 
 
 def _crops(utterance: Utterance) -> NDArray[np.uint8]:

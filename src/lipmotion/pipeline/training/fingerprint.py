@@ -25,7 +25,7 @@ PICTURES = "crops.npy"
 """File of the mouth pictures of an utterance: large, and needed for eigenlips only."""
 
 
-def fingerprint(
+def fingerprint_training(
     corpus: Corpus,
     names: Sequence[str],
     engine: Engine[Any],
@@ -61,7 +61,7 @@ def fingerprint(
     return digest.hexdigest()
 
 
-def corpus_digest(corpus: Corpus) -> str:
+def digest_corpus(corpus: Corpus) -> str:
     """Return a digest of all utterances of a corpus, without their mouth pictures."""
     digest = hashlib.sha256()
     _add_utterances(digest, corpus, corpus.names(), GEOMETRY)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,18 +14,17 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.printable import printable
-from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE, TranscriptFit, transcript_fit
+from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE, transcript_fit
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.types import Item, Monitor, ParallelMap, Progress, Span, Timeline, Unit, Utterance
 
 LOG = logging.getLogger("lipmotion")
-MOST_NAMED_RECORDINGS = 10
+MAX_NAMED_RECORDINGS = 10
 """Largest number of recordings that one warning names."""
 
 
 def warn_of_doubtful_transcripts(
-    labelled: Iterable[tuple[Utterance, Timeline[Unit]]],
-    realigned: Callable[[Utterance], Timeline[Unit]] | None = None,
+    labelled: Iterable[tuple[Utterance, Timeline[Unit]]], realigned: Callable[[Utterance], Timeline[Unit]] | None = None
 ) -> None:
     """Log a warning that names the utterances whose transcripts do not fit the sound.
 
@@ -39,7 +39,9 @@ def warn_of_doubtful_transcripts(
             if utterance.phones is None and utterance.words:
                 fit, count = transcript_fit(utterance.audio, units), count + 1
                 if realigned is not None and (fit.is_doubtful or fit.share < LEAST_FITTING_SHARE):
-                    fit = _better(fit, utterance, realigned)
+                    with suppress(AlignmentError):
+                        other = transcript_fit(utterance.audio, realigned(utterance))
+                        fit = max(fit, other, key=lambda each: (not each.is_doubtful, each.share))
                 if fit.is_doubtful:
                     wrong.append(utterance.name)
                 elif fit.share < LEAST_FITTING_SHARE:
@@ -55,17 +57,6 @@ def warn_of_doubtful_transcripts(
             )
 
 
-def _better(
-    fit: TranscriptFit, utterance: Utterance, realigned: Callable[[Utterance], Timeline[Unit]]
-) -> TranscriptFit:
-    """Return the fit of the words aligned once more, if it is better than a fit."""
-    try:
-        other = transcript_fit(utterance.audio, realigned(utterance))
-    except AlignmentError:
-        return fit
-    return max(fit, other, key=lambda each: (not each.is_doubtful, each.share))
-
-
 def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
     """Log a warning that names the utterances with neither words nor labelled phones, if others have them."""
     missing = [utterance.name for utterance in utterances if utterance.phones is None and not utterance.words]
@@ -79,8 +70,8 @@ def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
 
 def _listed(names: Sequence[str]) -> str:
     """Return the first names, and how many more there are."""
-    more = len(names) - MOST_NAMED_RECORDINGS
-    return printable(", ".join(names[:MOST_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_NAMED_RECORDINGS
+    return printable(", ".join(names[:MAX_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
 
 
 UTTERANCES_PER_CHECKPOINT = 32
@@ -102,7 +93,7 @@ def label_utterances(
     """
     starts = range(0, len(utterances), UTTERANCES_PER_CHECKPOINT)
     blocks = [utterances[start : start + UTTERANCES_PER_CHECKPOINT] for start in starts]
-    stored = [checkpoint.load(_stage(number)) for number in range(len(blocks))]
+    stored = [checkpoint.load(f"labels-{number}") for number in range(len(blocks))]
     unlabelled = (block for block, arrays in zip(blocks, stored, strict=True) if arrays is None)
     # without mouth pictures, which take time to send to another process
     missing = [[replace(each, track=replace(each.track, crops=None)) for each in block] for block in unlabelled]
@@ -111,7 +102,7 @@ def label_utterances(
     for number, (block, arrays) in enumerate(zip(blocks, stored, strict=True)):
         results = _from_arrays(arrays) if arrays is not None else next(labelled)
         if arrays is None:
-            checkpoint.save(_stage(number), _to_arrays(results))
+            checkpoint.save(f"labels-{number}", _to_arrays(results))
         for utterance, phones in zip(block, results, strict=True):
             if isinstance(phones, str):
                 monitor(Item(utterance.name, "skipped", phones))
@@ -120,20 +111,15 @@ def label_utterances(
         monitor(Progress("phones: alignment and recognition", done, len(utterances), done / len(utterances)))
 
 
-def _stage(number: int) -> str:
-    """Return the name of a block in the checkpoint."""
-    return f"labels-{number}"
-
-
 def _label_block(utterances: Sequence[Utterance], labeller: Labeller) -> list[PhonesOrReason]:
-    return [_label(utterance, labeller) for utterance in utterances]
-
-
-def _label(utterance: Utterance, labeller: Labeller) -> PhonesOrReason:
-    try:
-        return labeller(utterance)
-    except (AlignmentError, InputError) as error:
-        return str(error)
+    """Return the phones in time, or the reason why there are none, of each utterance; runs in another process."""
+    results: list[PhonesOrReason] = []
+    for utterance in utterances:
+        try:
+            results.append(labeller(utterance))
+        except (AlignmentError, InputError) as error:
+            results.append(str(error))
+    return results
 
 
 def _to_arrays(results: Sequence[PhonesOrReason]) -> dict[str, NDArray[Any]]:

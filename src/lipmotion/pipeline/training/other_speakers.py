@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
-from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shortened
+from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shorten
 from lipmotion.formats.label_files import find_labels
+from lipmotion.pipeline.analysis.transcribe import align_or_recognise
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
-from lipmotion.pipeline.understand.transcribe import phones_in_time
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score
 from lipmotion.speech.recognition.recogniser import Recogniser
@@ -78,7 +78,7 @@ def is_held_out_speaker(speaker: str) -> bool:
     return zlib.crc32(speaker.encode()) % SPEAKER_PARTS == HELD_OUT_PART
 
 
-def synthetic_sentences(
+def synthesise_sentences(
     texts: Sequence[str] | None = None,
     voices: Sequence[SyntheticVoice] | None = None,
     *,
@@ -100,11 +100,11 @@ def synthetic_sentences(
         packages = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
         raise MissingDependencyError(f"no speech synthesiser is installed; install one or more: apt install {packages}")
     spoken = [prompt.text for prompt in prompts(count=SENTENCES).chosen] if texts is None else list(texts)
-    for sentences in each(partial(_sentences_of_voice, texts=spoken, lexicon=lexicon), chosen):
+    for sentences in each(partial(_synthesise_voice, texts=spoken, lexicon=lexicon), chosen):
         yield from sentences
 
 
-def recorded_sentences(
+def align_recordings(
     folder: str | Path,
     phones: Recogniser,
     *,
@@ -131,30 +131,37 @@ def recorded_sentences(
     check_listable(root)
     is_any_transcribed = False
     for path in sorted(path for path in root.rglob("*") if path.suffix.lower() in AUDIO_SUFFIXES):
-        name = "-".join(path.relative_to(root).with_suffix("").parts)
-        speaker = _speaker(name, path.relative_to(root), speakers or {})
+        inner = path.relative_to(root)
+        name = "-".join(inner.with_suffix("").parts)
+        named = (speaker for pattern, speaker in (speakers or {}).items() if fnmatchcase(name, pattern))
+        speaker = next(named, inner.parts[0] if len(inner.parts) > 1 else name)
         try:
             words = find_labels(path).words
-            if words is not None:
-                is_any_transcribed = True
-                _check_language(words, lexicon)
-                yield SpokenSentence(name, speaker, *_aligned(path, words, phones, lexicon))
+            if words is None:
+                continue
+            is_any_transcribed = True
+            foreign = [word for word in words if not word.isascii() and not lexicon.known(word)]
+            if foreign:  # what other languages do with their letters is no guide to English
+                raise InputError(
+                    f"no pronunciation of {shorten(foreign[0])!r}; required English words, or a lexicon file with the "
+                    "others"
+                )
+            audio = read_audio(path)
+            units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
+            score = agreement_score(audio, units)
+            if score < DOUBTFUL_SCORE:
+                raise InputError(
+                    f"its transcript seems not to be what is said (its phones agree with the sound at {score:.1f}, "
+                    f"required {DOUBTFUL_SCORE} or more); check it"
+                )
+            yield SpokenSentence(name, speaker, audio, units)
         except (AlignmentError, InputError) as error:
             monitor(Item(name, "skipped", str(error)))
     if not is_any_transcribed:
         raise CorpusError(f"{root}: no recording with a transcript; put what is said in x.wav into x.txt beside it")
 
 
-def _check_language(words: Sequence[str], lexicon: Lexicon) -> None:
-    """Raise InputError if words have accents and no pronunciation: those of other languages are no guide to English."""
-    foreign = [word for word in words if not word.isascii() and not lexicon.known(word)]
-    if foreign:
-        raise InputError(
-            f"no pronunciation of {shortened(foreign[0])!r}; required English words, or a lexicon file with the others"
-        )
-
-
-def voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
+def make_voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
     """Yield sentences as training data; features are computed when an item is taken, and not kept."""
     return (VoiceExample(analysed(sentence.audio).mfcc(), sentence.phones, sentence.speaker) for sentence in sentences)
 
@@ -172,52 +179,30 @@ def other_voices(
     recordings : a folder of transcribed recordings, which are aligned by the general phone models
     lexicon    : pronunciations of words, ahead of those of the dictionary
     monitor    : called with the recordings that cannot be used
-    Raises MissingDependencyError, CorpusError: as ``synthetic_sentences`` and ``recorded_sentences``.
+    Raises MissingDependencyError, CorpusError: as ``synthesise_sentences`` and ``align_recordings``.
     """
     if recordings is not None:
         general = Recogniser(load_model().phones, "general")
-        yield from voice_examples(recorded_sentences(recordings, general, lexicon=lexicon, monitor=monitor))
+        yield from make_voice_examples(align_recordings(recordings, general, lexicon=lexicon, monitor=monitor))
     if synthetic:
         chosen = [voice for voice in installed_voices() if not is_held_out_speaker(voice.speaker)]
-        yield from voice_examples(synthetic_sentences(voices=chosen, lexicon=lexicon))
+        yield from make_voice_examples(synthesise_sentences(voices=chosen, lexicon=lexicon))
 
 
-def _sentences_of_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:
-    name = f"{voice.synthesiser}-{voice.name}"
-    return [
-        SpokenSentence(f"{name}-{number:03d}", voice.speaker, *_with_pauses_and_noise(audio, units, number))
-        for number, (audio, units) in enumerate(speak_sentences(texts, voice, lexicon), start=1)
-    ]
-
-
-def _with_pauses_and_noise(audio: Audio, units: Timeline[Unit], seed: int) -> tuple[Audio, Timeline[Unit]]:
-    """Return a sentence with silence before and after it, and with white noise."""
-    pause = np.zeros(round(PAUSE_S * audio.rate_hz), np.float32)
-    longer = Audio(np.concatenate([pause, audio.samples, pause]), audio.rate_hz)
-    spoken = list(units.shifted(PAUSE_S))
-    if is_silent(spoken[0].label.phone):
-        del spoken[0]
-    if is_silent(spoken[-1].label.phone):
-        del spoken[-1]
-    before = Span(0.0, spoken[0].start_s, Unit(SILENCE))
-    after = Span(spoken[-1].end_s, longer.duration_s, Unit(SILENCE))
-    return noisy_audio(longer, "white", FLOOR_DB, seed=seed), Timeline((before, *spoken, after))
-
-
-def _speaker(name: str, inner: Path, speakers: Mapping[str, str]) -> str:
-    """Return the speaker of a recording, from its name and its path within the folder."""
-    given = (speaker for pattern, speaker in speakers.items() if fnmatchcase(name, pattern))
-    return next(given, inner.parts[0] if len(inner.parts) > 1 else name)
-
-
-def _aligned(path: Path, words: Sequence[str], phones: Recogniser, lexicon: Lexicon) -> tuple[Audio, Timeline[Unit]]:
-    """Return the sound of a recording and its aligned phones. Raises InputError: they do not agree."""
-    audio = read_audio(path)
-    units = phones_in_time(phones, audio, analysed(audio).mfcc(), words, lexicon)
-    score = agreement_score(audio, units)
-    if score < DOUBTFUL_SCORE:
-        raise InputError(
-            f"its transcript seems not to be what is said (its phones agree with the sound at {score:.1f}, required "
-            f"{DOUBTFUL_SCORE} or more); check it"
-        )
-    return audio, units
+def _synthesise_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:
+    """Return texts in a voice, with silence before and after each of them, and with white noise."""
+    sentences = []
+    for number, (audio, units) in enumerate(speak_sentences(texts, voice, lexicon), start=1):
+        pause = np.zeros(round(PAUSE_S * audio.rate_hz), np.float32)
+        longer = Audio(np.concatenate([pause, audio.samples, pause]), audio.rate_hz)
+        spoken = list(units.shifted(PAUSE_S))
+        if is_silent(spoken[0].label.phone):
+            del spoken[0]
+        if is_silent(spoken[-1].label.phone):
+            del spoken[-1]
+        before = Span(0.0, spoken[0].start_s, Unit(SILENCE))
+        after = Span(spoken[-1].end_s, longer.duration_s, Unit(SILENCE))
+        noisy = noisy_audio(longer, "white", FLOOR_DB, seed=number)
+        name = f"{voice.synthesiser}-{voice.name}-{number:03d}"
+        sentences.append(SpokenSentence(name, voice.speaker, noisy, Timeline((before, *spoken, after))))
+    return sentences

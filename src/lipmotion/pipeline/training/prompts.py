@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from importlib import resources
+from itertools import chain, groupby, pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.training.phone_sequences import pronounced_sentences, recorded_phones
-from lipmotion.units import SILENCE, VISEME_OF, Lexicon
+from lipmotion.formats.label_files import read_plain_text
+from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, split_words
 
+SHIPPED = "english.txt"
 PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
 WEIGHTS = {PHONE: 8.0, DIPHONE: 2.0, CONTEXT: 1.0}
 """Weight of the first occurrence of each kind of unit: a phone; a phone after a phone; a phone beside a viseme class.
@@ -66,21 +69,15 @@ def prompts(
     if count < 1:
         raise InputError(f"{count} prompts asked for, required at least 1")
     lexicon = lexicon or Lexicon()
-    usable, left_out = pronounced_sentences(text, lexicon)
+    usable, left_out = pronounce_sentences(text, lexicon)
     index: dict[UnitName, int] = {}
-    units = [_numbered(units_of(phones), index) for phones in usable.values()]
-    recorded = (
-        _numbered(
-            {unit for run in chain.from_iterable(recorded_phones(have, lexicon)) for unit in units_of(run)}, index
-        )
-        if have
-        else None
-    )
+    units = [_numbered(find_units(phones), index) for phones in usable.values()]
+    runs = chain.from_iterable(read_corpus_phones(have, lexicon)) if have else ()
+    recorded = _numbered({unit for run in runs for unit in find_units(run)}, index)
     weights = np.array([WEIGHTS[name[0]] for name in index])
-    if recorded is not None:
-        weights[recorded] = 0
+    weights[recorded] = 0
     costs = [len(phones) for phones in usable.values()]
-    order = greedy_cover(units, costs, weights.copy(), count)
+    order = cover_greedily(units, costs, weights.copy(), count)
     covered = weights == 0
     is_phone, is_diphone = (np.array([name[0] == kind for name in index]) for kind in (PHONE, DIPHONE))
     chosen, sentences = [], list(usable)
@@ -90,7 +87,7 @@ def prompts(
     return Prompts(tuple(chosen), int(is_phone.sum()), int(is_diphone.sum()), len(usable), left_out)
 
 
-def units_of(phones: Sequence[str]) -> set[UnitName]:
+def find_units(phones: Sequence[str]) -> set[UnitName]:
     """Return the units in a sequence of phones between two silences; silence counts as a neighbour only."""
     sequence = [SILENCE, *phones, SILENCE]
     units: set[UnitName] = {(DIPHONE, left, right) for left, right in pairwise(sequence)}
@@ -100,7 +97,7 @@ def units_of(phones: Sequence[str]) -> set[UnitName]:
     return units
 
 
-def greedy_cover(
+def cover_greedily(
     sets: Sequence[NDArray[np.intp]], costs: Sequence[float], weights: NDArray[np.float64], count: int
 ) -> list[int]:
     """Return the numbers of the sets to take, in order: each time the set that adds most weight for its cost.
@@ -132,3 +129,46 @@ def greedy_cover(
 def _numbered(units: set[UnitName], index: dict[UnitName, int]) -> NDArray[np.intp]:
     """Return the numbers of some units, adding new ones to the index."""
     return np.array([index.setdefault(unit, len(index)) for unit in sorted(units)], np.intp)
+
+
+def pronounce_sentences(text: str | Path | None, lexicon: Lexicon) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
+    """Return the phones of the sentences of a file, and the unknown word of every sentence that cannot be used.
+
+    text    : a file with a sentence a line; None: the list in the package
+    lexicon : pronunciations of words; the first one of each word is taken
+    Raises InputError: no such file, or no sentence that can be used.
+    """
+    path = Path(text) if text is not None else Path(str(resources.files("lipmotion") / "prompts" / SHIPPED))
+    usable: dict[str, tuple[str, ...]] = {}
+    left_out: dict[str, str] = {}
+    lines = (" ".join(line.split()) for line in read_plain_text(path).splitlines())
+    for line in dict.fromkeys(filter(None, lines)):
+        try:
+            words = split_words(line)
+        except InputError:  # a line of dashes
+            continue
+        unknown = next((word for word in words if not lexicon.known(word)), None)
+        if unknown is None:
+            usable[line] = tuple(phone for word in words for phone in lexicon.pronunciations(word)[0])
+        else:
+            left_out[line] = unknown
+    if not usable:
+        reason = f"; {next(iter(left_out.values()))!r} is not in the dictionary: --lexicon" if left_out else ""
+        raise InputError(f"{path}: no sentence to choose from{reason}; required: a sentence a line")
+    return usable, left_out
+
+
+def read_corpus_phones(corpus: Corpus, lexicon: Lexicon) -> Iterator[list[tuple[str, ...]]]:
+    """Yield for each utterance of a corpus the sequences of phones between silences, those of its labels or words.
+
+    An utterance without labels, and without words that the lexicon knows, has none.
+    """
+    for name in corpus.names():
+        entry = read_entry(corpus.folder(name))
+        if entry.get("phones"):
+            phones = [row[2] for row in entry["phones"]]
+            yield [tuple(run) for silent, run in groupby(phones, key=is_silent) if not silent]
+        elif entry["words"] and all(map(lexicon.known, entry["words"])):
+            yield [tuple(phone for word in entry["words"] for phone in lexicon.pronunciations(word)[0])]
+        else:
+            yield []

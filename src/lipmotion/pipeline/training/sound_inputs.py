@@ -8,8 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.engines import Engine
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, token_posteriors
 from lipmotion.speech.sound.acoustic_conditions import condition_spectra
 from lipmotion.types import (
@@ -31,65 +33,50 @@ LONGEST_VOICE_S = 10.0
 
 
 def with_sound_inputs(
-    engine: Engine[Any],
-    examples: Sequence[Example],
-    sound: Mapping[str, Audio],
-    monitor: Monitor,
-    each: ParallelMap,
+    engine: Engine[Any], examples: Sequence[Example], sound: Mapping[str, Audio], monitor: Monitor, each: ParallelMap
 ) -> list[Example]:
     """Return examples with what the engine's training takes from their sound (``Inputs``).
 
-    These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, and spectra in many
-    acoustic conditions (``Example.condition_spectra``).
+    These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, the encoding of the
+    sound, and spectra in many acoustic conditions (``Example.condition_spectra``). The noise of babble is made of the
+    recordings themselves; all is drawn from the number of the recording.
     sound : of each example, by its name
     each  : applies a function to many items, perhaps in several processes
     """
     inputs = engine.inputs(sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ)
-    recordings = [sound[example.name] for example in examples]
+    recordings, count = [sound[example.name] for example in examples], len(examples)
     result = list(examples)
     name = installed_phone_recogniser() if inputs.posteriors else None
     if name is not None:
-        result = _with_posteriors(result, recordings, name, sub_monitor(monitor, 0, 0.5), each)
+        report = sub_monitor(monitor, 0, 0.5)
+        for number, posteriors in enumerate(each(partial(token_posteriors, name), recordings)):
+            result[number] = replace(result[number], speech=replace(result[number].speech, posteriors=posteriors))
+            if (number + 1) % BLOCK == 0:
+                report(Progress("posteriors of phones", number + 1, count, (number + 1) / count))
+    if inputs.encoding:
+        result = [
+            replace(example, speech=replace(example.speech, encoding=encoding))
+            for example, encoding in zip(result, each(_encode, recordings), strict=True)
+        ]
     if inputs.conditions:
-        result = _with_conditions(result, recordings, inputs.conditions, sub_monitor(monitor, 0.5, 1), each)
+        report, spectra = sub_monitor(monitor, 0.5, 1), list[list[ConditionSpectrum]]()
+        chosen = [recordings[n] for n in np.unique(np.linspace(0, count - 1, VOICES).round().astype(int))]
+        voices = [Audio(voice.samples[: int(LONGEST_VOICE_S * voice.rate_hz)], voice.rate_hz) for voice in chosen]
+        blocks = [list(enumerate(recordings))[start : start + BLOCK] for start in range(0, count, BLOCK)]
+        for block in each(partial(_vary_block, voices=voices, count=inputs.conditions), blocks):
+            spectra += block
+            report(Progress("acoustic conditions", len(spectra), count, len(spectra) / count))
+        result = [
+            replace(example, condition_spectra=tuple(varied)) for example, varied in zip(result, spectra, strict=True)
+        ]
     return result
 
 
-def _with_posteriors(
-    examples: Sequence[Example], recordings: Sequence[Audio], name: str, monitor: Monitor, each: ParallelMap
-) -> list[Example]:
-    result: list[Example] = []
-    for example, posteriors in zip(examples, each(partial(token_posteriors, name), recordings), strict=True):
-        result.append(replace(example, speech=replace(example.speech, posteriors=posteriors)))
-        if len(result) % BLOCK == 0:
-            monitor(Progress("posteriors of phones", len(result), len(examples), len(result) / len(examples)))
-    return result
-
-
-def _with_conditions(
-    examples: Sequence[Example], recordings: Sequence[Audio], count: int, monitor: Monitor, each: ParallelMap
-) -> list[Example]:
-    """Return examples in ``count`` acoustic conditions each.
-
-    The noise of babble is made of the recordings themselves; all is drawn from the number of the recording.
-    """
-    chosen = np.unique(np.linspace(0, len(recordings) - 1, VOICES).round().astype(int))
-    voices = [_shortened(recordings[number]) for number in chosen]
-    blocks = [list(enumerate(recordings))[start : start + BLOCK] for start in range(0, len(recordings), BLOCK)]
-    varied: list[list[ConditionSpectrum]] = []
-    for block in each(partial(_block, voices=voices, count=count), blocks):
-        varied += block
-        monitor(Progress("acoustic conditions", len(varied), len(recordings), len(varied) / len(recordings)))
-    return [
-        replace(example, condition_spectra=tuple(spectra)) for example, spectra in zip(examples, varied, strict=True)
-    ]
-
-
-def _block(
+def _vary_block(
     recordings: Sequence[tuple[int, Audio]], voices: Sequence[Audio], count: int
 ) -> list[list[ConditionSpectrum]]:
     return [condition_spectra(audio, voices, count, [number]) for number, audio in recordings]
 
 
-def _shortened(audio: Audio) -> Audio:
-    return Audio(audio.samples[: int(LONGEST_VOICE_S * audio.rate_hz)], audio.rate_hz)
+def _encode(audio: Audio) -> NDArray[np.float16]:
+    return analysed(audio).encoding

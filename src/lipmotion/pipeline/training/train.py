@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import metadata
@@ -20,7 +21,8 @@ from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import resample_track
-from lipmotion.motion.speaker_maps import SpeakerMaps, add_habits, map_to_mean_person
+from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
+from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses
 from lipmotion.pipeline.model import GEOMETRY, Model, load_model, with_prior
 from lipmotion.pipeline.training.channels import (
     check_visual,
@@ -28,7 +30,7 @@ from lipmotion.pipeline.training.channels import (
     with_common_channels,
     with_visual_channels,
 )
-from lipmotion.pipeline.training.fingerprint import fingerprint
+from lipmotion.pipeline.training.fingerprint import fingerprint_training
 from lipmotion.pipeline.training.labels import (
     label_utterances,
     warn_of_doubtful_transcripts,
@@ -36,7 +38,6 @@ from lipmotion.pipeline.training.labels import (
 )
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
-from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
@@ -46,6 +47,7 @@ from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
     FRAME_RATE_HZ,
+    Audio,
     Example,
     Features,
     Monitor,
@@ -156,7 +158,8 @@ def train(  # noqa: PLR0913
     check_visual(visual)
     if run.work is not None:
         check_apart((), [Source(corpus.path, "corpus")], folders=[run.work])
-    _check_prior(prior)
+    if prior is not None and prior.prior is not None:
+        raise InputError("the model to start from stands on another model itself; start from that one, or from none")
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
     chosen = corpus.selected(selection)
@@ -165,7 +168,7 @@ def train(  # noqa: PLR0913
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = with_common_channels([with_visual_channels(each, visual, eigenlips) for each in utterances])
-    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
+    job = fingerprint_training(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
     checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
     with worker_pool(min(process_count(run.workers), len(chosen) // UTTERANCES_PER_WORKER)) as team:
         monitor = sub_monitor(run.monitor, 0, 0.5)
@@ -173,7 +176,9 @@ def train(  # noqa: PLR0913
             utterances, recogniser, lexicon, monitor, checkpoint, team.ordered_map
         )
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
-        examples, speakers = _of_the_mean_person(examples, speaker_of)
+        people, speakers = [speaker_of[example.name] for example in examples], None
+        if len(set(filter(None, people))) > 1:
+            examples, speakers = map_to_mean_person(examples, people)
         sound = {utterance.name: utterance.audio for utterance in utterances}
         examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
@@ -181,7 +186,7 @@ def train(  # noqa: PLR0913
     if not fit.uses_prior:
         prior = None
     used = tuple(example.name for example in examples)
-    about = about_training(
+    about = describe_training(
         corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
     )
     if selection.speakers and selection.names is None:
@@ -192,7 +197,7 @@ def train(  # noqa: PLR0913
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
     if speakers is not None:
         generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
-        speakers = add_habits(speakers, examples, [speaker_of[name] for name in used], generated)
+        speakers = add_habits(speakers, examples, people, generated)
         about["speakers"] = list(speakers.names)
     return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers), TrainReport(
         used, skipped, fit.figures
@@ -212,9 +217,27 @@ def phones_and_examples(
     each : applies a function to many items, perhaps in several processes
     Raises CorpusError: no utterance can be used.
     """
-    training, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
-    phones = _train_phone_models(utterances, lexicon, recogniser, training, checkpoint, each)
-    examples, skipped = _examples(utterances, Recogniser(phones), lexicon, labelling, checkpoint, each)
+    learning, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
+    phones = _train_phone_models(utterances, lexicon, recogniser, learning, checkpoint, each)
+    examples: list[Example] = []
+    skipped: dict[str, str] = {}
+    labelled: list[tuple[Utterance, Timeline[Unit]]] = []
+    warn_of_missing_transcripts(utterances)
+    labeller = partial(label_phones, phones=Recogniser(phones), lexicon=lexicon)
+    for utterance, units in label_utterances(utterances, labeller, labelling, checkpoint, each):
+        if isinstance(units, str):
+            skipped[utterance.name] = units
+            continue
+        labelled.append((utterance, units))
+        motion, valid = resample_track(utterance.track, len(utterance.features.values))
+        spectrum = analysed(utterance.audio).spectrum
+        speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum)
+        examples.append(Example(utterance.name, speech, motion, valid))
+    if not examples:
+        name, reason = next(iter(skipped.items()))
+        raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
+    general = Recogniser(phones, "general")
+    warn_of_doubtful_transcripts(labelled, partial(label_phones, phones=general, lexicon=lexicon))
     return phones, examples, skipped
 
 
@@ -237,31 +260,12 @@ def examples_without_motion(
         yield Example(speaker, Speech(features, units), no_motion, np.zeros(frames, bool))
 
 
-def phones_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
+def label_phones(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
     """Return the phones in time of an utterance: labelled, or aligned if its words are known, or recognised."""
     if utterance.phones is not None:
         return utterance.phones
     features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
-    return phones_in_time(phones, utterance.audio, features, utterance.words, lexicon)
-
-
-def _check_prior(prior: Model | None) -> None:
-    """Raise InputError if a model cannot be stood on."""
-    if prior is not None and prior.prior is not None:
-        raise InputError("the model to start from stands on another model itself; start from that one, or from none")
-
-
-def _of_the_mean_person(
-    examples: list[Example], speakers: Mapping[str, str]
-) -> tuple[list[Example], SpeakerMaps | None]:
-    """Return examples in the motion of the mean person, and the maps of all people; as they are, of one person.
-
-    speakers : of each example, by its name
-    """
-    names = [speakers[example.name] for example in examples]
-    if len(set(filter(None, names))) < 2:
-        return examples, None
-    return map_to_mean_person(examples, names)
+    return align_or_recognise(phones, utterance.audio, features, utterance.words, lexicon)
 
 
 def _train_phone_models(
@@ -273,14 +277,19 @@ def _train_phone_models(
     each: ParallelMap,
 ) -> UnitHmm:
     """Return phone models of all transcribed or labelled utterances, or those of the shipped model."""
-    transcribed = [
-        (utterance.audio, utterance.words)
-        for utterance in utterances
-        if utterance.phones is None and utterance.words and _are_pronounceable(utterance.words, lexicon)
-    ]
-    labelled = [
-        (utterance.audio, _phone_runs(utterance.phones)) for utterance in utterances if utterance.phones is not None
-    ]
+    transcribed: list[tuple[Audio, tuple[str, ...]]] = []
+    labelled: list[tuple[Audio, tuple[str, ...]]] = []
+    pronunciations: dict[str, tuple[tuple[str, ...], ...]] = {}
+    for utterance in utterances:
+        if utterance.phones is not None:  # the phones between two silences are a word with one pronunciation
+            phones = groupby((span.label.phone for span in utterance.phones), key=is_silent)
+            runs = [tuple(run) for silent, run in phones if not silent]
+            labelled.append((utterance.audio, tuple(map(" ".join, runs))))
+            pronunciations |= {" ".join(run): (run,) for run in runs}
+        elif utterance.words:
+            with suppress(InputError):  # a word in another script; the utterance is reported when it is aligned
+                if all(lexicon.pronunciations(word) for word in utterance.words):
+                    transcribed.append((utterance.audio, utterance.words))
     if not transcribed and not labelled:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
@@ -289,63 +298,15 @@ def _train_phone_models(
         LOG.warning(
             "%d of %d recordings have no words: their phones are recognised, which is less sure; write the words "
             "into a .txt beside each (docs/corpora.md)",
-            unknown,
-            len(utterances),
+            *(unknown, len(utterances)),
         )
     vocabulary = dict.fromkeys(word for _, words in transcribed for word in words)
     warn_of_guesses(tuple(vocabulary), lexicon)
-    pronunciations = {" ".join(run): (run,) for _, runs in labelled for run in runs}
-    as_words = [(audio, tuple(map(" ".join, runs))) for audio, runs in labelled]
     lexicon = Lexicon(lexicon.user | pronunciations)
-    return train_phone_models([*transcribed, *as_words], lexicon, config, monitor, checkpoint, each)
+    return train_phone_models([*transcribed, *labelled], lexicon, config, monitor, checkpoint, each)
 
 
-def _phone_runs(phones: Timeline[Unit]) -> list[tuple[str, ...]]:
-    """Return the sequences of phones between silences; each is used as a word with one pronunciation."""
-    names = (span.label.phone for span in phones)
-    return [tuple(run) for silent, run in groupby(names, key=is_silent) if not silent]
-
-
-def _are_pronounceable(words: Sequence[str], lexicon: Lexicon) -> bool:
-    """Return whether all words have a pronunciation."""
-    try:
-        return all(lexicon.pronunciations(word) for word in words)
-    except InputError:  # a word in another script; the utterance is reported when it is aligned
-        return False
-
-
-def _examples(
-    utterances: Sequence[Utterance],
-    phones: Recogniser,
-    lexicon: Lexicon,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
-    each: ParallelMap,
-) -> tuple[list[Example], dict[str, str]]:
-    """Return the examples for an engine, and the reason for every utterance that is not used."""
-    examples: list[Example] = []
-    skipped: dict[str, str] = {}
-    labelled: list[tuple[Utterance, Timeline[Unit]]] = []
-    warn_of_missing_transcripts(utterances)
-    labeller = partial(phones_of, phones=phones, lexicon=lexicon)
-    for utterance, units in label_utterances(utterances, labeller, monitor, checkpoint, each):
-        if isinstance(units, str):
-            skipped[utterance.name] = units
-            continue
-        labelled.append((utterance, units))
-        motion, valid = resample_track(utterance.track, len(utterance.features.values))
-        spectrum = analysed(utterance.audio).spectrum
-        speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum)
-        examples.append(Example(utterance.name, speech, motion, valid))
-    if not examples:
-        name, reason = next(iter(skipped.items()))
-        raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
-    general = Recogniser(phones.own, "general")
-    warn_of_doubtful_transcripts(labelled, partial(phones_of, phones=general, lexicon=lexicon))
-    return examples, skipped
-
-
-def about_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
+def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
     """Return the part of the header of a model that is for users: corpus, licence, attribution, versions.
 
     utterances : all that the training was given

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import average_power, find_sound_runs, find_spoken_frames, smooth_level
+from lipmotion.speech.features.encoding import WindowedEncoding
 from lipmotion.speech.features.mfcc import HOP, WINDOW, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import CEPSTRA, general_features
@@ -19,14 +20,16 @@ from lipmotion.speech.sound.voice_activity import (
     SEPARATE_FRAMES,
     SOFTEST_DROP,
     Stretch,
+    apply_gain,
     fill_gaps,
     find_passages,
     find_tones,
-    level_passage,
+    passage_gain,
 )
 from lipmotion.types import Audio, Features, JoinedRows
 
 MadeT = TypeVar("MadeT")
+FloatT = TypeVar("FloatT", bound=np.floating[Any])
 SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
 QUIETEST = 0.1
@@ -65,12 +68,22 @@ class AnalysedAudio(Audio):
         stretches = [Stretch(piece.frame + first, piece.frame + end) for piece, (first, end) in found]
         bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(stretches)), self.frames]
         passages = []
+        sounds = {id(piece): _LevelledPiece(piece.samples) for piece, _ in found}
         for number, (piece, (first, end)) in enumerate(found):
             level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
-            samples = level_passage(fill_gaps(samples, level), level)
+            gain = passage_gain(level)
+            samples = apply_gain(fill_gaps(samples, level), np.arange(len(gain)), gain)
+            sounds[id(piece)].add(first, samples, gain)
             sound = find_spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
-            padded = _PassageAudio(np.pad(samples, (lead * HOP, tail * HOP)), self.rate_hz, lead=lead, tail=tail)
+            padded = _PassageAudio(
+                np.pad(samples, (lead * HOP, tail * HOP)),
+                self.rate_hz,
+                piece=sounds[id(piece)],
+                first=first,
+                lead=lead,
+                tail=tail,
+            )
             own = slice(bounds[number], bounds[number + 1])
             passages.append(Passage(stretches[number].first - lead, own, padded))
         return tuple(passages)
@@ -191,6 +204,11 @@ class AnalysedAudio(Audio):
         """The normalised log mel spectrum [shape=(T, 40)], as of ``speech.features.spectrum``."""
         return self.joined(lambda audio: audio.spectrum)
 
+    @cached_property
+    def encoding(self) -> NDArray[np.float16]:
+        """What the speech encoder makes of every frame [shape=(T, 64)], as of ``speech.features.encoding``."""
+        return self.joined(lambda audio: audio.encoding)
+
     def stretch(self, first: int, stop: int) -> AnalysedAudio:
         """Return some frames of the recording, with the features that they have in the whole."""
         return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
@@ -228,6 +246,31 @@ class _Piece(NamedTuple):
     tones: Sequence[Stretch]
 
 
+class _LevelledPiece:
+    """The sound of a piece at the level of all passages, whose encoding knows what is around a passage."""
+
+    def __init__(self, samples: NDArray[np.float32]) -> None:
+        self._samples = samples
+        self._passages: list[tuple[int, NDArray[np.float32]]] = []
+        self._frames: list[int] = []
+        self._gains: list[float] = []
+        self.encoding = WindowedEncoding(self._read, len(samples))
+
+    def add(self, first: int, samples: NDArray[np.float32], gain: NDArray[np.float64]) -> None:
+        """Add the levelled samples of a passage that begins in a frame, and the gain in its frames [shape=(T,)]."""
+        self._passages.append((first * HOP, samples))
+        self._frames += [first, first + len(gain) - 1]
+        self._gains += [float(gain[0]), float(gain[-1])]
+
+    def _read(self, first: int, stop: int) -> NDArray[np.float32]:
+        result = apply_gain(self._samples[first:stop], self._frames, self._gains, first)
+        for start, samples in self._passages:
+            begin, end = max(first, start), min(stop, start + len(samples))
+            if begin < end:
+                result[begin - first : end - first] = samples[begin - start : end - start]
+        return result
+
+
 def _heard(samples: NDArray[np.float32]) -> slice:
     """Return the samples without digital silence before and after them; none where there is nothing else."""
     sound = samples != 0
@@ -247,9 +290,12 @@ def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) 
 class _PassageAudio(AnalysedAudio):
     """The sound of one passage, of which features are computed.
 
+    piece, first : the sound between digital silences that it is part of, and the frame there in which it begins
     lead, tail : frames of silence before and after what is recorded, with the features of the quietest moment
     """
 
+    piece: _LevelledPiece | None = None
+    first: int = 0
     lead: int = 0
     tail: int = 0
 
@@ -295,6 +341,14 @@ class _PassageAudio(AnalysedAudio):
     def spectrum(self) -> NDArray[np.float32]:
         return self._with_silence(spectrum(self._sound))
 
+    @cached_property
+    def encoding(self) -> NDArray[np.float16]:
+        encoding = self.piece.encoding if self.piece else WindowedEncoding(self._read, len(self._sound.samples))
+        return self._with_silence(encoding.rows(self.first, self.first + len(self._energy)))
+
+    def _read(self, first: int, stop: int) -> NDArray[np.float32]:
+        return self._sound.samples[first:stop]
+
 
 @dataclass(frozen=True, eq=False)
 class _Stretch(AnalysedAudio):
@@ -322,7 +376,11 @@ class _Stretch(AnalysedAudio):
     def spectrum(self) -> NDArray[np.float32]:
         return self._rows(self.whole.spectrum)
 
-    def _rows(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    @cached_property
+    def encoding(self) -> NDArray[np.float16]:
+        return self._rows(self.whole.encoding)
+
+    def _rows(self, rows: NDArray[FloatT]) -> NDArray[FloatT]:
         return rows[self.first : self.first + len(self.samples) // HOP + 1]
 
 

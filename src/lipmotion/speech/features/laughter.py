@@ -31,7 +31,7 @@ VOICED_SHARES = (0.15, 0.75)
 """Share of the frames of a bout that is voiced; with less it is a cough, or clicks of tongue or teeth."""
 WEIGHTS = (14.8, 0.122, -7.09, -2.93, 3.85, -16.5)
 """The log odds of laughter: the sum of these times likeness, depth, voiced share, voiced gaps, log calls, and 1."""
-LEAST_PROBABILITY = 0.7
+MIN_PROBABILITY = 0.7
 
 
 class Bout(NamedTuple):
@@ -61,7 +61,7 @@ def laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.b
         if figures is None:
             continue
         probability = float(1 / (1 + np.exp(-np.dot(WEIGHTS, [*figures, 1.0]))))
-        if probability >= LEAST_PROBABILITY:
+        if probability >= MIN_PROBABILITY:
             first, end = max(calls[0] - EDGE_FRAMES, 0), min(calls[-1] + EDGE_FRAMES + 1, len(level_db))
             yield Bout(first, end, calls, tuple(level_db[[*calls]].tolist()), probability)
 

@@ -12,7 +12,7 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.general.acoustic import STREAMS
 from lipmotion.stats.constrained_mllr import identity, transformed
-from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 
 LARGEST_WARP = 2.0
 """Frequencies are not stretched by more, nor by less than its inverse."""
@@ -61,7 +61,7 @@ def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
     """Deserialise an adaptation. Raises ModelFormatError: an array is missing, or cannot be a transform."""
     with format_errors("the adaptation", "adapt the model again"):
         refuse_undeclared(arrays, ADAPTATION_ARRAYS)
-        checked = checked_arrays(arrays, ADAPTATION_ARRAYS)
+        checked = check_arrays(arrays, ADAPTATION_ARRAYS)
         warp, own_weight = checked["numbers"].tolist()
         if not 1 / LARGEST_WARP <= warp <= LARGEST_WARP or not 0 <= own_weight <= 1:
             raise ValueError(f"a warp of {warp} and a weight of the own models of {own_weight}")

@@ -37,7 +37,7 @@ OWN_RELEVANCE, GENERAL_RELEVANCE = 300.0, 30.0
 SHORT_S, SHORT_RELEVANCE = 10.0, 1000.0
 """From less speech than this, the own models' features, Δ and ΔΔ are transformed each by themselves, with a stronger
 prior."""
-LEAST_SPEECH_S = 1.0
+MIN_SPEECH_S = 1.0
 
 
 class EstimatedAdaptation(NamedTuple):
@@ -55,7 +55,7 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     All recordings are recognised with the own and the general models. The features of both then get the affine
     transform that makes the recognised states most probable, with the identity as prior mean. The frequencies are
     stretched first, by one factor for all recordings.
-    Raises InputError: less speech than ``LEAST_SPEECH_S``.
+    Raises InputError: less speech than ``MIN_SPEECH_S``.
     Raises MissingDependencyError: pocketsphinx is not installed.
     Source: Gales 1998 (constrained MLLR); Lei, Hamaker & He 2006 (a prior for it; ours is the models' own statistics).
     """
@@ -81,16 +81,16 @@ def _checked_speech_s(names: Sequence[str], densities: NDArray[np.intp]) -> floa
 
     names     : of all densities: unit, point, state
     densities : of the frames [shape=(T,)]
-    Raises InputError: less than ``LEAST_SPEECH_S``.
+    Raises InputError: less than ``MIN_SPEECH_S``.
     """
     units = [name.partition(".")[0] for name in names]
     silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
     speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
     if not speech_s:
         raise InputError("no speech found in the recordings; give some of the voice to adapt to")
-    if speech_s < LEAST_SPEECH_S:
+    if speech_s < MIN_SPEECH_S:
         raise InputError(
-            f"found {speech_s:.1f} s of speech, required at least {LEAST_SPEECH_S:.0f} s; give more of this voice"
+            f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more of this voice"
         )
     return speech_s
 

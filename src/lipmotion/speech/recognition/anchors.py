@@ -26,7 +26,7 @@ FREE_FRAMES = 60_000
 """A recording of up to so many frames, ten minutes, is aligned without times where these are of something else."""
 NEIGHBOURS = 3
 """So many words on each side of one without room, and all that share its time, get a wider window, too."""
-MOST_SHIFT_S, LEAST_CORRELATION, LEAST_GAIN, FEWEST_TIMES = 120.0, 0.3, 0.15, 20
+MOST_SHIFT_S, MIN_CORRELATION, LEAST_GAIN, FEWEST_TIMES = 120.0, 0.3, 0.15, 20
 """A shift of all times, of so many or more, is searched up to the first, and corrected from these correlations on."""
 MOST_WIDENINGS = 40
 """Windows without room are doubled so many times; then they are opened altogether."""
@@ -112,7 +112,7 @@ def lateness_s(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
 
     loud : which frames are loud [shape=(T,)]
     It is the shift at which the spans of the times and the loud frames correlate best, up to ``MOST_SHIFT_S``, if it is
-    larger than the tolerance of lines, and the correlation at least ``LEAST_CORRELATION``, and by ``LEAST_GAIN`` better
+    larger than the tolerance of lines, and the correlation at least ``MIN_CORRELATION``, and by ``LEAST_GAIN`` better
     than without a shift.
     """
     anchors = anchors_of(transcript)
@@ -128,7 +128,7 @@ def lateness_s(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
     best = int(correlation.argmax())
     late_s = (best - most) / FRAME_RATE_HZ
     gain = correlation[best] - max(correlation[most], 0.0)
-    is_sure = correlation[best] >= LEAST_CORRELATION and gain >= LEAST_GAIN
+    is_sure = correlation[best] >= MIN_CORRELATION and gain >= LEAST_GAIN
     return late_s if is_sure and abs(late_s) > LINE_TOLERANCE_S else 0.0
 
 

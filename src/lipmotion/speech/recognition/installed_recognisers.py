@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lipmotion.errors import InputError, MissingDependencyError, shortened
+from lipmotion.errors import InputError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command
 from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine, sort_lines
 from lipmotion.units.spoken_text import extract_spoken_text, time_words
@@ -78,7 +78,7 @@ def _folder(recogniser: InstalledRecogniser, kind: str) -> Path:
     missing = [group for group in recogniser.parts if not any((folder / name).exists() for name in group)]
     if missing:
         raise InputError(
-            f"{shortened(named)} ({recogniser.variable}): is no model of {kind}, required a folder with "
+            f"{shorten(named)} ({recogniser.variable}): is no model of {kind}, required a folder with "
             f"{' or '.join(missing[0])}; see docs/transcripts.md"
         )
     return folder
@@ -109,7 +109,7 @@ def _whisper_model(module: Any, folder: str) -> Any:
     try:
         return module.WhisperModel(folder, device="cpu", compute_type="int8", local_files_only=True)
     except (RuntimeError, ValueError, OSError) as error:
-        raise InputError(f"{folder}: faster-whisper cannot read this model: {shortened(str(error))}") from error
+        raise InputError(f"{folder}: faster-whisper cannot read this model: {shorten(str(error))}") from error
 
 
 def _vosk_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]:
@@ -140,7 +140,7 @@ def _vosk_model(module: Any, folder: str) -> Any:
     try:
         return module.Model(folder)
     except Exception as error:  # vosk raises nothing more special
-        raise InputError(f"{folder}: vosk cannot read this model: {shortened(str(error))}") from error
+        raise InputError(f"{folder}: vosk cannot read this model: {shorten(str(error))}") from error
 
 
 INSTALLED_RECOGNISERS = {

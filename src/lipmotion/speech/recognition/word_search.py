@@ -90,7 +90,7 @@ class WordSearch:
             here, fits = self._part(stretch, [word.text for word in words], len(recognised))
             parts += here
             recognised += [
-                RecognisedWord(word.text, confidence_of(fit, word.posterior))
+                RecognisedWord(word.text, score_words(fit, word.posterior))
                 for word, fit in zip(words, fits, strict=True)
             ]
         return parts, recognised
@@ -120,7 +120,7 @@ class WordSearch:
         return free_labels(self.loop, self.loop.network.best_path(wrap_log_likelihoods(values)), stretch.first)
 
 
-def confidence_of(fit: float, posterior: float) -> float:
+def score_words(fit: float, posterior: float) -> float:
     """Return the probability that a word is right, 0 to 1: by logistic regression (docs/decisions/recognition.md).
 
     fit       : of the word (``AlignedWords.fits``), in nats

@@ -21,7 +21,7 @@ LEAST_RANGE_DB = 10.0
 """Where loud and quiet differ by less (music, noise), there are no pauses: all of it counts as speech."""
 LEAST_PAUSE_S = 0.2
 """A shorter silence is part of a word, or of no use to divide at."""
-LEAST_SPEECH_S = 0.1
+MIN_SPEECH_S = 0.1
 """Shorter sounds are clicks."""
 QUIETEST_DB = -100.0
 
@@ -64,7 +64,7 @@ def spoken_spans(levels: Array) -> list[tuple[float, float]]:
             joined[-1] = (joined[-1][0], end_s)
         else:
             joined.append((start_s, end_s))
-    return [(start_s, end_s) for start_s, end_s in joined if end_s - start_s >= LEAST_SPEECH_S]
+    return [(start_s, end_s) for start_s, end_s in joined if end_s - start_s >= MIN_SPEECH_S]
 
 
 def quietest_s(levels: Array, start_s: float, end_s: float) -> float:

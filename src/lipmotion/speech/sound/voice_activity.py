@@ -7,7 +7,7 @@ softer than the one before. Its features are normalised, and its speaker judged,
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -203,7 +203,7 @@ def _joined(runs: list[Stretch]) -> list[Stretch]:
 def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the samples of a passage with noise in the digital silence between its words, as of a noise gate.
 
-    samples, log_energy : as of ``level_passage``
+    samples, log_energy : as of ``passage_gain``: the samples are those of the passage
     Where nothing is recorded, features are unlike those of any room: all else would look alike beside them, and every
     voice like that of the training.
     """
@@ -219,11 +219,11 @@ def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> 
     return filled
 
 
-def level_passage(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the samples of a passage at the level of all passages; where its voice becomes softer, it is raised.
+def passage_gain(log_energy: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the factors that bring the frames of a passage to the level of all passages [shape=(T,)].
 
-    samples    : [shape=(N,)], full scale 1
     log_energy : of its frames, natural logarithm [shape=(T,)]
+    Where its voice becomes softer, it is raised.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -235,5 +235,13 @@ def level_passage(samples: NDArray[np.float32], log_energy: NDArray[np.float32])
     if len(sound) and lower[sound].max() > 0:
         raised = np.clip(lower[sound], 0, LOCAL_DROP) / 2
         gain *= np.exp(np.interp(np.arange(len(level)), sound, raised))
-    times = np.arange(len(samples)) / HOP
-    return (samples * np.interp(times, np.arange(len(gain)), gain)).astype(np.float32)
+    return gain
+
+
+def apply_gain(samples: NDArray[np.float32], frames: Any, gain: Any, first: int = 0) -> NDArray[np.float32]:
+    """Return samples times a gain that is known in some frames, and interpolated between them.
+
+    first : number of the first sample, from frame 0
+    """
+    times = (first + np.arange(len(samples))) / HOP
+    return (samples * np.interp(times, frames, gain)).astype(np.float32)

@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shortened
+from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
@@ -86,7 +86,7 @@ def voice_named(name: str) -> SyntheticVoice:
     """
     maker, colon, rest = name.rpartition(":")
     if colon and maker not in SYNTHESISERS:
-        raise InputError(f"unknown synthesiser {shortened(maker)!r}; required one of: {', '.join(SYNTHESISERS)}")
+        raise InputError(f"unknown synthesiser {shorten(maker)!r}; required one of: {', '.join(SYNTHESISERS)}")
     asked = [SYNTHESISERS[maker]] if colon else [each for each in SYNTHESISERS.values() if _works(each)]
     if not colon and not any(synthesiser.voices() for synthesiser in asked):
         raise nothing_installed()
@@ -105,7 +105,7 @@ def voice_named(name: str) -> SyntheticVoice:
     if found:
         names = ", ".join(f"{voice.synthesiser}:{voice.name}" for voice in found)
         raise InputError(f"several voices are called {name!r}; give one of: {names}")
-    raise InputError(f"no voice {shortened(name)!r} is installed; lipmotion speak --voices lists those that are")
+    raise InputError(f"no voice {shorten(name)!r} is installed; lipmotion speak --voices lists those that are")
 
 
 def default_voice() -> SyntheticVoice:

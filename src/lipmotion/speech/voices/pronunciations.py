@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from lipmotion.errors import InputError, MissingDependencyError, shortened
+from lipmotion.errors import InputError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices.espeak import EXTRA, pronounced_words
 from lipmotion.types.languages import ENGLISH, LANGUAGES, foreign_letters
@@ -57,7 +57,7 @@ def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunci
     for word in words:
         if letters := foreign_letters(word, language):
             raise InputError(
-                f"no rules say how {shortened(repr(word))} is said in {spoken.name} ({shortened(letters)}): write it "
+                f"no rules say how {shorten(repr(word))} is said in {spoken.name} ({shorten(letters)}): write it "
                 f"as it is spoken ({' or '.join(spoken.scripts).lower()} letters), add it to a lexicon file, or give "
                 "another language"
             )
@@ -65,12 +65,12 @@ def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunci
         found = espeak_pronunciations(words, spoken.voice or language)
     except MissingDependencyError as error:
         raise MissingDependencyError(
-            f"no pronunciation of {shortened(repr(words[0]))} in {spoken.name}: install espeak-ng "
+            f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng "
             f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
         ) from error
     silent = next((word for word, (phones,) in found.items() if not phones), None)
     if silent is not None:
-        raise InputError(f"{shortened(repr(silent))} has no phone in {spoken.name}; add it to a lexicon file")
+        raise InputError(f"{shorten(repr(silent))} has no phone in {spoken.name}; add it to a lexicon file")
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError, shorten
 from lipmotion_studio.study.analysis.crossed import CONFIDENCE, Components, variance_of_mean
 from lipmotion_studio.study.analysis.paired import pair_table, paired_figures, share_components
 from lipmotion_studio.study.analysis.ratings import difference_components, rating_figures, rating_table
@@ -126,7 +126,7 @@ def analyse_study(
     conditions = sorted({each.condition for each in counted if each.kind != PAIRED})
     if baseline is not None and baseline not in conditions:
         known = ", ".join(conditions) or "no condition, as nothing was rated"
-        raise InputError(f"the baseline {shortened(baseline)!r}, required one of: {known}")
+        raise InputError(f"the baseline {shorten(baseline)!r}, required one of: {known}")
     if not 0.05 < power < 1:
         raise InputError(f"a power of {power:g}, required between 0.05 and 1, such as {USUAL_POWER}")
     if sentences is not None and sentences < 2:

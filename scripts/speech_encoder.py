@@ -1,0 +1,117 @@
+"""Makes the speech encoder of the package, ``models/speech-encoder.npz``, from the network of Smart Turn v3.2.
+
+    pip download --no-deps pipecat-ai==1.14.0
+    pip install onnx
+    python scripts/speech_encoder.py pipecat_ai-1.14.0-py3-none-any.whl CORPUS
+
+CORPUS is a prepared corpus (GRID speaker s1); the principal components are those of its training list. The weights stay
+at eight bits, as they are stored there. ``--check`` compares with the network itself, and needs ``onnxruntime``, too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import io
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion import Corpus
+from lipmotion.speech.features import encoding
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.encoding import COMPONENTS, LAYERS, WEIGHTS, encoder_of
+
+NETWORK = "pipecat/audio/turn/smart_turn/data/smart-turn-v3.2-cpu.onnx"
+DIGEST = "2bb026316b14a660486a75b1733cd3fbab8c2fd0314dc9af7be49f8cca967e4f"
+OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
+QUERY_SCALE = 1 / 8
+"""Scores of attention are divided by the root of the 64 values of a head."""
+Arrays = dict[str, NDArray[Any]]
+
+
+def main() -> None:
+    """Make the file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("wheel", type=Path)
+    parser.add_argument("corpus", type=Path)
+    options = parser.parse_args()
+    content = zipfile.ZipFile(options.wheel).read(NETWORK)
+    if hashlib.sha256(content).hexdigest() != DIGEST:
+        parser.error(f"{NETWORK} of {options.wheel} has another digest, required {DIGEST}")
+    arrays, gain, shift = weights_of(content)
+    corpus = Corpus.open(options.corpus)
+    whole = encoder_of(arrays | {"basis": np.diag(gain), "shift": shift})
+    encoding.shipped_encoder = lambda: whole  # type: ignore[assignment]
+    passages = (
+        passage.audio for name in corpus.names("train") for passage in analysed(corpus.utterance(name).audio).passages
+    )
+    rows = np.concatenate([audio.encoding[audio.recorded][::2] for audio in passages]).astype(float)
+    mean = rows.mean(axis=0)
+    axes = np.linalg.eigh(np.cov((rows - mean).T))[1][:, ::-1][:, :COMPONENTS]
+    axes *= np.sign(axes.sum(axis=0))
+    scale = ((rows - mean) @ axes[:, 0]).std()  # the first component has the deviation 1
+    arrays |= {
+        "basis": (gain[:, None] * axes / scale).astype(np.float32),
+        "shift": ((shift - mean) @ axes / scale).astype(np.float32),
+    }
+    with OUTPUT.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+    print(f"{OUTPUT.name}: {OUTPUT.stat().st_size} bytes, from {len(rows)} rows")
+
+
+def weights_of(content: bytes) -> tuple[Arrays, NDArray[np.float32], NDArray[np.float32]]:
+    """Return the arrays of the layers that are used, and gain and bias of the normalisation after them."""
+    import onnx
+    from onnx.numpy_helper import to_array
+
+    graph = onnx.load(io.BytesIO(content)).graph
+    stored = {tensor.name: to_array(tensor) for tensor in graph.initializer}
+    arrays: Arrays = {}
+
+    def put(name: str, matrix: NDArray[np.int8], columns: Any, bias: Any, gain: Any = None, offset: Any = None) -> None:
+        full = matrix.astype(np.float32) * columns
+        arrays[name], arrays[f"{name}_columns"] = matrix, np.asarray(columns, np.float32)
+        arrays[f"{name}_rows"] = np.ones(len(matrix), np.float32) if gain is None else gain
+        arrays[f"{name}_bias"] = np.asarray(bias if offset is None else bias + offset @ full, np.float32)
+
+    for number in (0, 1):
+        name = f"inner.encoder.conv{number + 1}"
+        kernel = stored[f"{name}.weight_quantized"]  # outputs, inputs, taps
+        bias = stored[f"{name}.bias_quantized"] * stored[f"{name}.bias_quantized_scale"]
+        put(
+            f"convolution_{number}",
+            kernel.transpose(2, 1, 0).reshape(-1, len(kernel)),
+            stored[f"{name}.weight_scale"],
+            bias,
+        )
+    products = [node for node in graph.node if node.op_type == "MatMul"]
+    names = [node.input[1].removesuffix("_DequantizeLinear_Output") for node in products]
+    constant = [name for name in names if f"{name}_quantized" in stored][: 6 * LAYERS]
+    matrices = [(stored[f"{name}_quantized"], stored[f"{name}_scale"]) for name in constant]
+    for number in range(LAYERS):
+        layer = f"inner.encoder.layers.{number}."
+        keys, queries, values, joined, widened, narrowed = matrices[6 * number : 6 * number + 6]
+        attention, first, second = f"{layer}self_attn.", f"{layer}self_attn_layer_norm.", f"{layer}final_layer_norm."
+        queries_bias, values_bias = stored[f"{attention}q_proj.bias"] * QUERY_SCALE, stored[f"{attention}v_proj.bias"]
+        put(
+            f"attend_{number}",
+            np.concatenate([queries[0], keys[0], values[0]], axis=1),
+            np.concatenate([queries[1] * QUERY_SCALE, keys[1], values[1]]),
+            np.concatenate([queries_bias, np.zeros(len(keys[0])), values_bias]),
+            stored[f"{first}weight"],
+            stored[f"{first}bias"],
+        )
+        put(f"join_{number}", *joined, stored[f"{attention}out_proj.bias"])
+        norm = stored[f"{second}weight"], stored[f"{second}bias"]
+        put(f"widen_{number}", *widened, stored[f"{layer}fc1.bias"], *norm)
+        put(f"narrow_{number}", *narrowed, stored[f"{layer}fc2.bias"])
+    last = f"inner.encoder.layers.{LAYERS}.self_attn_layer_norm."
+    return arrays, stored[f"{last}weight"], stored[f"{last}bias"]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,528 @@
+"""Recordings to the input of engines: acoustic features, phones in time, F0."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from lipmotion.engines import Animator
+from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
+from lipmotion.hmm.model import UnitHmm
+from lipmotion.pipeline.analysis.language import warn_of_another_language
+from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
+from lipmotion.pipeline.analysis.transcribe import (
+    compute_phone_posteriors,
+    format_places,
+    transcribe,
+    warn_of_guesses,
+    warn_of_label_misfit,
+)
+from lipmotion.pipeline.model import Model, with_prior
+from lipmotion.pipeline.request import DETECTED, Request
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.mfcc import HOP
+from lipmotion.speech.features.speaker_similarity import speaker_similarity
+from lipmotion.speech.features.voice_events import voice_events, without_laughter
+from lipmotion.speech.recognition.agreement import TranscriptFit, label_fit
+from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
+from lipmotion.speech.recognition.network.posteriors import token_posteriors
+from lipmotion.speech.recognition.network.word_tree import english_words
+from lipmotion.speech.recognition.recognised_speech import (
+    WORD_POSTERIORS,
+    Recognition,
+    joined_units,
+    level_range_db,
+    placed_units,
+    relied_on,
+)
+from lipmotion.speech.recognition.recogniser import (
+    RECOGNISER_KINDS,
+    Recogniser,
+    cached_recogniser,
+    network_of,
+    voice_knowledge,
+)
+from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.storage.sources import is_file
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Audio,
+    Features,
+    Monitor,
+    ParallelMap,
+    Progress,
+    Span,
+    Speech,
+    SpeechPart,
+    TimedTranscript,
+    TimedWord,
+    Timeline,
+    TranscriptLine,
+    Unit,
+    VoiceEvent,
+    frames_of,
+    silent_monitor,
+)
+from lipmotion.types.languages import ENGLISH
+from lipmotion.types.moods import MoodTag
+from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
+from lipmotion.units.mood_tags import parse_tagged_text
+from lipmotion.units.text_normalisation import require_tokens
+
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
+
+UNHEARD_S = 0.05
+"""Phones may last so long outside of all passages, and half of their time: alignment is no surer."""
+LATE_S = 0.1
+"""Seconds by which given units may end after the sound; editing programs round times."""
+TIME_UNITS = {"milliseconds": 1e3, "samples": 16e3, "samples of 48 kHz": 48e3, "ticks of 100 ns": 1e7}
+"""How many of them a second has: given times that end near so many times the recording are in this unit."""
+SHORTEST_PHONE_S, FEWEST_TIMED = 0.02, 5
+"""Given phones, of which half are shorter, are faster than speech; so many are needed to tell."""
+REACH_S = 0.1
+"""Phones are recognised so far around the first and the last one that is heard."""
+LATEST_S = 1e15
+"""Later units are refused: frames of such times cannot be counted."""
+MIN_SPEECH_S = 0.2
+"""A shorter time of recognised speech is none: the edge of a tone or of noise, taken as a consonant."""
+WORDS = (0.2, 0.9)
+"""Shares of the work at which the recognition of words begins and ends, in reports."""
+LOG = logging.getLogger("lipmotion")
+
+
+@dataclass(frozen=True, eq=False)
+class SpeechAnalysis:
+    """The speech of a recording as input of an engine, and what was recognised in it.
+
+    recognition : None where words or phones were given, or the engine's own model recognised the speaker
+    range_db    : decibels between the loud and the quiet moments of the recording
+    fit         : of the transcript; None where there was none, or it was not compared with the sound
+    tags        : the moods that tags in the transcript ask for
+    events      : what is detected in the voice beside words; empty: nothing, or it was not asked for
+    """
+
+    speech: Speech
+    recognition: Recognition | None
+    range_db: float
+    fit: TranscriptFit | None = None
+    tags: tuple[MoodTag, ...] = ()
+    events: tuple[VoiceEvent, ...] = ()
+
+    @property
+    def speech_s(self) -> float:
+        """Seconds of speech, by the phones in time."""
+        return sum(span.duration_s for span in self.speech.units if not is_silent(span.label.phone))
+
+    @property
+    def is_without_speech(self) -> bool:
+        """Whether no speech was recognised."""
+        return not self.speech.units_known and self.speech_s < MIN_SPEECH_S
+
+
+def analyse(model: Model, request: Request, each: ParallelMap = map) -> Speech:
+    """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
+
+    each : applies a function to many items, perhaps in several processes
+    Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
+    Raises AlignmentError: the transcript cannot be aligned with the recording.
+    """
+    return analyse_speech(model, request, each).speech.with_arrays()
+
+
+def analyse_speech(
+    model: Model, request: Request, each: ParallelMap = map, monitor: Monitor = silent_monitor
+) -> SpeechAnalysis:
+    """Return the speech of a request as ``analyse`` does, with what was recognised.
+
+    monitor : receives reports of the progress; the share is that of recognition, up to ``WORDS[1]``
+    """
+    request = read_request(request, is_typed=False)
+    monitor(Progress("reading the sound", 0, 1, 0.0))
+    audio = analysed(read_recording(request))
+    monitor(Progress("recognising phones", 0, 1, 0.02))
+    analysis = _find_phones(model, request, audio, _report_progress(each, audio.duration_s, monitor))
+    speech, recognition = analysis.speech, analysis.recognition
+    if request.manner == DETECTED:
+        events = voice_events(audio, speech.units)
+        units = without_laughter(speech.units, events)  # phones that were recognised in laughter are silence
+        speech = with_units(speech, units) if units != speech.units else speech
+        analysis = replace(analysis, speech=speech, events=events)
+    if analysis.is_without_speech and not analysis.events:
+        LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
+    elif audio.tones:
+        places = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
+        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(places))
+    if recognition is not None and request.language == ENGLISH:
+        warn_of_another_language(recognition)
+    given = request.units is not None or analysis.fit is not None
+    speech = with_voice(model.phones, audio, speech, recognition, given=given)
+    return replace(analysis, speech=with_prior(model.prior, speech))
+
+
+def with_voice(
+    phones: UnitHmm, audio: Audio, speech: Speech, recognition: Recognition | None, *, given: bool = False
+) -> Speech:
+    """Return speech that says how well a model knows its voice, 0 to 1, that of the recording and of each passage.
+
+    phones      : the model's own phone models
+    recognition : of the speech; None: words or phones were given, or the engine recognised the speaker
+    given       : whether the phones in time were given
+    It is 1 where the engine recognised the speaker, and for silence.
+    """
+
+    def knowledge_of(sound: Audio) -> float:
+        return voice_knowledge(speaker_similarity(phones, analysed(sound)).score)
+
+    by_engine, parts = recognition is None and not given and not speech.units_known, speech.parts
+    if by_engine or not speech.features.values.any():
+        voice = 1.0
+    elif recognition is not None and recognition.similarity is not None:
+        voice = voice_knowledge(recognition.similarity)
+    else:
+        voice = knowledge_of(audio)
+    if parts is not None:
+        sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
+        is_recognised = not given and not speech.units_known
+        parts = tuple(
+            part
+            if is_recognised and part.speech.voice == 1
+            else part._replace(speech=replace(part.speech, voice=knowledge_of(sounds[part.first])))
+            for part in parts
+        )
+    return replace(speech, voice=voice, parts=parts)
+
+
+def prepare_search(request: Request) -> None:
+    """Load the words that are searched where a phone recogniser decides; they are then there when it is done."""
+    is_searched = request.transcript is None and request.units is None and request.language == ENGLISH
+    if is_searched and network_of(request.recogniser) is not None:
+        with suppress(MissingDependencyError):  # whoever needs them says so
+            english_words()
+
+
+def align_between(
+    model: Model,
+    request: Request,
+    audio: AnalysedAudio,
+    text: str,
+    start_s: float,
+    end_s: float,
+    *,
+    pauses: bool = False,
+) -> list[Span[Unit]]:
+    """Return the phones in time of words that are said from ``start_s`` to ``end_s``, by forced alignment there.
+
+    audio  : the recording of the request
+    pauses : whether silence before and after the words stays; else the first and the last phone take its time
+    Raises AlignmentError: the words do not fit in there.
+    """
+    first, stop = (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s))
+    lexicon, words = read_lexicon(request), require_tokens(text)
+    warn_of_guesses(words, lexicon)
+    if stop > len(audio.samples) // HOP:
+        raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
+    segment = audio.stretch(first, stop)
+    spans = list(_recogniser(model, request).align(segment, segment.mfcc(), words, lexicon).shifted(start_s))
+    while not pauses and len(spans) > 1 and is_silent(spans[0].label.phone):
+        del spans[0]
+    while not pauses and len(spans) > 1 and is_silent(spans[-1].label.phone):
+        del spans[-1]
+    spans[0], spans[-1] = replace(spans[0], start_s=start_s), replace(spans[-1], end_s=end_s)
+    return spans
+
+
+def _recogniser(model: Model, request: Request) -> Recogniser:
+    kind = "auto" if request.recogniser in INSTALLED_RECOGNISERS else request.recogniser
+    return cached_recogniser(model.phones, kind, model.adaptation)
+
+
+def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
+    """Return a map over stretches of samples (16 bit, 16 kHz) that reports how far into the sound it is."""
+
+    def map_with_reports(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        lengths_s: deque[float] = deque()
+
+        def measured() -> Iterator[ItemT]:
+            for item in items:
+                lengths_s.append(len(item) / 2 / SPEECH_RATE_HZ if isinstance(item, bytes) else 0.0)
+                yield item
+
+        done_s = 0.0
+        for result in each(function, measured()):
+            done_s += lengths_s.popleft()
+            share = WORDS[0] + (WORDS[1] - WORDS[0]) * min(done_s / duration_s, 1.0)
+            monitor(Progress("recognising words, seconds", int(done_s), int(duration_s), share))
+            yield result
+
+    return map_with_reports
+
+
+def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
+    """Return the speech of a request with phones that are given, aligned or recognised."""
+    kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
+    if request.recogniser not in kinds:
+        raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
+    range_db = level_range_db(audio.log_energy)
+    phones, features, fit = _recogniser(model, request), audio.joined_mfcc(), None
+    results: list[Recognition] = []
+
+    def recognise() -> Recognition:
+        results.append(phones.recognition(audio, features, each, english=request.language == ENGLISH))
+        return results[-1]
+
+    @cache
+    def recognised() -> Speech:
+        return recognise_speech(model.engine, model.learned, audio, features, phones, recognise, each)
+
+    if request.units is not None:
+        if request.transcript is not None:
+            LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
+        units, fit = _follow_units(model, request, audio, phones.kind, lambda: recognised().units)
+        speech = build_speech(model.engine, audio, features, units, phones.kind, each)
+        return SpeechAnalysis(replace(speech, times_given=True), None, range_db, fit)
+    words = _read_words(cast("str | TimedTranscript | None", request.transcript), audio.duration_s)
+    if words is None and request.recogniser in INSTALLED_RECOGNISERS:
+        words = recognise_words(audio, request.recogniser)
+    if words is not None:
+        lexicon = read_lexicon(request)
+        aligned, fit = transcribe(phones, audio, audio.mfcc(), words, lexicon, lambda: recognised().units)
+        if aligned is not None:
+            speech = build_speech(model.engine, audio, features, aligned, phones.kind, each)
+            tags = words.tags if isinstance(words, TimedTranscript) else ()
+            return SpeechAnalysis(speech, None, range_db, fit, tags)
+    return SpeechAnalysis(recognised(), results[0] if results else None, range_db, fit)
+
+
+def build_speech(
+    engine: Animator[Any],
+    audio: Audio,
+    features: Features,
+    units: Timeline[Unit],
+    kind: str = "auto",
+    each: ParallelMap = map,
+) -> Speech:
+    """Return speech of features and phones in time, and what else of the recording the engine needs.
+
+    kind : of the recognition; of all but ``auto``, a phone recogniser has no part in it
+    each : applies a function to many items, perhaps in several processes
+    """
+    inputs, audio = engine.inputs(), analysed(audio, features)
+    f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
+    spectrum: Any = None
+    if inputs.conditions:
+        spectrum = audio.spectrum if audio.is_passage else audio.joined_rows(lambda sound: sound.spectrum)
+    network = network_of(kind) if inputs.posteriors else None
+    posteriors = token_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
+    parts = None
+    if not audio.is_passage:
+        parts = tuple(
+            SpeechPart(first, own, build_speech(engine, sound, sound.mfcc(), Timeline(()), kind, each))
+            for first, own, sound in audio.passages
+        )
+    encoding: Any = None
+    if inputs.encoding:
+        encoding = audio.encoding if audio.is_passage else audio.joined_rows(lambda sound: sound.encoding)
+    speech = Speech(
+        features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts
+    )
+    return with_units(speech, units) if len(units) else speech
+
+
+def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
+    """Return speech with other phones in time, which are known or recognised as their labels say.
+
+    Where only some of them are known, those of a user who corrected the others, ``confidence`` is one of each frame.
+    Every passage has those in its time; where phones are said outside of all, the recording is one passage.
+    """
+    if speech.parts is not None:
+        speech = replace(speech, parts=_place_in_parts(speech.parts, units))
+        speech = speech.with_arrays() if speech.parts is None else speech
+    confidences = [span.label.confidence for span in units]
+    first = confidences[0] if confidences else None
+    if confidences.count(first) == len(confidences):
+        return replace(speech, units=units, units_known=first is None, confidence=1.0 if first is None else first)
+    by_frame = np.ones(len(speech.features.values))
+    for span, confidence in zip(units, confidences, strict=True):
+        by_frame[slice(*frames_of(span, len(by_frame)))] = 1.0 if confidence is None else confidence
+    return replace(speech, units=units, units_known=False, confidence=by_frame)
+
+
+def _place_in_parts(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[SpeechPart, ...] | None:
+    """Return the passages with the phones in their time; None where phones are said outside of them."""
+    covered = np.zeros(max((part.first + part.frames for part in parts), default=0), bool)
+    for part in parts:
+        covered[max(part.first, 0) : part.first + part.frames] = True
+    for span in units:
+        first, end = (min(round(time_s * FRAME_RATE_HZ), len(covered)) for time_s in (span.start_s, span.end_s))
+        unheard_s = span.duration_s - int(covered[first:end].sum()) / FRAME_RATE_HZ
+        if not is_silent(span.label.phone) and unheard_s > max(UNHEARD_S, span.duration_s / 2):
+            return None
+    spoken = []
+    for part in parts:
+        within = list(part.between(units))
+        said = [span.label for span in within if not is_silent(span.label.phone)] or [span.label for span in within]
+        for place in (0, -1) if within else ():  # silence between passages is as sure as the phones beside it
+            if is_silent(within[place].label.phone):
+                label = replace(within[place].label, confidence=said[place].confidence)
+                within[place] = replace(within[place], label=label)
+        silent = Unit(SILENCE, confidence=said[0].confidence if said else None)
+        joined = joined_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
+        spoken.append(part._replace(speech=with_units(part.speech, joined)))
+    return tuple(spoken)
+
+
+def recognise_speech(
+    engine: Animator[Any],
+    learned: Any,
+    audio: Audio,
+    features: Features,
+    phones: Recogniser,
+    recognise: Callable[[], Recognition],
+    each: ParallelMap = map,
+) -> Speech:
+    """Return the speech of a recording whose words are not known, with recognised phones in time.
+
+    learned   : the engine's model of motion
+    phones    : the recogniser
+    recognise : recognises phones in time, for speakers that the engine does not recognise itself
+    each      : applies a function to many items, perhaps in several processes
+    If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
+    training were; else the result of ``recognise`` is used.
+    """
+    audio = analysed(audio, features)
+    speech = build_speech(engine, audio, features, Timeline(()), phones.kind, each)
+    passages = (SpeechPart(0, slice(0, len(features.values)), speech),) if speech.parts is None else speech.parts
+    units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
+    for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
+        within = None
+        if phones.kind not in ("general", "words"):
+            within = engine.recognise(learned, part.speech)
+        if within is not None:
+            try:
+                within = relied_on(phones.align_phones(sound, sound.mfcc(), within), 0.0)
+            except AlignmentError:
+                within = None
+        knows_voice = within is not None
+        if within is None:
+            found = found or recognise()
+            within = part.between(relied_on(found.units, found.reliability))
+        if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < MIN_SPEECH_S:
+            continue  # a click, a knock
+        spoken.append(part._replace(speech=replace(part.speech, voice=float(knows_voice))))  # else ``with_voice`` says
+        units.append(placed_units(within, part.first, part.own))
+    if speech.parts is not None:
+        speech = replace(speech, parts=tuple(spoken))
+    confidence = found.reliability if found is not None else 0.0
+    return with_units(speech, joined_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
+
+
+def _read_words(text: str | TimedTranscript | None, duration_s: float) -> tuple[str, ...] | TimedTranscript | None:
+    """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
+    if text is None or isinstance(text, TimedTranscript):
+        return text
+    if "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
+        raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
+    check_text(text, duration_s)
+    plain, tags = parse_tagged_text(text)
+    words = require_tokens(plain)
+    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
+
+
+def _follow_units(
+    model: Model, request: Request, audio: AnalysedAudio, kind: str, recognised: Callable[[], Timeline[Unit]]
+) -> tuple[Timeline[Unit], TranscriptFit | None]:
+    """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
+
+    kind : of the recogniser
+    Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
+    else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
+    """
+    given = cast("Timeline[Unit]", request.units)  # of ``read_request``
+    _check_units(given, audio.duration_s)
+    spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
+    for span in (span for span in given if span.start_s < audio.duration_s):
+        end_s = min(span.end_s, audio.duration_s)
+        if span.label.phone or span.label.unit != UNKNOWN_PHONES:
+            spans.append(replace(span, end_s=end_s) if span.end_s > audio.duration_s + LATE_S else span)
+            continue
+        try:
+            word = span.label.word
+            inside = align_between(model, request, audio, word, span.start_s, end_s) if word else []
+            if inside:
+                aligned.append(f"{word!r} at {span.start_s:.1f} s")
+        except (AlignmentError, InputError):
+            inside = []
+        if not inside:
+            guessed.append((span.start_s, end_s))
+        spans += inside or _cut_phones(recognised(), span.start_s, end_s)
+    if aligned:
+        LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
+    if guessed:
+        LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
+    if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
+        return units, None
+    name = network_of(kind) if request.language == ENGLISH else None
+    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
+    is_sure = sure >= WORD_POSTERIORS[0]
+    fit = label_fit(audio, units, posteriors if is_sure else None)
+    edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), audio.duration_s]
+    filling = [
+        phone
+        for open_s, close_s in zip(edges_s[::2], edges_s[1::2], strict=True)
+        for start_s, end_s in (fit.missing if is_sure else ())
+        if min(close_s, end_s) - max(open_s, start_s) >= LEAST_GAP_S
+        for phone in _cut_phones(recognised(), max(open_s, start_s - REACH_S), min(close_s, end_s + REACH_S))
+    ]
+    warn_of_label_misfit(fit, filled=bool(filling))
+    spans = sorted([*spans, *filling], key=lambda span: span.start_s)
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
+    return units, replace(fit, missing=(*fit.missing, *guessed))
+
+
+def _cut_phones(units: Timeline[Unit], start_s: float, end_s: float) -> list[Span[Unit]]:
+    """Return the phones, without silence, whose middle is within some time, cut to it."""
+    return [
+        replace(span, start_s=max(span.start_s, start_s), end_s=min(span.end_s, end_s))
+        for span in units
+        if start_s <= (span.start_s + span.end_s) / 2 < end_s and not is_silent(span.label.phone)
+    ]
+
+
+def _check_units(units: Timeline[Unit], duration_s: float) -> None:
+    """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
+    if not len(units):
+        raise InputError(
+            "the units are an empty list (a .csv has none); give those of a .json, .npz or label file, or leave "
+            "them out"
+        )
+    check_phones(len(units), duration_s)
+    first_s, last_s, end_s = units[0].start_s, units[-1].start_s, units[-1].end_s
+    if duration_s <= first_s <= LATEST_S:
+        raise InputError(f"the units begin at {first_s:.2f} s, the recording ends at {duration_s:.2f} s; give its own")
+    if not -LATEST_S <= first_s <= last_s <= LATEST_S or LATEST_S < end_s < np.inf:
+        raise InputError(f"the units last from {first_s} to {end_s} s, required times of this recording")
+    spoken_s = sorted(span.duration_s for span in units if not is_silent(span.label.phone))
+    if duration_s + LATE_S < end_s < np.inf:
+        unit = next((name for name, ratio in TIME_UNITS.items() if 0.3 < end_s / duration_s / ratio < 1.3), "")
+        guess = f"their times in {unit}, where seconds are required" if unit else "they those of another recording"
+        LOG.warning(
+            "the units go on to %.2f s, the recording ends at %.2f s: are %s?", units[-1].end_s, duration_s, guess
+        )
+    elif len(spoken_s) >= FEWEST_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
+        LOG.warning(
+            "the units last %.1f ms each and end at %.2f s of %.2f s, faster than anybody speaks: are their times in "
+            "seconds?",
+            *(1000 * spoken_s[len(spoken_s) // 2], end_s, duration_s),
+        )

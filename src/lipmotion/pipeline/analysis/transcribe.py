@@ -1,0 +1,363 @@
+"""Phones in time of recordings: by forced alignment of a transcript, or by recognition."""
+
+from __future__ import annotations
+
+import logging
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from difflib import SequenceMatcher
+from itertools import groupby, pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import AlignmentError, shorten
+from lipmotion.hmm.loudness import find_loud_frames
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
+from lipmotion.speech.recognition.anchors import anchors_of, fitted
+from lipmotion.speech.recognition.network.posteriors import (
+    POSTERIOR_STEP,
+    WORD_BOUNDARY,
+    mean_posterior,
+    posterior_stretches,
+    recording_posteriors,
+)
+from lipmotion.speech.recognition.recognised_speech import PHONE_POSTERIORS, WORD_POSTERIORS
+from lipmotion.speech.recognition.recogniser import Recogniser, network_of
+from lipmotion.speech.recognition.transcript_evidence import (
+    LEAST_GAP_S,
+    SURE_COSTS,
+    WORD_COSTS,
+    OtherSpeech,
+    TranscriptEvidence,
+    WordEvidence,
+    transcript_evidence,
+)
+from lipmotion.speech.voices.pronunciations import LanguageLexicon
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
+from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
+from lipmotion.units.phones import count_phone_edits
+
+LOG = logging.getLogger("lipmotion")
+MAX_WARNINGS = 20
+"""Largest number of guessed pronunciations that are reported one by one."""
+FOREIGN_SHARE, MIN_FOREIGN = 0.25, 3
+"""A text of which so large a share, and so many different words, are not in the dictionary is not English."""
+MAX_STRETCHES = 3
+"""Largest number of stretches without words that are named in one warning."""
+REACH_S = 0.1
+"""A phone of a word may be heard so far from the middle that its recognition has."""
+MIN_INSERTED = 2
+"""Fewer phones between words than this belong to them: recognition errs by one."""
+ALIKE_SHARE = 0.34
+"""Words are said all the same where recognition finds their phones, but for so small a share."""
+
+
+class Transcription(NamedTuple):
+    """Phones in time of a recording, and how well the transcript fits.
+
+    units : None where the transcript is of something else: what is said is to be recognised
+    fit   : None where there was no transcript, or it was not compared with the sound (general phone models are needed)
+    """
+
+    units: Timeline[Unit] | None
+    fit: TranscriptFit | None
+
+
+def transcribe(
+    phones: Recogniser,
+    audio: Audio,
+    features: Features,
+    words: Sequence[str] | TimedTranscript | None,
+    lexicon: Lexicon,
+    recognised: Callable[[], Timeline[Unit]] | None = None,
+) -> Transcription:
+    """Return the phones in time of a recording, with warnings for the user.
+
+    phones     : the recogniser
+    features   : of the audio, from ``mfcc``
+    words      : the spoken words in lower case, also with times, within which they are aligned; or None
+    recognised : recognises phones in time with their confidence; None: nothing is corrected
+    Warnings are logged for guessed pronunciations and, with general phone models, for words that do not agree with the
+    sound, and speech that the words leave out. Of English words, a phone recogniser judges, where one is installed: if
+    it is sure, words that nobody says are left out, and speech that has no words is recognised.
+    Raises AlignmentError: the words cannot be aligned with the recording.
+    """
+    if isinstance(words, TimedTranscript):
+        words = fitted(words, find_loud_frames(analysed(audio, features).log_energy), audio.duration_s)
+    spoken = words.words if isinstance(words, TimedTranscript) else words or ()
+    if is_other_language(spoken, lexicon):
+        LOG.warning(
+            "the transcript seems not to be English: its words are read by English rules, and the lips will be wrong; "
+            "give its language (--language)"
+        )
+    else:
+        warn_of_guesses(spoken, lexicon)
+    name = None if isinstance(lexicon, LanguageLexicon) else network_of(phones.kind)
+    refused: AlignmentError | None = None
+    try:
+        units = align_or_recognise(phones, audio, features, words, lexicon)
+    except AlignmentError as error:  # too much for the recording: some of the words may be said all the same
+        check_words(spoken, audio.duration_s)
+        if (
+            name is None
+            or recognised is None
+            or compute_phone_posteriors(name, analysed(audio))[1] < PHONE_POSTERIORS[0]
+        ):
+            raise
+        refused = error
+        labels = [Unit(phone, word=word) for word in spoken for phone in lexicon.pronunciations(word)[0]]
+        edges_s = np.linspace(0, audio.duration_s, len(labels) + 1).tolist()  # each for the same time
+        units = Timeline(tuple(map(Span, edges_s[:-1], edges_s[1:], labels)))
+    if words is None or phones.kind == "own":
+        return Transcription(units, None)
+    fit = transcript_fit(audio, units)
+    if name is None:
+        warn_of_misfit(fit)
+        return Transcription(units, fit)
+    posteriors, sure = compute_phone_posteriors(name, analysed(audio))
+    costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
+    evidence = transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
+    if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
+        fit = fit.with_evidence(evidence)
+        warn_of_misfit(fit)
+        return Transcription(units, fit)
+    phones_recognised = recognised()
+    evidence = _compare(evidence, phones_recognised)
+    fit = fit.with_evidence(evidence)
+    warn_of_misfit(fit, corrected=True)
+    if fit.is_doubtful:
+        return Transcription(None, fit)
+    if refused is not None and not evidence.unsaid:
+        raise refused
+    if evidence.gaps or evidence.unsaid:
+        units = _correct(phones, audio, features, evidence, phones_recognised, lexicon)
+    return Transcription(units, fit)
+
+
+def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
+    """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
+    posteriors = recording_posteriors(name, audio)
+    hears = any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
+    sure = mean_posterior(posterior_stretches(name, audio)) if hears else 1.0
+    return posteriors.of_phones.astype(float), sure
+
+
+def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
+    """Return evidence of a transcript that is wrong somewhere, compared with what is recognised.
+
+    Words are said, and there, where recognition finds most of their phones; words that were doubted together, if it
+    finds all of them. Where it finds nothing, nothing is missing.
+    Short words that are left out go unnoticed by themselves, for their neighbours are stretched over them: once a
+    transcript is known to leave out something, recognised phones between those of its words are more of it.
+    """
+    spans = [span for span in recognised if not is_silent(span.label.phone)]
+    words, taken = _match_words(evidence, spans)
+    others_said = [span for place, span in enumerate(spans) if place not in taken]
+    middles_s = [(span.start_s + span.end_s) / 2 for span in others_said]
+    known = {(other.first, other.stop) for other in evidence.others}
+    said = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
+    others = []
+    for before, after in pairwise(said):
+        before_s = words[before].end_s if before >= 0 else 0.0
+        after_s = words[after].start_s if after < len(words) else np.inf
+        between = others_said[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
+        lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
+        is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= MIN_INSERTED)
+        if after > before + 1 or (lasts and is_more):
+            start_s, end_s = (between[0].start_s, between[-1].end_s) if between else (before_s, before_s)
+            others.append(OtherSpeech(start_s, end_s, before + 1, after))
+    return TranscriptEvidence(tuple(words), tuple(others))
+
+
+def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
+    """Return the words of ``_compare``, those that are found with the times that they have there, and their phones.
+
+    spans : recognised phones; those of the words that are found are returned by their numbers
+    """
+    words, phones = list(evidence.words), [span.label.phone for span in spans]
+    wanted = [(number, phone) for number, word in enumerate(words) for phone in word.phones]
+    matcher = SequenceMatcher(None, [phone for _, phone in wanted], phones, autojunk=False)
+    matched: dict[int, list[int]] = {}
+    for first, at, size in matcher.get_matching_blocks():
+        for (number, _), place in zip(wanted[first : first + size], range(at, at + size), strict=True):
+            matched.setdefault(number, []).append(place)
+    doubted = set[int]()
+    for other in evidence.others:
+        left_out = range(other.first, other.stop)
+        shares = [len(matched.get(number, ())) / len(words[number].phones) for number in left_out]
+        doubted.update(left_out if min(shares, default=1.0) < 1 - ALIKE_SHARE else ())
+    taken, end = set[int](), 0
+    for number, word in enumerate(words):
+        stop = next((matched[later][0] for later in range(number + 1, len(words)) if later in matched), len(spans))
+        most = ALIKE_SHARE * len(word.phones)
+        if number in doubted:
+            continue
+        lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
+        runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
+        edits = [(count_phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
+        if edits and min(edits)[0] <= most:
+            _, first, end = min(edits)
+            words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)
+            taken.update(range(first, end))
+    return words, taken
+
+
+def _select_recognised(
+    recognised: Timeline[Unit], evidence: TranscriptEvidence, other: OtherSpeech
+) -> list[list[Span[Unit]]]:
+    """Return the recognised phones where something else is said than the transcript has, by words.
+
+    Whole words count by their middle, half of the way to the words beside them. Phones without words do from the last
+    one on that may be the end of the word before, to the first one that may be the beginning of the word after.
+    """
+    if other.start_s == other.end_s:
+        return []
+    words, spans = evidence.words, [span for span in recognised if not is_silent(span.label.phone)]
+    middles_s = np.array([(span.start_s + span.end_s) / 2 for span in spans])
+    before_s, after_s, first, stop = 0.0, np.inf, 0, len(spans)
+    if other.first > 0:
+        before_s = words[other.first - 1].end_s
+        first = int(np.searchsorted(middles_s, before_s))
+        near = range(*np.searchsorted(middles_s, [before_s - REACH_S, before_s + REACH_S]))
+        first = max([n + 1 for n in near if spans[n].label.phone == words[other.first - 1].phones[-1]], default=first)
+    if other.stop < len(words):
+        after_s = words[other.stop].start_s
+        stop = int(np.searchsorted(middles_s, after_s))
+        near = range(*np.searchsorted(middles_s, [after_s - REACH_S, after_s + REACH_S]))
+        stop = min([n for n in near if spans[n].label.phone == words[other.stop].phones[0]], default=stop)
+    runs: list[list[Span[Unit]]] = []
+    for word, group in groupby(enumerate(spans), key=lambda pair: pair[1].label.word):
+        run = list(group)
+        middle_s = (run[0][1].start_s + run[-1][1].end_s) / 2
+        if word and (before_s + other.start_s) / 2 <= middle_s <= (other.end_s + after_s) / 2:
+            runs.append([span for _, span in run])
+        elif not word and (inside := [span for number, span in run if first <= number < stop]):
+            runs.append(inside)
+    return runs
+
+
+def _correct(
+    phones: Recogniser,
+    audio: Audio,
+    features: Features,
+    evidence: TranscriptEvidence,
+    recognised: Timeline[Unit],
+    lexicon: Lexicon,
+) -> Timeline[Unit]:
+    """Return the words of a transcript that are said, and what is recognised beside them, aligned.
+
+    Raises AlignmentError: as ``transcribe``.
+    """
+    labels: list[tuple[str, float | None]] = []
+    variants: dict[str, tuple[Pronunciation, ...]] = {}
+    for number, word in enumerate((*evidence.words, None)):
+        for other in (each for each in evidence.others if each.first == number):
+            for run in _select_recognised(recognised, evidence, other):
+                variants[str(len(labels))] = (tuple(span.label.phone for span in run),)
+                labels.append((run[0].label.word, run[0].label.confidence))
+        if word is not None and word.is_said:
+            known = lexicon.pronunciations(word.word)
+            variants[str(len(labels))] = known if word.phones in known else (word.phones,)
+            labels.append((word.word, None))
+    spans = list[Span[Unit]]()
+    for span in phones.align(audio, features, tuple(variants), Lexicon(variants)):
+        text, confidence = labels[int(span.label.word)] if span.label.word else ("", None)
+        spans.append(replace(span, label=replace(span.label, word=text, confidence=confidence)))
+    return Timeline(tuple(spans))
+
+
+def align_or_recognise(
+    phones: Recogniser,
+    audio: Audio,
+    features: Features,
+    words: Sequence[str] | TimedTranscript | None,
+    lexicon: Lexicon,
+) -> Timeline[Unit]:
+    """Return the phones in time of a recording as ``transcribe`` does, without warnings."""
+    if words is None:
+        return phones.recognise(audio, features)
+    anchors = None
+    if isinstance(words, TimedTranscript):
+        anchors, words = anchors_of(words) if words.has_times else None, words.words
+    check_words(words, audio.duration_s)
+    return phones.align(audio, features, words, lexicon, anchors)
+
+
+def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
+    """Log a warning if a transcript seems to be of something else, to leave out speech, or to have too many words.
+
+    corrected : whether what is said instead is recognised
+    """
+    places = f"at {format_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
+    if fit.is_doubtful:
+        why = f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
+        if fit.evidence is not None:
+            said = sum(word.is_said for word in fit.evidence.words)
+            why = f"{said} of its {len(fit.evidence.words)} words are heard"
+        LOG.warning(
+            "the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out",
+            *(why, f" or to leave out words {places}" if fit.missing else ""),
+            "the sound is recognised instead: " if corrected else "",
+        )
+        return
+    if fit.unsaid:
+        words = [f"{shorten(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MAX_STRETCHES]]
+        more = len(fit.unsaid) - MAX_STRETCHES
+        LOG.warning(
+            "the transcript seems to have words that are not said: %s%s%s; correct it",
+            *(", ".join(words), f" and {more} more" if more > 0 else ""),
+            ", which are left out" if corrected else "",
+        )
+    if fit.missing:
+        done = "what is said there is recognised" if corrected else "the lips are wrong there"
+        LOG.warning(
+            "the transcript seems to leave out words %s: %s; add the words, or leave the whole transcript out",
+            *(places, done),
+        )
+
+
+def warn_of_label_misfit(fit: TranscriptFit, filled: bool) -> None:
+    """Log warnings where given phones do not fit the sound; ``filled``: where they are open, phones are recognised."""
+    problems = {
+        "leave out speech": fit.missing,
+        "lie where nothing is said": fit.idle,
+        "are not what is said": fit.wrong,
+    }
+    for problem, places in problems.items():
+        if places:
+            done = "; what is said there is recognised" if filled and places is fit.missing else ""
+            LOG.warning("the units %s at %s%s; correct them, or leave them out", problem, format_places(places), done)
+
+
+def format_places(places: Sequence[tuple[float, float]]) -> str:
+    """Return the longest of some stretches of time, for a message."""
+    longest = sorted(places, key=lambda place: place[0] - place[1])[:MAX_STRETCHES]
+    named = ", ".join(f"{start_s:.1f} to {end_s:.1f} s" for start_s, end_s in sorted(longest))
+    more = len(places) - MAX_STRETCHES
+    return named + (f" and at {more} more places" if more > 0 else "")
+
+
+def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:
+    """Return whether words seem to be of another language than their lexicon."""
+    unknown = [word for word in words if not lexicon.known(word)]
+    return len({*unknown}) >= MIN_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
+
+
+def guess_pronunciations(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
+    """Return the first ``MAX_WARNINGS`` words whose pronunciation is a guess, with it."""
+    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+    return {word: lexicon.pronunciations(word)[0] for word in unknown[:MAX_WARNINGS]}
+
+
+def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
+    """Log a warning for every word whose pronunciation is a guess; after ``MAX_WARNINGS``, for how many more."""
+    for word, guess in guess_pronunciations(words, lexicon).items():
+        shown = map(shorten, (word, " ".join(guess)))
+        LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *shown)
+    more = sum(not lexicon.known(word) for word in dict.fromkeys(words)) - MAX_WARNINGS
+    if more > 0:
+        LOG.warning("%d more words are not in the dictionary; a lexicon file can say better", more)

@@ -1,0 +1,138 @@
+"""Motion as it is delivered: one place from which files, curves, cues and videos get it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from lipmotion.articulation.curve_edits import apply_gain
+from lipmotion.articulation.delivery import (
+    Delivery,
+    close_on_frame_grid,
+    find_closed_times,
+    hold_poses,
+    intensify,
+    shift_in_time,
+)
+from lipmotion.articulation.expression import is_mood, with_moods
+from lipmotion.articulation.phone_targets import with_gestures
+from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.pipeline.outputs.curve_sets import with_curves
+from lipmotion.types import Gain, Generation, VoiceEvent
+from lipmotion.types.moods import NEUTRAL, PLAIN, MoodKey, sort_moods
+from lipmotion.types.motion import RADIAN
+from lipmotion.types.voice_event import LAUGHTER, SHOUT, WHISPER
+
+FACTORS: Final = {PLAIN: 1.0, "whisper": 0.85, "shout": 1.5, "mumble": 0.5}
+"""How large the movements of the mouth are in each manner, beside those of plain speech."""
+
+LAUGHING: Final = "happy"
+"""The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.pauses`` opens the jaw."""
+
+
+def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
+    """Return moods and manners over time: those that are asked for, or else those that are detected.
+
+    asked  : where it has a mood, no other is detected; where it has a manner, no manner
+    events : laughter is a mood; phrases that are whispered or shouted have this manner, as far as they are strong
+    """
+    manner_of = {LAUGHTER: False, WHISPER: True, SHOUT: True}
+    keys = list(asked)
+    for event in events:
+        is_manner = manner_of.get(event.kind)
+        if is_manner is None or any(key.is_manner == is_manner for key in asked):
+            continue
+        named, usual = (event.kind, PLAIN) if is_manner else (LAUGHING, NEUTRAL)
+        strength = event.strength if is_manner else 1.0
+        keys += [MoodKey(event.start_s, named, strength), MoodKey(event.end_s, usual)]
+    return sort_moods(keys)
+
+
+def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
+    """Return generated motion whose mouth moves more, or less, in some manners of speaking; what is closed stays so.
+
+    keys : in the order of their times; moods do not count. Each holds until the next manner
+    """
+    manners = [key for key in keys if key.is_manner]
+    last = MoodKey(len(generation.motion.values) / generation.motion.rate_hz, PLAIN)
+    for key, stop_s in ((key, later.time_s) for key, later in pairwise((*manners, last))):
+        factor = 1 + key.strength * (FACTORS[key.mood] - 1)
+        if factor != 1 and key.time_s < stop_s:
+            generation = apply_gain(generation, Gain(key.time_s, stop_s, factor))
+    return generation
+
+
+def deliver(generation: Generation, delivery: Delivery) -> Generation:
+    """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``hold_poses``).
+
+    Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
+    without any, motion keeps the moods that it has. So do manners of speaking. Where none is asked for, those that are
+    detected count.
+    Raises InputError: the offset leaves nothing.
+    """
+    keys = with_detected(sort_moods((*delivery.moods, *generation.moods)), generation.events)
+    generation = with_manners(generation, keys)
+    if delivery.intensity != 1:
+        motion = generation.motion
+        opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
+        generation = intensify(generation, delivery.intensity, opening)
+    if not all(key.is_manner for key in keys):
+        moods = with_moods(generation.motion, keys)
+        names = tuple(name for name in generation.motion.names if not is_mood(name))
+        generation = generation.selected(names).with_motion(moods)
+    return shift_in_time(generation, delivery)
+
+
+def deliver_to_face(
+    generation: Generation, delivery: Delivery, fps: float, character: DrivenCharacter | None = None
+) -> Generation:
+    """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
+
+    character : whose weights are deliver_to_face, if the face is a character with blendshapes
+    """
+    moved = with_drawn_channels(deliver(generation, delivery))
+    if moved.curve_edits and character is not None and character.shapes is not None:
+        moved = with_curves(moved, character)[0]
+    frames = delivery.hold_frames(fps)
+    if not frames:
+        return moved
+    moved = moved.with_motion(with_gestures(moved.motion, moved.units))
+    closed_s, moved = find_closed_times(moved), close_on_frame_grid(moved, fps)
+    if character is not None and character.shapes is not None:
+        moved = with_curves(moved, character)[0]
+    return hold_mouth(moved.resampled(fps), frames, closed_s)
+
+
+def with_drawn_channels(generation: Generation) -> Generation:
+    """Return a generation with the channels that faces draw: those of a mouth, where it has blendshapes."""
+    if not is_of_blendshapes(generation.motion):
+        return generation
+    return generation.with_motion(with_mouth(generation.motion))
+
+
+def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
+    """Return a generation whose mouth is held (``hold_poses``); eyes, brows, cheeks and head move as before.
+
+    frames : 0: everything moves as before; 1: every frame is a pose, which formats that can say so hold
+    """
+    motion = generation.motion
+    names = tuple(
+        channel.name
+        for channel in motion.channels
+        if channel.unit != RADIAN and arkit_name(channel.name) not in ARKIT_OTHERS and not is_mood(channel.name)
+    )
+    if not frames or not names:
+        return generation
+    mouth = replace(hold_poses(generation.selected(names), frames, closed_s), stepped=names)
+    if names == motion.names:
+        return mouth
+    columns = [motion.column(name) for name in names]
+    values, variance = motion.values.astype(np.float64), np.array(generation.variance)
+    values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance
+    return replace(mouth, motion=replace(motion, values=values), spread=variance)

@@ -1,0 +1,197 @@
+"""What the encoder of a large speech network makes of a recording: features that are alike for every voice.
+
+The network is the encoder of Whisper Tiny (Radford et al. 2022), trained on 680,000 hours of many languages, as Smart
+Turn has fine-tuned it and rounded it to eight bits. ``scripts/speech_encoder.py`` makes its file,
+``models/speech-encoder.npz``; ``models/speech-encoder.txt`` has the licences. Two of its four layers suffice for the
+motion of lips. Activations are not rounded here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import resources
+from itertools import chain
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from lipmotion.speech.features.mfcc import HOP, WINDOW
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+
+Array = NDArray[np.float32]
+WEIGHTS = "speech-encoder.npz"
+COMPONENTS = 64
+"""Principal components that are kept of the 384 values; more serve the voice of the training, fewer all others."""
+ROW_FRAMES = 2
+"""Frames of 10 ms from one row of the network to the next."""
+WINDOW_ROWS, OVERLAP_ROWS = 400, 100
+"""The network takes 8 s at a time; windows overlap by 2 s, over which one fades into the next."""
+LEVEL = 25.0
+"""Factor from samples at the level of all passages to that of speech in the training of the network."""
+BANDS, HEADS, LAYERS = 80, 6, 2
+FLOOR = -4.5
+"""The smallest logarithm of a power, eight powers of ten beneath loud speech, as in Whisper."""
+
+
+class WindowedEncoding:
+    """The features of a recording, computed window by window, as far as they are asked for.
+
+    read    : returns the samples of the recording from one to before another, at the level of all passages
+    samples : their number
+    encoder : the network; None: that of the package
+    """
+
+    def __init__(self, read: Callable[[int, int], Array], samples: int, encoder: Encoder | None = None) -> None:
+        self._read, self._samples, self._encoder = read, samples, encoder or shipped_encoder()
+        self._windows: dict[int, Array] = {}
+
+    def rows(self, first: int, stop: int) -> NDArray[np.float16]:
+        """Return the features of frames of 10 ms [shape=(stop - first, ``COMPONENTS``)], frames as of ``mfcc``.
+
+        Windows begin with the recording, and nothing is normalised over it: silence around speech changes nothing.
+        Source: Radford et al. 2022, §2.2 (log mel spectrum, encoder).
+        """
+        place, odd = np.divmod(np.arange(first, stop), ROW_FRAMES)
+        last = self._samples // HOP // ROW_FRAMES
+        here, after = (self._rows(np.minimum(rows, last)) for rows in (place, place + odd))
+        return ((here + after) / 2).astype(np.float16)
+
+    def _rows(self, rows: NDArray[np.intp]) -> Array:
+        step = WINDOW_ROWS - OVERLAP_ROWS
+        number, inside = np.divmod(rows, step)
+        result = np.zeros((len(rows), len(self._encoder.shift)), np.float32)
+        for window in np.unique(number).tolist():
+            chosen = np.flatnonzero(number == window)
+            result[chosen] = self._window(window)[inside[chosen]]
+            fading = chosen[inside[chosen] < OVERLAP_ROWS] if window else chosen[:0]
+            if len(fading):
+                share = ((inside[fading] + 0.5) / OVERLAP_ROWS).astype(np.float32)[:, None]
+                result[fading] = share * result[fading] + (1 - share) * self._window(window - 1)[inside[fading] + step]
+        return result
+
+    def _window(self, number: int) -> Array:
+        if number not in self._windows:
+            first = number * (WINDOW_ROWS - OVERLAP_ROWS) * ROW_FRAMES * HOP - WINDOW // 2
+            stop = first + (WINDOW_ROWS * ROW_FRAMES - 1) * HOP + WINDOW
+            samples = np.zeros(stop - first, np.float32)
+            start, end = max(first, 0), min(stop, self._samples)
+            samples[start - first : end - first] = self._read(start, end)
+            self._windows[number] = encode_window(log_mel_spectrum(samples), self._encoder)
+        return self._windows[number]
+
+
+def log_mel_spectrum(samples: Array) -> Array:
+    """Return the log mel spectrum that the network takes, of every whole window of samples [shape=(T, 80)]."""
+    window = np.hanning(WINDOW + 1)[:-1].astype(np.float32)
+    spectrum = np.fft.rfft(sliding_window_view(samples * np.float32(LEVEL), WINDOW)[::HOP] * window)
+    powers = (np.square(spectrum.real) + np.square(spectrum.imag)).astype(np.float32) @ _filters()
+    result: Array = (np.log10(np.maximum(powers, np.float32(10**FLOOR))) + 4) / 4
+    return result
+
+
+def encode_window(log_mel: Array, encoder: Encoder) -> Array:
+    """Return the principal components of what enters the third layer [shape=(400, ``COMPONENTS``)].
+
+    log_mel : of 8 s [shape=(800, 80)]
+    """
+    x = log_mel
+    for stride, (kernel, bias) in enumerate(encoder.convolutions, 1):
+        padded = np.pad(x, ((1, 1), (0, 0)))
+        columns = [padded[first : first + len(x) : stride] for first in range(3)]
+        x = _gelu(np.concatenate(columns, axis=1) @ kernel + bias)
+    x += _positions(x.shape[1])
+    for layer in encoder.layers:
+        queries, keys, values = np.split(_standardised(x) @ layer.attend + layer.attend_bias, 3, axis=1)
+        q, k, v = (part.reshape(len(x), HEADS, -1).swapaxes(0, 1) for part in (queries, keys, values))
+        scores = q @ k.swapaxes(1, 2)
+        scores = np.exp(scores - scores.max(axis=2, keepdims=True))
+        attended = (scores / scores.sum(axis=2, keepdims=True)) @ v
+        x += attended.swapaxes(0, 1).reshape(x.shape) @ layer.join + layer.join_bias
+        x += _gelu(_standardised(x) @ layer.widen + layer.widen_bias) @ layer.narrow + layer.narrow_bias
+    components: Array = _standardised(x) @ encoder.basis + encoder.shift
+    return components
+
+
+def _gelu(x: Array) -> Array:
+    """Return the Gaussian error linear unit of values (Hendrycks & Gimpel 2016, the form with tanh)."""
+    result: Array = 0.5 * x * (1 + np.tanh(np.float32(0.7978845608) * (x + np.float32(0.044715) * x * x * x)))
+    return result
+
+
+def _standardised(x: Array) -> Array:
+    """Return rows with mean 0 and variance 1; the gains of layer normalisation are in the weights that follow."""
+    centred = x - x.mean(axis=1, keepdims=True)
+    result: Array = centred / np.sqrt(np.square(centred).mean(axis=1, keepdims=True) + np.float32(1e-5))
+    return result
+
+
+@cache
+def _positions(size: int) -> Array:
+    """Return what tells the network where in its window a row is [shape=(400, size)]: Vaswani et al. 2017, §3.5."""
+    angles = np.arange(WINDOW_ROWS)[:, None] * np.exp(-np.log(10_000) / (size // 2 - 1) * np.arange(size // 2))
+    return np.concatenate([np.sin(angles), np.cos(angles)], axis=1).astype(np.float32)
+
+
+class EncoderLayer(NamedTuple):
+    """Weights of a layer of N values, each a matrix and a bias: of queries, keys and values, and of what follows."""
+
+    attend: Array
+    attend_bias: Array
+    join: Array
+    join_bias: Array
+    widen: Array
+    widen_bias: Array
+    narrow: Array
+    narrow_bias: Array
+
+
+class Encoder(NamedTuple):
+    """Weights of the network; gains of layer normalisation are in the matrices that follow them.
+
+    convolutions : of three taps each, the second one with stride 2: kernels [shape=(3·inputs, N)] and biases
+    basis, shift : from the normalised output of the last layer to the features [shape=(N, D)], [shape=(D,)]
+    """
+
+    convolutions: tuple[tuple[Array, Array], ...]
+    layers: tuple[EncoderLayer, ...]
+    basis: Array
+    shift: Array
+
+
+@cache
+def shipped_encoder() -> Encoder:
+    """Return the network of the package."""
+    path = resources.files("lipmotion") / "models" / WEIGHTS
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        return encoder_of(dict(stored))
+
+
+def encoder_of(arrays: Mapping[str, NDArray[Any]]) -> Encoder:
+    """Return the network of stored arrays: matrices in eight bits, with a scale for each row and each column."""
+
+    def linear(name: str) -> tuple[Array, Array]:
+        rows, columns, bias = (arrays[f"{name}_{kind}"] for kind in ("rows", "columns", "bias"))
+        return rows[:, None] * arrays[name].astype(np.float32) * columns, bias
+
+    layers = [
+        EncoderLayer(*chain.from_iterable(linear(f"{name}_{number}") for name in ("attend", "join", "widen", "narrow")))
+        for number in range(LAYERS)
+    ]
+    convolutions = tuple(linear(f"convolution_{number}") for number in range(2))
+    return Encoder(convolutions, tuple(layers), arrays["basis"], arrays["shift"])
+
+
+@cache
+def _filters() -> Array:
+    """Return Whisper's triangular filters, equally spaced in Slaney's mel and of equal area [shape=(201, 80)]."""
+    top = 15 + np.log(SPEECH_RATE_HZ / 2 / 1000) * 27 / np.log(6.4)
+    mel = np.linspace(0, top, BANDS + 2)
+    edges = np.where(mel < 15, mel * 200 / 3, 1000 * 6.4 ** ((mel - 15) / 27))
+    hertz = np.linspace(0, SPEECH_RATE_HZ / 2, WINDOW // 2 + 1)[:, None]
+    rising = (hertz - edges[:-2]) / (edges[1:-1] - edges[:-2])
+    falling = (edges[2:] - hertz) / (edges[2:] - edges[1:-1])
+    filters = np.maximum(0, np.minimum(rising, falling)) * 2 / (edges[2:] - edges[:-2])
+    return filters.astype(np.float32)

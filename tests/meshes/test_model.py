@@ -1,0 +1,209 @@
+"""Meshes check themselves; blendshapes add up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, place_keys
+from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
+from lipmotion.meshes.model.scene import HeadTurn, Scene, compute_shading_normals
+from lipmotion.meshes.model.shape_names import (
+    ARKIT_MOUTH,
+    ARKIT_OTHERS,
+    VISEMES_15,
+    arkit_name,
+    viseme_name,
+    vowel_name,
+)
+from lipmotion.meshes.model.surface import drop_back_sides
+from lipmotion.types import WEIGHT, Channel, Motion
+from meshes.heads import head, shaped
+
+CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+SQUARE = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+
+
+def _mesh(**changes) -> Mesh:
+    up = Blendshape("up", np.array([2, 3]), np.array([[0.0, 1, 0], [0, 2, 0]]))
+    out = Blendshape("out", np.array([3]), np.array([[0.0, 0, 4]]))
+    return Mesh(**({"vertices": CORNERS, "triangles": SQUARE, "shapes": (up, out)} | changes))
+
+
+def test_displacements_of_some_vertices():
+    moved = _mesh().displacements(np.array([3, 0]))
+    np.testing.assert_allclose(moved, [[[0, 2, 0], [0, 0, 0]], [[0, 0, 4], [0, 0, 0]]], atol=1e-12)
+
+
+def test_a_blendshape_keeps_only_what_moves():
+    shape = CORNERS.copy()
+    shape[1] += [0, 0, 1e-9]
+    shape[2] += [0, 0, 0.5]
+    assert Blendshape.between("a", CORNERS, shape, smallest=1e-6).rows.tolist() == [2]
+
+
+WRONG = [
+    ({"vertices": CORNERS[:, :2]}, "shape"),
+    ({"vertices": np.full((4, 3), np.nan)}, "finite"),
+    ({"triangles": SQUARE + 1}, "1 to 4, required 0 to 3"),
+    ({"triangles": SQUARE[:, :2]}, "required"),
+    ({"triangles": SQUARE - 1}, "-1 to 2"),
+    ({"triangles": SQUARE.astype(float)}, "whole numbers"),
+    ({"uv": np.zeros((2, 2))}, "uv"),
+    ({"parts": (MeshPart("a", 0, 1),)}, "parts"),
+    ({"parts": (MeshPart("a", 0, 1), MeshPart("b", 0, 2))}, "parts"),
+    ({"shapes": (Blendshape("a", np.array([9]), np.zeros((1, 3))),)}, "'a'"),
+    ({"shapes": (Blendshape("a", np.array([1, 2]), np.zeros((1, 3))),)}, "as many"),
+    ({"shapes": (Blendshape("a", np.array([1]), np.zeros((1, 3))),) * 2}, "one name"),
+]
+
+
+def test_what_does_not_fit_is_refused():
+    for changes, message in WRONG:
+        with pytest.raises(InputError, match=message):
+            _mesh(**changes)
+
+
+PLACES = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+FRONT = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+BACK = np.array([[0, 3, 2], [2, 1, 0]], np.int32)
+
+
+def test_a_part_with_both_sides_is_held_once():
+    uv = np.arange(6 * 3 * 2.0).reshape(6, 3, 2)
+    parts = (MeshPart("one", 0, 2), MeshPart("leaf", 2, 6))
+    places = np.concatenate([PLACES, PLACES + 5])
+    mesh = drop_back_sides(Mesh(places, np.concatenate([FRONT, FRONT + 4, BACK + 4]), parts, uv=uv))
+    assert mesh.triangles.tolist() == [*FRONT.tolist(), *(FRONT + 4).tolist()]
+    assert [(part.first, part.stop, part.material.two_sided) for part in mesh.parts] == [(0, 2, False), (2, 4, True)]
+    np.testing.assert_allclose(mesh.uv, uv[:4])
+
+
+def test_other_meshes_stay_as_they_are():
+    for triangles in (FRONT, np.concatenate([FRONT, FRONT]), np.concatenate([FRONT, BACK[:1]])):
+        mesh = Mesh(PLACES, triangles)
+        assert drop_back_sides(mesh) is mesh
+
+
+def test_both_sides_in_two_parts_stay():
+    mesh = Mesh(PLACES, np.concatenate([FRONT, BACK]), (MeshPart("front", 0, 2), MeshPart("back", 2, 4)))
+    assert drop_back_sides(mesh) is mesh
+
+
+def test_normals_of_both_sides_do_not_cancel_out():
+    normals = compute_shading_normals(Mesh(PLACES, np.concatenate([FRONT, BACK])))
+    np.testing.assert_allclose(normals.rest, np.tile([0.0, 0, 1], (4, 1)))
+
+
+def weights(name: str = "jawOpen") -> Motion:
+    return Motion(np.linspace(0, 1, 4)[:, None], 25.0, (Channel(name, WEIGHT),))
+
+
+def test_weights_are_in_the_order_of_the_mesh() -> None:
+    table = Scene(head(), weights()).table()
+    column = head().shape_names.index("jawOpen")
+    assert table[:, column] == pytest.approx(np.linspace(0, 1, 4))
+    assert np.delete(table, column, axis=1) == pytest.approx(np.zeros((4, table.shape[1] - 1)))
+
+
+def test_a_channel_that_is_no_shape_is_refused() -> None:
+    with pytest.raises(ExportError, match="no blendshape 'opening'"):
+        Scene(head(), weights("opening"))
+
+
+@pytest.mark.parametrize(("vertices", "frames"), [(3, 4), (None, 5)])
+def test_a_turn_that_does_not_fit_is_refused(vertices: int | None, frames: int) -> None:
+    share = np.ones(len(head().vertices) if vertices is None else vertices)
+    turn = HeadTurn(np.zeros(3), share, np.tile([0.0, 0, 0, 1], (frames, 1)))
+    with pytest.raises(InputError, match=f"and \\({frames}, 4\\) frames, required"):
+        Scene(head(), weights(), turn)
+
+
+def test_normals_are_of_length_one_and_turn_with_the_shape() -> None:
+    mesh = head()
+    normals = compute_shading_normals(mesh)
+    assert np.linalg.norm(normals.rest, axis=1) == pytest.approx(np.ones(len(mesh.vertices)))
+    number = mesh.shape_names.index("jawOpen")
+    rows, change = normals.turned[number]
+    moved = type(mesh)(shaped(mesh, {"jawOpen": 1.0}), mesh.triangles, mesh.parts)
+    after = compute_shading_normals(moved, split=False).rest
+    assert len(rows) > 10
+    inner = np.isin(rows, mesh.shapes[number].rows)
+    assert (normals.rest[rows] + change)[inner] == pytest.approx(after[rows][inner], abs=0.35)
+    assert set(rows.tolist()) != set(range(len(mesh.vertices)))
+
+
+TIME_S = np.arange(300) / 100
+ROWS = np.stack([np.sin(4 * TIME_S), np.abs(np.sin(9 * TIME_S)) ** 0.3, np.where(TIME_S < 1.5, 0.0, 0.4)], axis=1)
+SMOOTH = (False, False, False)
+
+
+def between(keys: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    time_s, rows = keys
+    return np.stack([np.interp(TIME_S, time_s, column) for column in rows.T], axis=1)
+
+
+@pytest.mark.parametrize("tolerance", [0.003, 0.01, 0.05])
+def test_curves_stay_within_the_tolerance(tolerance: float) -> None:
+    time_s, rows = place_keys(TIME_S, ROWS, SMOOTH, Thinning(tolerance))
+    assert 4 < len(time_s) < len(TIME_S)
+    assert (time_s[0], time_s[-1]) == (TIME_S[0], TIME_S[-1])
+    assert np.abs(between((time_s, rows)) - ROWS).max() <= tolerance + 1e-12
+
+
+def test_coarser_keys_are_fewer() -> None:
+    counts = [len(Thinning(tolerance).choose(TIME_S, ROWS)) for tolerance in (0.0, 0.003, 0.01, 0.05, 2.0)]
+    assert counts == sorted(counts, reverse=True)
+    assert (counts[0], counts[-1]) == (300, 2)
+    assert len(EVERY_KEY.choose(TIME_S[:0], ROWS[:0])) == 0
+
+
+def test_closed_lips_stay_closed() -> None:
+    kept = Thinning(2.0, (0.703, 2.995)).choose(TIME_S, ROWS)
+    assert kept.tolist() == [0, 69, 70, 71, 298, 299]
+
+
+def test_a_held_pose_still_changes_at_once() -> None:
+    stepped = (False, False, True)
+    time_s, rows = place_keys(TIME_S, ROWS, stepped, Thinning(0.05))
+    rise = np.flatnonzero(np.diff(rows[:, 2]) > 0.3)
+    assert len(rise) == 1
+    assert time_s[rise[0] + 1] - time_s[rise[0]] == pytest.approx(0.001)
+
+
+def test_there_are_52_and_15():
+    assert len({*ARKIT_MOUTH, *ARKIT_OTHERS}) == 52
+    assert len(set(VISEMES_15)) == 15
+
+
+def test_names_as_files_spell_them():
+    arkit = {
+        "jawOpen": "jawOpen", "JawOpen": "jawOpen",
+        "mouth_funnel": "mouthFunnel", "head.mouthSmile_L": "mouthSmileLeft",
+        "blendShape1.mouthPress_R": "mouthPressRight", "Face_mouthLowerDownRight": "mouthLowerDownRight",
+        "jawOpen.001": "jawOpen", "mouth_smile_left.002": "mouthSmileLeft", "Face_mouthSmileL": "mouthSmileLeft",
+        "JAW_OPEN": "jawOpen", "A25_Jaw_Open": "jawOpen", "Head|jawOpen_12": "jawOpen",
+        "mouthSmile": None, "Fcl_MTH_A": None, "": None, "001": None,
+    }  # fmt: skip
+    assert {spelled: arkit_name(spelled) for spelled in arkit} == arkit
+    visemes = {
+        "viseme_PP": "PP",
+        "viseme_I": "ih",
+        "vrc.v_oh": "oh",
+        "Viseme_aa": "aa",
+        "viseme_ZZ": None,
+        "viseme_PP.001": "PP",
+        "aa": None,
+    }
+    assert {spelled: viseme_name(spelled) for spelled in visemes} == visemes
+    vowels = {
+        "Fcl_MTH_A": "aa",
+        "Fcl_MTH_O.003": "oh",
+        "aa": "aa",
+        "う": "ou",
+        "oh": "oh",
+        "Fcl_MTH_Angry": None,
+        "Alpha": None,
+    }
+    assert {spelled: vowel_name(spelled) for spelled in vowels} == vowels
