@@ -45,8 +45,8 @@ from lipmotion_studio.project import (
     ProjectRecording,
     check_recordings,
     digest_of,
+    parse_project,
     project_document,
-    project_from,
 )
 from lipmotion_studio.votes import Vote, read_votes, votes_text
 
@@ -129,7 +129,7 @@ class ProjectFolder:
         if file.exists():
             text = read_text_file(file, "project", MAX_PROJECT_BYTES)
             try:
-                self.project = project_from(from_json(text))
+                self.project = parse_project(from_json(text))
             except ValueError as error:  # InputError is one
                 raise InputError(f"{file}: {error}") from error
 

@@ -51,7 +51,7 @@ PRESETS = {
 _SUFFIX = re.compile(r"(?:\.[A-Za-z0-9]{1,10}){1,3}")
 
 
-def preset_of(name: str, files: tuple[str, ...]) -> Preset:
+def find_preset(name: str, files: tuple[str, ...]) -> Preset:
     """Return a preset of a name; of an empty name, one of these suffixes of files.
 
     Raises InputError: there is none of that name, or nothing is written of such a suffix.

@@ -189,7 +189,7 @@ def project_document(project: Project) -> dict[str, Any]:
     return {"format": FORMAT, "version": VERSION, "made_by": made_by, **settings, "lines": rows}
 
 
-def project_from(content: Any) -> Project:
+def parse_project(content: Any) -> Project:
     """Return the project of an object of JSON. Raises InputError, ExportError: it is none, or of a later version."""
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f'not a project: required "format": "{FORMAT}"')

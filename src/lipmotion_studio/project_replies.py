@@ -18,9 +18,9 @@ from lipmotion.types import values
 from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items
 from lipmotion.units import PHONES, split_words
-from lipmotion_studio.presets import preset_of
+from lipmotion_studio.presets import find_preset
 from lipmotion_studio.project import APPROVED, MAX_RECORDINGS
-from lipmotion_studio.requests import content_of, member, text, texts, whole
+from lipmotion_studio.requests import member, read_content, text, texts, whole
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.trainer import MAX_LISTED
 from lipmotion_studio.training import FACE, VOICE, VoiceOptions, check_options
@@ -54,7 +54,7 @@ class ProjectReplies:
 
     async def understand(self, request: Request) -> Response:
         """Recordings that are to be analysed."""
-        content = await content_of(request)
+        content = await read_content(request)
         known = self._studio.folder.project.lines
         numbers = list(known) if content.get("lines") == ALL else member(content, "lines", None, items(NUMBER))
         if not set(numbers) <= known.keys():
@@ -77,14 +77,14 @@ class ProjectReplies:
 
     async def mark(self, request: Request) -> Response:
         """A mark of a recording."""
-        number, content = self._number(request), await content_of(request)
+        number, content = self._number(request), await read_content(request)
         mark, revision = text(content, "mark"), whole(content, "revision")
         return json_reply(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
 
     async def remove(self, request: Request) -> Response:
         """A recording that leaves the project; its files stay."""
         number, folder = self._number(request), self._studio.folder
-        with folder.check_out(number, whole(await content_of(request), "revision")):
+        with folder.check_out(number, whole(await read_content(request), "revision")):
             folder.change(lambda project: project.without_recording(number))
             self._studio.workspace.forget(number)
         return json_reply({"removed": number})
@@ -92,11 +92,11 @@ class ProjectReplies:
     async def export_one(self, request: Request) -> Response:
         """Files of one recording."""
         number = self._number(request)
-        return await self._export(await content_of(request), [number])
+        return await self._export(await read_content(request), [number])
 
     async def export_all(self, request: Request) -> Response:
         """Files of the recordings that are approved, or of all."""
-        content = await content_of(request)
+        content = await read_content(request)
         only = text(content, "only", APPROVED)
         if only not in (APPROVED, ALL):
             raise InputError(f"only is {only!r}, required {APPROVED} or {ALL}")
@@ -105,7 +105,7 @@ class ProjectReplies:
 
     async def _export(self, content: dict[str, object], numbers: list[int]) -> Response:
         files = texts(content, "files", most=20, longest=40) if "files" in content else ()
-        preset, face = preset_of(text(content, "preset", ""), files), text(content, "face", "")
+        preset, face = find_preset(text(content, "preset", ""), files), text(content, "face", "")
         return json_reply(await self._run_apart(lambda: self._studio.export_several(numbers, preset, face)))
 
     async def mesh(self, request: Request) -> Response:
@@ -123,7 +123,7 @@ class ProjectReplies:
 
     async def pronounce(self, request: Request) -> Response:
         """A pronunciation that the project keeps."""
-        content = await content_of(request)
+        content = await read_content(request)
         word, phones, revision = _word(content), texts(content, "phones", most=MAX_PHONES), whole(content, "revision")
         if not phones or not set(phones) <= set(PHONES):
             raise InputError(f"the phones of a word are some of: {' '.join(PHONES)}")
@@ -143,7 +143,7 @@ class ProjectReplies:
 
     async def begin_training(self, request: Request) -> Response:
         """A voice or a face that is to be made."""
-        content = await content_of(request)
+        content = await read_content(request)
         kind, name = text(content, "kind"), text(content, "name", "")
         numbers = list(dict.fromkeys(member(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
         options = check_options(content.get("options", {}))
@@ -154,7 +154,7 @@ class ProjectReplies:
         """Return what replies once something was done: what is made was stopped, gone on with, or restored."""
 
         async def reply(request: Request) -> Response:
-            await content_of(request)
+            await read_content(request)
             await self._run_apart(act)
             return await self._reply_training(status)
 
@@ -162,7 +162,7 @@ class ProjectReplies:
 
     async def voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""
-        content = await content_of(request)
+        content = await read_content(request)
         name, revision = text(content, "voice"), whole(content, "revision")
         path, voice = await self._run_apart(lambda: self._studio.load_voice(name))
         self._studio.use_voice(path, voice, revision)

@@ -27,7 +27,7 @@ LOUDNESS_HZ = 100
 """Rate of the loudness by which two sounds are compared: encoders move samples a little, which it hardly shows."""
 
 
-def video_of(recording: Path) -> Path | None:
+def find_real_video(recording: Path) -> Path | None:
     """Return the path of the real video of a recording; None: there is none.
 
     recording : a sound or a video

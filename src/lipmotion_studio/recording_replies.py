@@ -20,7 +20,7 @@ from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_studio.folder import RevisionError
 from lipmotion_studio.project import ProjectRecording
 from lipmotion_studio.recording import OpenRecording
-from lipmotion_studio.requests import Access, content_of, objects, seconds, stretch, text, texts, whole
+from lipmotion_studio.requests import Access, objects, read_content, seconds, stretch, text, texts, whole
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.votes import Vote, tally
 from lipmotion_studio.web.replies import FRESH, json_reply
@@ -192,7 +192,7 @@ class RecordingReplies:
 
     async def video(self, request: Request) -> Response:
         """A video of a stretch."""
-        content = await content_of(request)
+        content = await read_content(request)
         start_s, end_s = seconds(content, "start_s"), seconds(content, "end_s")
         name, by, number = text(content, "face", "woman"), text(content, "by", ""), self._number(request)
 
@@ -225,7 +225,7 @@ class RecordingReplies:
 
     async def _change(self, request: Request) -> tuple[int, dict[str, Any], int]:
         """Return the recording of a change, what it brings, and the revision that its author saw."""
-        content = await content_of(request)
+        content = await read_content(request)
         return self._number(request), content, whole(content, "revision")
 
     async def _step(self, request: Request, step: Callable[[OpenRecording, int, int], Changed]) -> Response:

@@ -16,7 +16,7 @@ from starlette.requests import Request
 from lipmotion.errors import InputError
 from lipmotion.types import values
 from lipmotion.types.values import Schema, any_members, items, number_or_text, parse_number, parse_whole, require
-from lipmotion_studio.web.replies import foreign_refusal, json_of
+from lipmotion_studio.web.replies import foreign_refusal, read_json
 
 TOKEN_HEADER = "x-lipmotion-token"  # noqa: S105 # its name
 API = "/api"
@@ -62,9 +62,9 @@ MAX_JSON_BYTES = 1 << 20
 LATEST_S = 1e6
 
 
-async def content_of(request: Request) -> dict[str, Any]:
+async def read_content(request: Request) -> dict[str, Any]:
     """Return the object of JSON that a request brings. Raises HTTPException, InputError: it brings something else."""
-    content = await json_of(request, MAX_JSON_BYTES)
+    content = await read_json(request, MAX_JSON_BYTES)
     if not isinstance(content, dict):
         raise InputError("required an object of JSON")
     return content

@@ -12,7 +12,7 @@ from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import sound_reference
-from lipmotion_studio.web.listening import HOST, check_installed, listening, serve
+from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 TOKEN_BYTES = 24
 NAMES = (HOST, "localhost")
@@ -59,7 +59,7 @@ def serve_studio(  # noqa: PLR0913
         numba_works()
         mesh_of_figure()
 
-    with listening(HOST, port) as place, open_folder(source, out) as folder:
+    with open_socket(HOST, port) as place, open_folder(source, out) as folder:
         file = folder.path.absolute() / PROJECT
         changes: dict[str, Any] = {}
         if characters:

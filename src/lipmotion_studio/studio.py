@@ -34,7 +34,7 @@ from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revi
 from lipmotion_studio.meshes import Faces
 from lipmotion_studio.presets import PRESETS, Preset, suffixes
 from lipmotion_studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectRecording, digest_of
-from lipmotion_studio.recorded_videos import MP4, media_type, sound_begins_s, video_of, write_playable
+from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
 from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer
 from lipmotion_studio.training import FACE, VOICE
@@ -322,7 +322,7 @@ class Studio:
         """Return the path of a recording's real video, and when in it the sound begins [s]; None: there is none."""
         sound = self.folder.sound(self.folder.recording(number))
         if sound not in self._videos:
-            video = video_of(sound)
+            video = find_real_video(sound)
             self._videos[sound] = (video, sound_begins_s(video, sound)) if video else None
         return self._videos[sound]
 

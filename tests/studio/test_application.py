@@ -31,7 +31,7 @@ from lipmotion.storage.files import LOCK
 from lipmotion_studio import recording as recording_module
 from lipmotion_studio.application import studio_application
 from lipmotion_studio.folder import ProjectFolder, open_folder
-from lipmotion_studio.project import project_from
+from lipmotion_studio.project import parse_project
 from lipmotion_studio.requests import TOKEN_HEADER, Access
 from lipmotion_studio.studio import Studio, known_model
 from lipmotion_studio.votes import read_votes
@@ -496,7 +496,7 @@ def test_versions_are_kept_shown_and_gone_back_to(studio: OpenStudio) -> None:
     assert [each["edits"] for each in back.content["versions"]] == [first["undo"], first["undo"] + 1]
     assert studio.ask("/api/lines/1/motion").body == then
     assert studio.ask("/api/lines/1/motion?by=version-2").body == now
-    read = project_from(json.loads((studio.folder.path / "project.json").read_text(encoding="utf-8")))
+    read = parse_project(json.loads((studio.folder.path / "project.json").read_text(encoding="utf-8")))
     assert [len(each.steps) for each in read.lines[1].versions] == [first["undo"], first["undo"] + 1]
     assert studio.change("versions/forget", version="version-2").content["versions"][-1]["number"] == 1
     for wrong in ("version-2", "other", ""):

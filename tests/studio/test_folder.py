@@ -14,7 +14,7 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.storage.files import portable_name
 from lipmotion.testing.toy import ToySentence
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, project_path
-from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, project_document, project_from
+from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, project_document
 
 LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}
 RECORD = ExportRecord("arkit", {"exports/a.livelink.csv": "1"}, "exports/a.edits.json", "2", "3", "0.1.0")
@@ -92,7 +92,7 @@ def test_a_project_is_what_its_document_says() -> None:
     project = Project(
         {1: ProjectRecording(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
     )
-    assert project_from(json.loads(json.dumps(project_document(project)))) == replace(project, next_number=2)
+    assert parse_project(json.loads(json.dumps(project_document(project)))) == replace(project, next_number=2)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_a_project_is_what_its_document_says() -> None:
 )
 def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -> None:
     document = project_document(Project()) | {"lines": [LINE]}
-    assert list(project_from(document).lines) == [1]
+    assert list(parse_project(document).lines) == [1]
     (tmp_path / PROJECT).write_text(json.dumps(document | change), encoding="utf-8")
     with pytest.raises((InputError, ExportError)):
         ProjectFolder(tmp_path)

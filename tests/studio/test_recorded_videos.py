@@ -11,7 +11,7 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion_faces.video.mp4 import write_mp4
-from lipmotion_studio.recorded_videos import MP4, media_type, sound_begins_s, video_of, write_playable
+from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
 from studio.late_sound import shifted
 
 LATE_S = 0.3
@@ -41,7 +41,7 @@ def test_a_later_sound_is_found_in_the_video(video: Path, toy_speech: Path, tmp_
 def test_what_begins_later_than_0_is_written_anew(video: Path, tmp_path: Path) -> None:
     assert media_type(video) == MP4
     later = shifted(video, tmp_path / "later.mp4", all_s=1.0)
-    assert video_of(later) == later
+    assert find_real_video(later) == later
     assert media_type(later) is None
     write_playable(later, later, tmp_path / "playable.mp4")
     assert media_type(tmp_path / "playable.mp4") == MP4

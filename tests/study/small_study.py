@@ -9,7 +9,7 @@ from typing import Any
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo, write_manifest
 from lipmotion_studio.study.settings import SCALES
-from lipmotion_studio.study.trials import anchor_trials, attention_trials, main_trials, practice_trials, questions_of
+from lipmotion_studio.study.trials import anchor_trials, attention_trials, list_questions, main_trials, practice_trials
 
 CONDITIONS = ("recording", "visemes", "phones")
 SENTENCES = ("one", "two", "three", "four", "five", "six")
@@ -57,7 +57,7 @@ def scripted_answer(study: Study, place: dict[str, Any], value: str = "") -> dic
     """Return what the page would send for a trial, in whose place a rater is."""
     trial = next(each for each in study.trials)
     count = len(place["videos"])
-    asked = {PAIRED: 1, MOS: len(questions_of(study, trial)), RANKING: count}[study.kind]
+    asked = {PAIRED: 1, MOS: len(list_questions(study, trial)), RANKING: count}[study.kind]
     return {
         "trial": place["trial"],
         "values": [value or VALUES[study.kind]] * asked,

@@ -14,7 +14,7 @@ from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_ans
 from lipmotion_studio.study.conduct import export_answers, forget_rater
 from lipmotion_studio.study.manifest import Study, check_videos
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
-from lipmotion_studio.study.trials import trials_of
+from lipmotion_studio.study.trials import order_trials
 from study.asgi import Application, ask
 from study.small_study import scripted_answer, small_study
 
@@ -221,7 +221,7 @@ def test_the_page_has_no_resource_from_elsewhere(place: Open) -> None:
 
 def test_an_answer_is_taken_as_it_is(tmp_path: Path) -> None:
     study = small_study(tmp_path / "study")
-    assert check_sheet(study, trials_of(study, 7), 7, SENT) == AnswerSheet(7, 4, ("second",), 1.25, 3)
+    assert check_sheet(study, order_trials(study, 7), 7, SENT) == AnswerSheet(7, 4, ("second",), 1.25, 3)
 
 
 @pytest.mark.parametrize(
@@ -254,28 +254,28 @@ def test_an_answer_is_taken_as_it_is(tmp_path: Path) -> None:
 def test_anything_else_is_refused(tmp_path: Path, change: dict[str, Any]) -> None:
     study = small_study(tmp_path / "study")
     with pytest.raises(InputError):
-        check_sheet(study, trials_of(study, 7), 7, SENT | change)
+        check_sheet(study, order_trials(study, 7), 7, SENT | change)
 
 
 @pytest.mark.parametrize("content", [None, [], "text", 7, {}, {"trial": 0}])
 def test_only_the_object_is_taken(tmp_path: Path, content: Any) -> None:
     study = small_study(tmp_path / "study")
     with pytest.raises(InputError, match="required a"):
-        check_sheet(study, trials_of(study, 7), 7, content)
+        check_sheet(study, order_trials(study, 7), 7, content)
 
 
 def test_every_scale_and_every_slider_has_a_value(tmp_path: Path) -> None:
     opinions, ranking = small_study(tmp_path / "m", MOS), small_study(tmp_path / "r", RANKING)
     sent = {"trial": 0, "values": ["01", "2", "3", "4", "5"], "plays": [1], "seconds": 0.5}
-    sheet = check_sheet(opinions, trials_of(opinions, 1), 1, sent)
+    sheet = check_sheet(opinions, order_trials(opinions, 1), 1, sent)
     assert sheet.values == ("1", "2", "3", "4", "5")
     for values in (["1"] * 4, ["0", "2", "3", "4", "5"], ["6", "2", "3", "4", "5"]):
         with pytest.raises(InputError):
-            check_sheet(opinions, trials_of(opinions, 1), 1, sent | {"values": values})
+            check_sheet(opinions, order_trials(opinions, 1), 1, sent | {"values": values})
     sent = {"trial": 0, "values": ["0", "50", "100", "7"], "plays": [1] * 4, "seconds": 2.0}
-    assert check_sheet(ranking, trials_of(ranking, 1), 1, sent).values == ("0", "50", "100", "7")
+    assert check_sheet(ranking, order_trials(ranking, 1), 1, sent).values == ("0", "50", "100", "7")
     with pytest.raises(InputError):
-        check_sheet(ranking, trials_of(ranking, 1), 1, sent | {"values": ["0", "50", "101", "7"]})
+        check_sheet(ranking, order_trials(ranking, 1), 1, sent | {"values": ["0", "50", "101", "7"]})
 
 
 def test_a_burst_and_then_a_rate() -> None:

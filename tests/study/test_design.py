@@ -22,7 +22,7 @@ from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.design import design_study
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.settings import Region, StudySettings
-from lipmotion_studio.study.sources import condition_of, encode_shown, named_conditions, read_sentences
+from lipmotion_studio.study.sources import encode_video, make_condition, parse_conditions, read_sentences
 
 DRAWN = Job(Request(), Outputs(face="portrait"))
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
@@ -108,7 +108,7 @@ def test_motion_is_drawn_with_the_sound_of_the_sentence(here: Path) -> None:
 
 def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here: Path) -> None:
     source = here / "said" / "one.mp4"
-    seconds = [encode_shown(source, here / f"{ms}.mp4", source, Region(), ms) for ms in (0.0, 200.0)]
+    seconds = [encode_video(source, here / f"{ms}.mp4", source, Region(), ms) for ms in (0.0, 200.0)]
     assert seconds[0] == seconds[1]
     begins = []
     for ms in (0, 200):
@@ -116,7 +116,7 @@ def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here: Path) -> None
         begins.append(int(np.argmax(np.abs(audio.samples) > 0.2)) / audio.rate_hz)
     assert begins[1] - begins[0] == pytest.approx(0.2, abs=0.03)
     with pytest.raises(InputError, match="longer sentences"):
-        encode_shown(source, here / "late.mp4", source, Region(), 5000.0)
+        encode_video(source, here / "late.mp4", source, Region(), 5000.0)
 
 
 def test_the_mark_of_a_synthetic_video_stays(here: Path) -> None:
@@ -124,7 +124,7 @@ def test_the_mark_of_a_synthetic_video_stays(here: Path) -> None:
     picture = np.zeros((48, 64, 3), np.uint8)
     write_mp4(here / "a.mp4", [picture] * 10, fps=25, audio=read_audio(source), tags=mark.tags, xmp=mark.xmp)
     for name, is_marked in (("a.mp4", True), ("said/one.mp4", False)):
-        encode_shown(here / name, here / "shown.mp4", source, Region())
+        encode_video(here / name, here / "shown.mp4", source, Region())
         with av.open(str(here / "shown.mp4")) as container:
             assert (container.metadata.get("comment") == STATEMENT) == is_marked
         assert (SOURCE_TYPE.encode() in (here / "shown.mp4").read_bytes()) == is_marked
@@ -155,7 +155,7 @@ def test_only_the_region_is_shown(here: Path) -> None:
 )
 def test_conditions_that_are_refused(conditions: list[str], says: str) -> None:
     with pytest.raises(InputError, match=says):
-        named_conditions(conditions)
+        parse_conditions(conditions)
 
 
 @pytest.mark.parametrize(
@@ -172,16 +172,16 @@ def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], objec
     prepare(here)
     said = read_sentences([here / "said"])
     if not says:
-        assert callable(condition_of(str(here / source), said, DRAWN))
+        assert callable(make_condition(str(here / source), said, DRAWN))
         return
     with pytest.raises(InputError, match=says):
-        condition_of(str(here / source), said, DRAWN)
+        make_condition(str(here / source), said, DRAWN)
 
 
 def test_recordings_without_pictures_cannot_be_shown() -> None:
     said = read_sentences([Path("examples/welcome.flac")])
     with pytest.raises(InputError, match="has no pictures"):
-        condition_of("recording", said, DRAWN)
+        make_condition("recording", said, DRAWN)
 
 
 def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) -> None:

@@ -14,7 +14,7 @@ from children import wait_until
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
-from lipmotion_studio.study.conduct import collected_answers
+from lipmotion_studio.study.conduct import collect_answers
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo
 from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screen
 from study.firefox import BOTH, Opens
@@ -91,7 +91,7 @@ def take_part(window: Browser, study: Study, act: Callable[[], object]) -> None:
 
 
 def answers(tmp_path: Path) -> list[Answer]:
-    return [row for row in collected_answers(tmp_path / "study") if not row.practice]
+    return [row for row in collect_answers(tmp_path / "study") if not row.practice]
 
 
 def look(window: Browser, name: str) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from children import LIPMOTION, environment, run_child, wait_until
 from lipmotion.errors import InputError
-from lipmotion_studio.study.conduct import collected_answers, serve_study
+from lipmotion_studio.study.conduct import collect_answers, serve_study
 from lipmotion_studio.study.manifest import VIDEOS
 from lipmotion_studio.study.store import ANSWERS
 from study.hostile import FOREIGN, hostile_requests
@@ -48,7 +48,7 @@ def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path: Path) -> None:
         assert [rater.failure for rater in raters] == [None] * RATERS
         assert not any(rater.is_alive() for rater in raters)
         servers[-1].kill()
-    rows = collected_answers(folder)
+    rows = collect_answers(folder)
     assert len(rows) == RATERS * len(study.trials)
     assert len({(row.rater, row.trial, row.question) for row in rows}) == len(rows)
     by_rater = sorted(
@@ -94,7 +94,7 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path: Path) -> 
         later.close()
         server.kill()
     assert "Traceback" not in errors.read_text(encoding="utf-8")
-    assert collected_answers(folder) == []
+    assert collect_answers(folder) == []
 
 
 @pytest.mark.long

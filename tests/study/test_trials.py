@@ -12,10 +12,10 @@ from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.trials import (
     anchor_trials,
     attention_trials,
+    list_questions,
     main_trials,
-    questions_of,
+    order_trials,
     shuffled,
-    trials_of,
 )
 from study.small_study import CONDITIONS, SENTENCES, small_study
 
@@ -65,8 +65,8 @@ def test_a_check_of_attention_tells_the_answer_that_it_expects(kind: str) -> Non
 
 def test_each_rater_has_an_order_that_stays(tmp_path: Path) -> None:
     study = small_study(tmp_path / "study")
-    orders = [trials_of(study, rater) for rater in range(1, 30)]
-    assert orders == [trials_of(study, rater) for rater in range(1, 30)]
+    orders = [order_trials(study, rater) for rater in range(1, 30)]
+    assert orders == [order_trials(study, rater) for rater in range(1, 30)]
     assert len({tuple(trial.videos for trial in order) for order in orders}) == 29
     for order in orders:
         assert order[0].practice
@@ -77,7 +77,7 @@ def test_orders_are_balanced_over_raters(tmp_path: Path) -> None:
     """A trial comes as often in the first half as chance has it: of 400 raters, 200 ± 4 standard deviations of 10."""
     study = small_study(tmp_path / "study")
     counted = [trial for trial in study.trials if not trial.practice]
-    early = Counter(trial for rater in range(400) for trial in trials_of(study, rater)[1 : 1 + len(counted) // 2])
+    early = Counter(trial for rater in range(400) for trial in order_trials(study, rater)[1 : 1 + len(counted) // 2])
     assert all(160 <= early[trial] <= 240 for trial in counted)
 
 
@@ -90,7 +90,7 @@ def test_every_order_of_three_is_equally_likely() -> None:
 
 def test_a_ranking_shuffles_the_videos_of_a_page(tmp_path: Path) -> None:
     study = small_study(tmp_path / "study", RANKING)
-    pages = {trials_of(study, rater)[0].videos for rater in range(40)}
+    pages = {order_trials(study, rater)[0].videos for rater in range(40)}
     assert len(pages) > 10
     assert len({tuple(sorted(page)) for page in pages}) == 1
 
@@ -98,6 +98,6 @@ def test_a_ranking_shuffles_the_videos_of_a_page(tmp_path: Path) -> None:
 def test_what_is_asked_names_the_conditions_as_they_are_shown(tmp_path: Path) -> None:
     paired, opinions = small_study(tmp_path / "p"), small_study(tmp_path / "m", MOS)
     trial = paired.trials[3]
-    assert questions_of(paired, trial) == [("preference", *(video.condition for video in paired.shown(trial)))]
-    asked = questions_of(opinions, opinions.trials[0])
+    assert list_questions(paired, trial) == [("preference", *(video.condition for video in paired.shown(trial)))]
+    asked = list_questions(opinions, opinions.trials[0])
     assert [question for question, _, _ in asked] == ["smoothness", "closure", "protrusion", "turning", "overall"]

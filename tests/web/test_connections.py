@@ -20,7 +20,7 @@ from starlette.responses import Response  # noqa: E402
 from starlette.routing import Route  # noqa: E402
 
 from lipmotion_studio.web import connections  # noqa: E402
-from lipmotion_studio.web.listening import listening  # noqa: E402
+from lipmotion_studio.web.listening import open_socket  # noqa: E402
 
 LARGE, SMALL = 1 << 26, b"small"
 PATIENCE_S = 60.0
@@ -35,7 +35,7 @@ def port() -> Iterator[int]:
         return Response(bytes(LARGE) if request.url.path == "/large" else SMALL)
 
     application = Starlette(routes=[Route("/{name}", replied)])
-    with pytest.MonkeyPatch.context() as patch, listening("127.0.0.1", 0) as place:
+    with pytest.MonkeyPatch.context() as patch, open_socket("127.0.0.1", 0) as place:
         for name, value in {"HEADERS_S": 0.2, "STALLED_S": 0.2, "FIRST_READ_S": 0.01, "MAX_OF_ONE": 5}.items():
             patch.setattr(connections, name, value)
         patch.setattr(connections, "MAX_CONNECTIONS", 8)

@@ -26,8 +26,8 @@ from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRE
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial
 from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name
-from lipmotion_studio.study.trials import questions_of, trials_of
-from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal, json_of
+from lipmotion_studio.study.trials import list_questions, order_trials
+from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, foreign_refusal, json_reply, read_json
 
 
 class RateLimit:
@@ -76,23 +76,22 @@ def check_sheet(study: Study, trials: list[StudyTrial], rater: int, content: Any
               often each video was played to its end; ``seconds``, from the start of the trial to the answer
     Raises InputError: something else, an impossible value, or not all videos were played to their ends.
     """
-    found = _SHEET(content)
-    if found["trial"] >= len(trials):
+    sheet = _SHEET(content)
+    if sheet["trial"] >= len(trials):
         raise InputError(f"no such trial, required 0 to {len(trials) - 1}")
-    trial, seconds = trials[found["trial"]], found["seconds"]
-    if len(found["plays"]) != len(trial.videos):
+    trial, seconds = trials[sheet["trial"]], sheet["seconds"]
+    if len(sheet["plays"]) != len(trial.videos):
         raise InputError(f"required the plays of {len(trial.videos)} videos")
     lasts_s = sum(video.seconds for video in study.shown(trial))
     if seconds < SHARE_PLAYED * lasts_s:
         raise InputError(f"{seconds:.1f} s for videos of {lasts_s:.1f} s; play all of them to their ends")
-    given = found["values"]
-    count = len(questions_of(study, trial))
-    if len(given) != count:
+    answers, count = sheet["values"], len(list_questions(study, trial))
+    if len(answers) != count:
         raise InputError(f"required {count} answers")
-    if not all(is_possible(study.kind, value) for value in given):
+    if not all(is_possible(study.kind, value) for value in answers):
         raise InputError(f"an answer that is not possible, required {POSSIBLE[study.kind]}")
-    values = tuple(given if study.kind == PAIRED else (str(int(value)) for value in given))
-    return AnswerSheet(rater, found["trial"], values, seconds, sum(found["plays"]))
+    values = tuple(answers if study.kind == PAIRED else (str(int(value)) for value in answers))
+    return AnswerSheet(rater, sheet["trial"], values, seconds, sum(sheet["plays"]))
 
 
 PAGE = {
@@ -152,10 +151,10 @@ def study_application(
     routes = [Route(f"/{name}", packaged) for name in page]
     routes += [
         Route(f"/{VIDEOS}/{{name}}", video),
-        Route("/api/study", replies.described),
-        Route("/api/raters", replies.joined, methods=["POST"]),
+        Route("/api/study", replies.describe),
+        Route("/api/raters", replies.join, methods=["POST"]),
         Route("/api/state", replies.state),
-        Route("/api/answers", replies.answered, methods=["POST"]),
+        Route("/api/answers", replies.answer, methods=["POST"]),
     ]
     application = Starlette(routes=routes, exception_handlers=ERRORS)
     application.add_middleware(Guard, refusal=refusal)
@@ -170,33 +169,32 @@ class _Replies:
         self._study, self._store = study, store
         self._answers = RateLimit(ANSWER_HZ, ANSWER_BURST)
         self._joins = RateLimit(JOIN_HZ, JOIN_BURST)
-        self._trials = lru_cache(maxsize=1000)(partial(trials_of, study))
+        self._trials = lru_cache(maxsize=1000)(partial(order_trials, study))
 
-    async def described(self, _: Request) -> Response:
+    async def describe(self, _: Request) -> Response:
         """What raters read before they begin; nothing of conditions."""
         study = self._study
-        told = {"kind": study.kind, "title": study.title, "consent": study.consent.split("\n")}
-        told |= {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]}
-        return JSONResponse(told, headers=FRESH)
+        document = {"kind": study.kind, "title": study.title, "consent": study.consent.split("\n")}
+        return json_reply(document | {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]})
 
-    async def joined(self, request: Request) -> Response:
+    async def join(self, request: Request) -> Response:
         """A new rater, who has agreed to take part."""
-        if await json_of(request) != {"agrees": True}:
+        if await read_json(request) != {"agrees": True}:
             raise InputError('required {"agrees": true}')
         if not self._joins.allows():
             raise HTTPException(429, "too many raters join at the same time; try again", {"retry-after": "2"})
         number, token = await asyncio.wrap_future(self._store.add_rater())
-        return JSONResponse({"token": token, **self._place(number, 0)}, 201, headers=FRESH)
+        return json_reply({"token": token, **self._place(number, 0)}, 201)
 
     async def state(self, request: Request) -> Response:
         """The trial that a rater is at."""
         rater = self._rater(request)
-        return JSONResponse(self._place(rater, self._store.next_trial(rater)), headers=FRESH)
+        return json_reply(self._place(rater, self._store.next_trial(rater)))
 
-    async def answered(self, request: Request) -> Response:
+    async def answer(self, request: Request) -> Response:
         """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
         rater = self._rater(request)
-        sheet = check_sheet(self._study, self._trials(rater), rater, await json_of(request))
+        sheet = check_sheet(self._study, self._trials(rater), rater, await read_json(request))
         following = self._store.next_trial(rater)
         if sheet.trial > following:
             raise HTTPException(409, f"trial {sheet.trial} comes after trial {following}")
@@ -204,7 +202,7 @@ class _Replies:
             if not await asyncio.wrap_future(self._store.record(sheet)):
                 raise HTTPException(401, "the rater has been forgotten")
             following += 1
-        return JSONResponse({"stored": sheet.trial, **self._place(rater, following)}, headers=FRESH)
+        return json_reply({"stored": sheet.trial, **self._place(rater, following)})
 
     def _rater(self, request: Request) -> int:
         """Return the rater of a request. Raises HTTPException: unknown, or too many requests."""
@@ -222,17 +220,16 @@ class _Replies:
         place = {"rater": rater_name(rater), "trial": number, "trials": len(trials)}
         if number >= len(trials):
             return place
-        ahead = self._addresses(trials[number + 1]) if number + 1 < len(trials) else []
-        trial = trials[number]
-        study = self._study
-        asked: dict[str, Any] = {"practice": trial.practice, "note": trial.note, "videos": self._addresses(trial)}
+        study, trial = self._study, trials[number]
+        videos, ahead = (
+            [f"/{VIDEOS}/{video.file}" for each in some for video in study.shown(each)]
+            for some in ([trial], trials[number + 1 : number + 2])
+        )
+        page: dict[str, Any] = {"practice": trial.practice, "note": trial.note, "videos": videos}
         if study.kind == MOS:
-            scales = [SCALES[question] for question, _, _ in questions_of(study, trial)]
-            asked["scales"] = [{"title": scale.title, "asks": scale.asks} for scale in scales]
-            asked["points"] = POINTS[:HIGHEST_MOS]
+            scales = [SCALES[question] for question, _, _ in list_questions(study, trial)]
+            page["scales"] = [{"title": scale.title, "asks": scale.asks} for scale in scales]
+            page["points"] = POINTS[:HIGHEST_MOS]
         elif study.kind != PAIRED:
-            asked["highest"] = HIGHEST_RANK
-        return place | asked | {"ahead": ahead}
-
-    def _addresses(self, trial: StudyTrial) -> list[str]:
-        return [f"/{VIDEOS}/{video.file}" for video in self._study.shown(trial)]
+            page["highest"] = HIGHEST_RANK
+        return place | page | {"ahead": ahead}

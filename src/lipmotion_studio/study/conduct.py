@@ -10,8 +10,8 @@ from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import Answer, write_answers
 from lipmotion_studio.study.manifest import Study, check_videos, read_study
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name, rater_number
-from lipmotion_studio.study.trials import questions_of, trials_of
-from lipmotion_studio.web.listening import HOST, check_installed, listening, serve
+from lipmotion_studio.study.trials import list_questions, order_trials
+from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 PORT = 8000
 
@@ -39,28 +39,28 @@ def serve_study(
 
     study = read_study(folder)
     videos = check_videos(study, folder)
-    with listening(host, port) as place, closing(StudyStore(folder)) as store:
+    with open_socket(host, port) as place, closing(StudyStore(folder)) as store:
         serve(study_application(study, videos, store, names), place, host=host, started=started)
 
 
-def collected_answers(folder: Path) -> list[Answer]:
+def collect_answers(folder: Path) -> list[Answer]:
     """Return the answers of a study, in the order of raters and trials.
 
     Raises InputError: no study, or nobody has answered yet.
     """
     study = read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
-        return list(answers_of(study, store.sheets()))
+        return list(list_answers(study, store.sheets()))
 
 
 def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
     """Write the answers of a study as CSV (``write_answers``); return how many there are.
 
     rater : name of the only rater whose answers are written, as the page shows it; None: all raters
-    Raises InputError: as ``collected_answers``, or no answers of this rater. Raises ExportError: the file cannot be
+    Raises InputError: as ``collect_answers``, or no answers of this rater. Raises ExportError: the file cannot be
     written.
     """
-    answers = collected_answers(folder)
+    answers = collect_answers(folder)
     if rater is not None:
         name = rater_name(rater_number(rater))
         answers = [answer for answer in answers if answer.rater == name]
@@ -82,12 +82,12 @@ def forget_rater(folder: Path, name: str) -> int:
         return store.forget(rater_number(name))
 
 
-def answers_of(study: Study, sheets: list[AnswerSheet]) -> Iterator[Answer]:
+def list_answers(study: Study, sheets: list[AnswerSheet]) -> Iterator[Answer]:
     """Yield one row for each judgement."""
-    orders = {number: trials_of(study, number) for number in sorted({sheet.rater for sheet in sheets})}
+    orders = {number: order_trials(study, number) for number in sorted({sheet.rater for sheet in sheets})}
     for sheet in sheets:
         trial = orders[sheet.rater][sheet.trial]
-        for (question, condition, other), value in zip(questions_of(study, trial), sheet.values, strict=True):
+        for (question, condition, other), value in zip(list_questions(study, trial), sheet.values, strict=True):
             yield Answer(
                 rater_name(sheet.rater),
                 study.kind,

@@ -19,9 +19,9 @@ from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, StudySettings
 from lipmotion_studio.study.sources import (
     MadeVideo,
     StudySentence,
-    condition_of,
-    encode_shown,
-    named_conditions,
+    encode_video,
+    make_condition,
+    parse_conditions,
     read_sentences,
 )
 from lipmotion_studio.study.trials import (
@@ -59,9 +59,9 @@ def design_study(
         raise InputError(f"a study of the kind {kind!r}, required one of {', '.join(KINDS)}")
     if output.exists():
         raise ExportError(f"{output}: exists; give the name of a new folder")
-    sources, spoken = named_conditions(conditions), read_sentences(sentences)
+    sources, spoken = parse_conditions(conditions), read_sentences(sentences)
     drawn = Job(Request(recogniser=settings.recogniser), Outputs(face=settings.face, fps=settings.fps))
-    makers = {name: condition_of(source, spoken, drawn) for name, source in sources.items()}
+    makers = {name: make_condition(source, spoken, drawn) for name, source in sources.items()}
     base = RECORDING if RECORDING in sources else next(iter(sources))
     names, seed = [sentence.name for sentence in spoken], settings.seed
     late = shuffled(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
@@ -114,7 +114,7 @@ def _encode(video: MadeVideo, sentence: StudySentence, name: str, folder: Path, 
     """Encode a video as it is shown, and name it by its content."""
     late_ms = settings.anchor_ms if name == ANCHOR else 0.0
     file = folder / VIDEOS / "encoded.mp4"
-    seconds = encode_shown(video.file, file, sentence.recording, settings.shown_region, late_ms)
+    seconds = encode_video(video.file, file, sentence.recording, settings.shown_region, late_ms)
     digest = sha256_of(file)
     file.replace(file.with_name(f"{digest[:32]}.mp4"))
     made = video.made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})

@@ -71,7 +71,7 @@ def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
     return found
 
 
-def named_conditions(given: Sequence[str]) -> dict[str, str]:
+def parse_conditions(given: Sequence[str]) -> dict[str, str]:
     """Return the sources of conditions by their names, of texts ``NAME=SOURCE`` or ``recording``.
 
     Raises InputError: a text of another form, a name that is taken, or fewer than two.
@@ -94,7 +94,7 @@ def named_conditions(given: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def condition_of(source: str, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
     """Return what gives the videos of a condition.
 
     source : ``recording``; a model, ``shipped`` or a file; a job file; or a folder with a video or a motion file of
@@ -175,7 +175,7 @@ def _animated(job: Job, made: dict[str, str]) -> Condition:
 Pictures = NDArray[np.uint8]
 
 
-def encode_shown(source: Path, target: Path, sound: Path, region: Region, late_ms: float = 0.0) -> float:
+def encode_video(source: Path, target: Path, sound: Path, region: Region, late_ms: float = 0.0) -> float:
     """Write a video as raters see it (H.264, AAC), and return how long it lasts, in seconds.
 
     sound   : the recording whose sound a video without sound gets

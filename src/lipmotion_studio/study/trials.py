@@ -92,7 +92,7 @@ def practice_trials(trials: Sequence[StudyTrial], count: int, seed: int) -> list
     return [replace(trial, practice=True, expected="") for trial in shuffled(trials, "practice", seed)[:count]]
 
 
-def trials_of(study: Study, rater: int) -> list[StudyTrial]:
+def order_trials(study: Study, rater: int) -> list[StudyTrial]:
     """Return the trials as a rater sees them: practice first, then all others in an order of the rater's own.
 
     rater : number of the rater in the study
@@ -108,7 +108,7 @@ def trials_of(study: Study, rater: int) -> list[StudyTrial]:
     ]
 
 
-def questions_of(study: Study, trial: StudyTrial) -> list[tuple[str, str, str]]:
+def list_questions(study: Study, trial: StudyTrial) -> list[tuple[str, str, str]]:
     """Return what a trial asks, in the order of its answers: question, condition and other condition of each."""
     conditions = [video.condition for video in study.shown(trial)]
     if study.kind == PAIRED:

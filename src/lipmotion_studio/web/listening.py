@@ -31,7 +31,7 @@ def serve(
 ) -> None:
     """Serve an application until the process is stopped; no client can keep it from serving the others.
 
-    place   : where connections come to, of ``listening``, at ``host``
+    place   : where connections come to, of ``open_socket``, at ``host``
     started : called with the address of the page once it can be opened
     """
     import uvicorn
@@ -54,7 +54,7 @@ def serve(
     uvicorn.Server(config).run([place])
 
 
-def listening(host: str, port: int) -> socket.socket:
+def open_socket(host: str, port: int) -> socket.socket:
     """Return a socket that connections can come to. Raises InputError: the address is taken, or not of this machine."""
     if not 0 <= port <= 65_535:
         raise InputError(f"the port is {port}, required 0 to 65535; give another --port")

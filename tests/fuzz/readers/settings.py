@@ -23,8 +23,8 @@ from lipmotion_studio.project import (
     ExportRecord,
     Project,
     ProjectRecording,
+    parse_project,
     project_document,
-    project_from,
 )
 from lipmotion_studio.study.answers import COLUMNS, read_answers
 from lipmotion_studio.study.manifest import MANIFEST, read_study
@@ -108,7 +108,7 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
             Trainer(ProjectFolder(Path(own))).document()
     elif name == PROJECT:
         project = ProjectFolder(folder).project
-        require(project_from(from_json(json.dumps(project_document(project)))) == project, "another project")
+        require(parse_project(from_json(json.dumps(project_document(project)))) == project, "another project")
         for line in project.lines.values():
             require(not ProjectFolder(folder).edits(line).exists(), "edits that nobody wrote")
     elif name.startswith("answers"):
