@@ -190,7 +190,7 @@ def test_its_share_depends_on_voice_recogniser_and_noise(
         weights=np.concatenate([told.weights[:, :-1], 0 * told.weights[:, -1:]], axis=1),
         biases=np.append(told.biases[:-1], distortion).astype(np.float32),
     )
-    alone = replace(shipped, beside=None, network=replace(shipped.network, output=constant))
+    alone = replace(shipped, posterior_network=None, network=replace(shipped.network, output=constant))
     output, ones = network.network.output, np.ones(dimensions)
     weights = np.resize(output.weights, (len(output.weights), dimensions))
     widened = output._replace(weights=weights, biases=np.resize(output.biases, dimensions))
@@ -199,11 +199,11 @@ def test_its_share_depends_on_voice_recogniser_and_noise(
     spoken = speech(0, voice=voice)
     spoken = replace(spoken, posteriors=replace(posteriors(0), mean=mean))
     without, same = alone.predict(spoken)
-    motion, distortions = replace(alone, beside=beside).predict(spoken)
+    motion, distortions = replace(alone, posterior_network=beside).predict(spoken)
     assert distortions == pytest.approx(same)
     assert distortions == pytest.approx(np.full(FRAMES, distortion), rel=1e-5)
     assert motion == pytest.approx(without + share * (beside.predict(spoken)[0] - without), abs=1e-6)
-    plain, both = alone.hidden(spoken), replace(alone, beside=beside).hidden(spoken)
+    plain, both = alone.hidden(spoken), replace(alone, posterior_network=beside).hidden(spoken)
     assert plain is not None
     assert both is not None
     assert both[0][:, : plain[0].shape[1]] == pytest.approx(plain[0])
