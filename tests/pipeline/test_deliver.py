@@ -19,8 +19,8 @@ from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mo
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift_prosody
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.types import Generation, Prosody, StateTrace
+from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.moods import MoodKey
-from lipmotion.types.voice_event import LAUGHTER
 from lipmotion_faces import Face, Staging
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.scenes import delivered_scene

@@ -229,7 +229,7 @@ def measure_prosody(speech: str | Path | Audio) -> Prosody:
     Raises InputError: the recording cannot be read.
     """
     if isinstance(speech, AnalysedAudio):
-        return speech.once("prosody", lambda: _prosody(speech))
+        return speech.cached("prosody", lambda: _prosody(speech))
     return _prosody(speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False))
 
 
