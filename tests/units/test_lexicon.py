@@ -83,7 +83,7 @@ def test_a_lengthened_word_is_the_word_that_is_meant() -> None:
 
 def test_sounds_in_letters_are_said_as_these() -> None:
     for word, phones in (
-        ("brrr", "b er"), ("brr", "b er"), ("psst", "p s t"), ("pfft", "p f t"), ("fff", "f"), ("", "z"),
+        ("brrr", "b er"), ("brr", "b er"), ("psst", "p s t"), ("pfft", "p f t"), ("fff", "f"), ("zzzz", "z"),
         ("mmm", "m"), ("grrr", "g er"), ("www", said("www")[0]), ("bbc", "b iy b iy s iy"),
     ):  # fmt: skip
         assert said(word)[0] == phones

@@ -62,6 +62,10 @@ class EncodingRegression(Predictor):
             products, targets = products + (x - mean).T @ (x - mean), targets + (x - mean).T @ (y - centre)
         penalty = RIDGE * np.trace(products) / len(mean)
         coefficients = np.linalg.solve(products + penalty * np.eye(len(mean)), targets)
+        if 0 < training.direct < len(centre):  # jaw and points go with lips as they do in the training
+            poses = np.concatenate([y for _, y in rows]) - centre
+            lips = poses[:, : training.direct]
+            coefficients = coefficients[:, : training.direct] @ np.linalg.lstsq(lips, poses, rcond=None)[0]
         fitted = cls(coefficients.astype(np.float32), centre - mean @ coefficients, np.ones((3, len(centre))))
         predicted = (fitted.predict(example.speech)[0] for example in training.examples)
         scale = np.sqrt(sum(np.square(y - centre).sum(axis=0) for _, y in rows) / count)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import ModelFormatError
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
@@ -34,7 +35,7 @@ of articulation for the phones in time, the spectrum and the encoding of the sou
 
 
 PRIOR_ARRAYS = {
-    "prior_sizes": ArraySpec(np.int32, "K", 0, 1e5),
+    "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
     "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
     "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
     "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
@@ -143,9 +144,10 @@ class PriorRegression(Predictor):
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PriorRegression:
         """Deserialise a regression; as ``Predictor.from_arrays``."""
+        if np.shape(arrays["prior_sizes"]) == (len(KINDS) - 1,):
+            raise ModelFormatError("a regression without the encoding of the sound, as of 2026-11-27; train again")
         stored = check_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
         sizes = tuple(stored["prior_sizes"].tolist())
-        sizes += (0,) * (len(KINDS) - len(sizes))  # models of earlier versions have no encoding
         around = (2 * ENCODING_REACH + 1) * ENCODING_COMPONENTS
         known = {(len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS, size) for size in (0, around)}
         if sum(sizes) != stored.sizes["R"] or sizes[2:] not in known:

@@ -29,6 +29,8 @@ Predict = Callable[[slice], Statistics]
 LATE_ENCODING_SHARE = 0.2
 """Share of the motion from the encoding alone after all that is done for such a voice, where training knows it half or
 less: what the sound says of the lips corrects what is only usual (docs/results/voices.md)."""
+NEAR_FRAMES = 20
+"""Frames before and after speech in which that holds: elsewhere the mouth rests."""
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
@@ -67,12 +69,17 @@ class UnseenSpeaker:
     voice: float
 
     def follow_encoding(self, statistics: Predict, encoded: Array) -> Predict:
-        """Draw the motion towards that from the encoding of the sound alone [shape=(T, Q)]."""
-        share = LATE_ENCODING_SHARE * min(2 * unseen_share(self.voice), 1.0)
+        """Draw the motion in and near speech towards that from the encoding of the sound alone [shape=(T, Q)]."""
+        spoken = np.zeros((self.frames, 1))
+        for span in self.units:
+            if not is_silent(span.label.phone):
+                first, stop = frames_of(span, self.frames)
+                spoken[max(first - NEAR_FRAMES, 0) : stop + NEAR_FRAMES] = 1
+        share = LATE_ENCODING_SHARE * min(2 * unseen_share(self.voice), 1.0) * smooth_steps(spoken)[:, :, None]
 
         def predict(chosen: slice) -> Statistics:
             means, precisions = statistics(chosen)
-            return means + share * (slice_dynamics(encoded, chosen) - means), precisions
+            return means + share[chosen] * (slice_dynamics(encoded, chosen) - means), precisions
 
         return predict
 
