@@ -94,7 +94,7 @@ def test_an_installed_predictor_is_chosen_by_name(toy_corpus: Corpus, toy_speech
     missing = run_child([*LIPMOTION, "animate", toy_speech, "--model", model, "-o", tmp_path / "b.csv"])
     assert missing.returncode == 6
     assert (
-        "no predictor 'frames'; there are: network, posteriors, prior; install the package that adds it"
+        "no predictor 'frames'; there are: network, posteriors, prior, encoding; install the package that adds it"
         in missing.stderr
     )
 
