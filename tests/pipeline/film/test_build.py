@@ -167,7 +167,7 @@ def test_recordings_that_cannot_be_used_are_left_out(videos: Videos, monkeypatch
 def test_footage_without_sound(tracker: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The face is built; its jaw cannot follow the energy, and other people's motion cannot be mapped onto it."""
     monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 2.0)
-    monkeypatch.setattr(build, "_sound", lambda _: None)
+    monkeypatch.setattr(build, "read_sound", lambda _: None)
     video = write_video(tmp_path / "mute.mp4", toy_sentences(3)[0])
     tracker(more={video.path.resolve(): video})
     face = build_face(video.path, workers=1)
