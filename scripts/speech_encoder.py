@@ -5,7 +5,7 @@
     python scripts/speech_encoder.py pipecat_ai-1.14.0-py3-none-any.whl CORPUS
 
 CORPUS is a prepared corpus (GRID speaker s1); the principal components are those of its training list. The weights stay
-at eight bits, as they are stored there. ``--check`` compares with the network itself, and needs ``onnxruntime``, too.
+at eight bits, as they are stored there.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class EncodingRegression(Predictor):
                 raise CorpusError("examples without encoding, which the predictor encoding needs")
             steps = np.arange(0, len(values), STEP)
             steps = steps[example.valid[steps]]
-            rows.append((regressors_around(example.speech)[steps // STEP], values[steps]))
+            rows.append((stack_encoding(example.speech)[steps // STEP], values[steps]))
         count = sum(len(x) for x, _ in rows)
         if not count:
             raise CorpusError("no frame with measured motion; train on recordings with a face")
@@ -87,7 +87,7 @@ class EncodingRegression(Predictor):
         return speech.cached(self, lambda: self._predict(speech, frames)), np.zeros(frames)
 
     def _predict(self, speech: Speech, frames: int) -> Array:
-        steps = regressors_around(speech) @ self.coefficients.astype(float) + self.centre
+        steps = stack_encoding(speech) @ self.coefficients.astype(float) + self.centre
         return interpolate_steps(steps, frames)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -105,8 +105,12 @@ class EncodingRegression(Predictor):
         return cls(*(stored[name] for name in cls.ARRAYS))
 
 
-def regressors_around(speech: Speech) -> Array:
-    """Return the encoding around every time step of 40 ms [shape=(ceil(T / 4), 11 · 64)]."""
-    encoding = np.asarray(speech.encoding)[::STEP]
-    around = np.clip(np.arange(len(encoding))[:, None] + np.arange(-REACH, REACH + 1), 0, len(encoding) - 1)
+def stack_encoding(speech: Speech, reach: int = REACH, components: int | None = None) -> Array:
+    """Return the encoding around every time step of 40 ms [shape=(ceil(T / 4), (2 · reach + 1) · components)].
+
+    reach      : time steps before and after it
+    components : the first ones that are used; None: all
+    """
+    encoding = np.asarray(speech.encoding)[::STEP, :components]
+    around = np.clip(np.arange(len(encoding))[:, None] + np.arange(-reach, reach + 1), 0, len(encoding) - 1)
     return encoding[around].reshape(len(encoding), -1).astype(float)

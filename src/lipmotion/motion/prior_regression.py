@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
+from lipmotion.motion.encoding_regression import stack_encoding
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
@@ -175,17 +176,10 @@ def _regressors(speech: Speech) -> list[Array]:
     table = trace_articulators(speech.units, frames)[::STEP]
     prior = speech.prior
     motion, hidden = (prior.articulators, prior.hidden) if prior is not None else (np.zeros((count, 0)),) * 2
-    kinds = motion, hidden, table, bands[around].reshape(count, -1), _encoding_around(speech, count)
+    encoded = speech.encoding is not None
+    encoding = stack_encoding(speech, ENCODING_REACH, ENCODING_COMPONENTS) if encoded else np.zeros((count, 0))
+    kinds = motion, hidden, table, bands[around].reshape(count, -1), encoding
     return [np.asarray(x, float) for x in kinds]
-
-
-def _encoding_around(speech: Speech, count: int) -> NDArray[np.floating]:
-    """Return the encoding around every time step [shape=(count, R)]; R is 0 without one."""
-    if speech.encoding is None:
-        return np.zeros((count, 0))
-    around = np.clip(np.arange(count)[:, None] + np.arange(-ENCODING_REACH, ENCODING_REACH + 1), 0, count - 1)
-    rows = np.asarray(speech.encoding)[::STEP, :ENCODING_COMPONENTS]
-    return rows[around].reshape(count, -1)
 
 
 def _solve(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
