@@ -32,11 +32,13 @@ def animated(
     return tmp_path / name
 
 
-def test_even_keys_are_the_frames(tmp_path: Path) -> None:
-    rows = np.random.default_rng(2).random((25, 2))
-    motion, units = read_motion(animated(tmp_path, [n / 29.97 for n in range(25)], rows))
+@pytest.mark.parametrize("kind", ["LINEAR", "STEP"])
+def test_even_keys_are_the_frames(tmp_path: Path, kind: str) -> None:
+    """Also where the single precision of a key's time puts it after its frame."""
+    rows = np.random.default_rng(2).random((600, 2))
+    motion, units = read_motion(animated(tmp_path, [n / 29.97 for n in range(600)], rows, kind))
     assert (motion.rate_hz, len(units), list(motion.names)) == (pytest.approx(30000 / 1001), 0, NAMES)
-    assert motion.values == pytest.approx(rows, abs=1e-4)
+    assert motion.values == pytest.approx(rows, abs=1e-6)
     assert {channel.unit for channel in motion.channels} == {WEIGHT}
 
 

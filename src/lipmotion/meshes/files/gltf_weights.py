@@ -38,7 +38,7 @@ SLOWEST_HZ = 10.0
 """Even keys further apart are those of an animator, not frames."""
 LONGEST_S = 86_400.0
 ROUNDING_FRAMES = 0.01
-"""Times are in single precision: the last key may be that much before its frame."""
+"""Times are in single precision: a key may be that much beside its frame."""
 KNOWN_AS = {
     "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
     "blinkLeft": ("eyeBlinkLeft",),
@@ -70,9 +70,14 @@ class _Track:
     kind: str
 
     def at(self, time_s: Array) -> Array:
-        """Return the values at some times [shape=(len(time_s), S)]; constant beyond both ends."""
-        inside = np.clip(time_s, self.time_s[0], self.time_s[-1])
-        before = np.clip(np.searchsorted(self.time_s, inside, "right") - 1, 0, len(self.time_s) - 1)
+        """Return the values at the times of frames [shape=(len(time_s), S)]; constant beyond both ends.
+
+        A frame that is a key but for its rounding has the key's value: a step would else come a frame late.
+        """
+        rounding = ROUNDING_FRAMES * time_s[1] if len(time_s) > 1 else 0.0
+        before = np.clip(np.searchsorted(self.time_s, time_s + rounding, "right") - 1, 0, len(self.time_s) - 1)
+        inside = np.where(np.abs(self.time_s[before] - time_s) <= rounding, self.time_s[before], time_s)
+        inside = np.clip(inside, self.time_s[0], self.time_s[-1])
         after = np.minimum(before + 1, len(self.time_s) - 1)
         if self.kind == STEP:
             return np.asarray(self.keys[before])
