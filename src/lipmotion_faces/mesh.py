@@ -73,7 +73,6 @@ class MeshFace(Face):
     character     : from ``load_character``
     width, height : of the pictures in pixels, even; a size of the staging counts instead, 16 to 9
     staging       : background, seed, and what moves on its own; None: the defaults
-    prosody       : of the speech that will be rendered, for accents of brows and head; None: not known
     """
 
     def __init__(
@@ -93,9 +92,8 @@ class MeshFace(Face):
         return self._character
 
     def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
-        """Return the same character with other settings.
-
-        prosody : of the speech that will be rendered, for accents of brows and head; None: not known
+        """Return the same character with other settings, and the prosody (None: not known) for accents of brows and
+        head.
         """
         return MeshFace(self._character, *self._size, staging, prosody)
 
@@ -138,7 +136,6 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
 class MeshStage:
     """A mesh before the camera, in light; may be used by several threads at once.
 
-    width, height : of the pictures in pixels, even
     colour        : red, green and blue of the background, 0 to 255; None: a soft gradient
     """
 

@@ -24,10 +24,7 @@ FACES: Registry[type[Face]] = Registry(
 
 
 def make_face(name: str = "portrait") -> Face:
-    """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md).
-
-    Raises InputError: none of that name, a drawing that cannot be used, or what an installed package adds is no face.
-    """
+    """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md)."""
     if name.lower().endswith(".svg"):
         from lipmotion_faces.portrait.layered import LayeredFace
 
@@ -44,10 +41,8 @@ def is_drawings(face: str | Path, folder: Path = Path()) -> bool:
 
 
 def stage_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
-    """Return a face, or the one of a name, with settings.
-
-    prosody : of the speech that will be rendered; None: not known
-    Raises InputError: as ``make_face``, or the face cannot be staged and settings differ from the defaults.
+    """Return a face, or the one of a name, with settings and prosody. Raises InputError: as ``make_face``, or it has
+    none.
     """
     if isinstance(face, str):
         face = make_face(face)

@@ -95,10 +95,7 @@ def measure_pair(
 
     person   : of the model; None: the mean person
     name     : of the recording
-    request  : the recording
     measured : tracked motion, or the model that generates it
-    where    : name of the person, for messages
-    speaker  : of the model in ``measured``
     Raises InputError: the person's motion has other channels.
     """
     try:

@@ -47,7 +47,6 @@ def compare(reference: Source, *others: Source, monitor: Monitor = silent_monito
     """Return how far other motion is from that of a reference, by name (docs/compare.md).
 
     reference, others : motion files, videos that show a face (they are tracked), or motion
-    monitor           : called with reports of progress
     Motion is compared at the slower of its two rates, where both last; ``notes`` say what was done for it. Figures that
     do not exist are None.
     Raises InputError: a file that cannot be read, values that are not finite, no common channel, too few frames.
@@ -204,10 +203,7 @@ def _channel_figures(
 
 
 def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
-    """Return the figures of points in millimetres; None for lips and upper face where no point is theirs.
-
-    Points of the upper face are above the eyes; their place at rest is the median in the original.
-    """
+    """Return the figures of points in mm (None: no points); at rest, points above the eyes are at their median."""
 
     def places(side: Motion, wanted: Sequence[str]) -> Array:
         coordinates = _values(side, [axis for point in wanted for axis in points[point]])

@@ -70,10 +70,7 @@ def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
 
 
 def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
-    """Return the share, in %, of original closings that are found in generated openings [each shape=(T_i, 1)].
-
-    Where no original opening closes, the statistic is NaN.
-    """
+    """Return the share, in %, of original closings found in generated openings; NaN where there are none."""
     hits, count = clip_closure_counts(generated, original, threshold)
     sums = [np.concatenate(pair) for pair in zip(hits, count, strict=True)]
     return ClipStatistic(sums, lambda total: float(100 * total[0] / total[1]) if total[1] else float("nan"))
@@ -86,10 +83,7 @@ def opening_curves(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) 
 
 
 def sign_of_difference(interval: Sequence[float | None]) -> int:
-    """Return 1 or -1 for a difference whose interval does not contain 0, else 0.
-
-    Systems that are the same by definition differ by rounding: ends within ``LEAST_DIFFERENCE`` of 0 count as 0.
-    """
+    """Return 1 or -1 for a difference whose interval leaves out 0, by ``LEAST_DIFFERENCE`` for rounding, else 0."""
     low, high = interval
     if low is None or high is None:
         return 0

@@ -65,11 +65,7 @@ _ACC, _COUNTS = "table1/acc", "table1/gaussians"
 
 @dataclass(frozen=True)
 class Table1Options:
-    """What is trained.
-
-    states   : numbers of states a unit
-    mixtures : numbers of Gaussians a state for speech, powers of two; of these one is chosen on ``val`` for each model
-    """
+    """What is trained: numbers of states a unit, and of Gaussians for speech, of which one is chosen on ``val``."""
 
     states: Sequence[int] = (3, 5)
     mixtures: Sequence[int] = (1, 2, 4, 8)
@@ -80,11 +76,7 @@ FULL, QUICK = Table1Options(), Table1Options(mixtures=(1, 2))
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """A trained system of one unit set.
-
-    gaussians : a state for speech, as chosen on ``val``
-    acc       : correlation of the opening on ``val``, by number of Gaussians
-    """
+    """A trained system of one unit set, its Gaussians a state, and the ACC of all that were tried on ``val``."""
 
     engine: JointEngine
     model: JointModel
@@ -113,8 +105,6 @@ def hofer2008(
 ) -> dict[str, Any]:
     """Train the system of the paper on ``train`` with each unit set; return figures of each model on ``split``.
 
-    work     : a folder for finished models, from which the same call continues after it was stopped; None: none
-    settings : its workers share the forced alignment that training starts from
     Every system recognises its own units (``audio only``), or aligns those of given words itself (``with transcript``),
     each with and without pins in p, b and m. Intervals are 95 % bootstrap intervals over clips; those of differences
     are of the same draws of clips.
@@ -189,11 +179,7 @@ def _train_system(
     checkpoint: Checkpoint,
     monitor: Monitor,
 ) -> _System:
-    """Return a system with the number of Gaussians whose motion correlates best with that of some recordings.
-
-    Among equals, the smallest is chosen. A system is the same, whether it was trained now or found.
-    Raises InputError: training ends before any of the numbers of Gaussians.
-    """
+    """Return a system with the number of Gaussians whose motion correlates best with that of some recordings."""
     stage = f"{engine.config.units}-{engine.config.states}-{'.'.join(map(str, counts))}"
     arrays = checkpoint.load(stage)
     if arrays is None:

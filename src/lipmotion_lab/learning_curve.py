@@ -51,15 +51,11 @@ def learning_curve(
 ) -> dict[str, Any]:
     """Train on the first N utterances of a list, for every N of ``sizes``; return figures of each model on ``split``.
 
-    order    : names of utterances; by default the training list, shuffled with the seed
     sizes    : by default 20, 50, 100, 200, as far as the list goes, and the whole list
-    work     : a folder for the figures of finished sizes, from which the same call goes on after a stop; None: none
-    settings : its seed is also that of the shuffled list
     Phone models and engine are both trained on those N utterances alone; the phone models also align and recognise
     the utterances of the split.
     Raises InputError: sizes under 1 or over the list, or an empty list.
     Raises CorpusError: names that are not in the corpus, twice in the list or in the split; no utterances of this
-    split; or motion without an opening.
     """
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), settings.seed)
     held_out = corpus.required(split)
@@ -88,10 +84,8 @@ def learning_curve(
 
 
 def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
-    """Return the sizes, each once, in rising order; the default ones where none are given.
-
-    listed : number of names in the list
-    Raises InputError: sizes under 1 or over the list, or an empty list.
+    """Return the sizes, or the usual ones, rising. Raises InputError: sizes under 1 or over ``listed``, or an empty
+    list.
     """
     if not listed:
         raise InputError("the list of utterances to train on is empty; give one name a line")

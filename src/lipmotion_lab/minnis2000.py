@@ -98,7 +98,6 @@ def join_figures(
 ) -> dict[str, Any]:
     """Return how many joins some speech takes, and how much the velocity of the opening changes there.
 
-    utterances : the recordings of the speech, whose own changes are the measure
     ``hard`` is the share of joins in which units abut; ``smooth`` that of joins where the velocity changes by no more
     than the 95th percentile of the recordings.
     """
@@ -188,13 +187,10 @@ def minnis2000(
 
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
-    quick  : train for few epochs; the model is not kept
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
     the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/test_minnis2000.py).
-    Raises CorpusError: no utterances to train on or of ``test``, or motion without an opening.
-    Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
     """
     splits = [split for split in ("val", "test") if split == "test" or corpus.names(split)]
     lists = {split: corpus.required(split) for split in splits}

@@ -21,12 +21,7 @@ BABBLE = "babble"
 
 @dataclass(frozen=True)
 class NoiseConditions:
-    """Noise that is added to the held-out recordings.
-
-    kinds     : of ``speech.sound.noise.NOISE_KINDS``
-    ratios_db : signal-to-noise ratios
-    talkers   : recordings for the babble
-    """
+    """Noise that is added to the held-out recordings."""
 
     kinds: tuple[str, ...] = ()
     ratios_db: tuple[float, ...] = (20.0, 10.0, 5.0, 0.0)
@@ -48,11 +43,7 @@ def add_noise(
     seed: int = 0,
     monitor: Monitor = silent_monitor,
 ) -> HeldOutRecordings:
-    """Return recordings with noise added, in the condition ``audio only``; every clip has its own noise.
-
-    kind, snr_db, talkers, seed : as in ``speech.sound.noise.noisy_audio``
-    Raises InputError: as ``speech.sound.noise.noisy_audio``.
-    """
+    """Return recordings with noise, each its own, ``audio only``; arguments and errors as of ``noisy_audio``."""
     utterances, recognitions = [], []
     for number, utterance in enumerate(with_progress(recordings.utterances, "adding noise", monitor)):
         audio = noisy_audio(utterance.audio, kind, snr_db, talkers, seed + number)

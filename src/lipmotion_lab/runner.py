@@ -47,11 +47,9 @@ _CURVES, _ABOUT = ("original", "generated", "time_s"), "about"
 class ExperimentSettings:
     """Settings that all experiments have in common.
 
-    recogniser : configuration of the phone models
     lexicon    : pronunciations; None: those of the dictionary
     seed       : of the shuffled training list, and of the bootstrap intervals
     workers    : number of processes, as in ``train``
-    monitor    : receives the progress
     receive    : receives the motion that every system generates, once, before its figures are kept
     """
 
@@ -68,13 +66,7 @@ DEFAULT_SETTINGS = ExperimentSettings()
 
 @dataclass(frozen=True, eq=False)
 class HeldOutResult:
-    """Motion that one trained system generates for held-out recordings.
-
-    recordings : the held-out recordings
-    clips      : generated and original curves of each recording, by condition
-    used       : names of the utterances that the system was trained on
-    seconds    : time of training, phone models and motion
-    """
+    """Motion generated for held-out recordings, by condition; utterances used, and seconds, of the training."""
 
     recordings: HeldOutRecordings
     clips: Mapping[str, Sequence[ComparedClip]]
@@ -92,9 +84,7 @@ def train_and_generate(
 ) -> HeldOutResult:
     """Train the default engine on the utterances ``names``; return the ``channels`` it generates for ``held_out``.
 
-    work : a folder from which training that was stopped goes on; None: none
     The names are sorted, so their order does not matter: all names of a list give the model of ``lipmotion train``.
-    Raises as ``train`` and ``evaluate``.
     """
     monitor, lexicon = settings.monitor, settings.lexicon
     start_s = perf_counter()
@@ -124,10 +114,7 @@ def train_and_generate(
 
 
 def check_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the channels to compare in some utterances: called before the long work.
-
-    Raises CorpusError: the opening is not among them, or the utterances have different channels.
-    """
+    """Return the channels to compare, before long work. Raises CorpusError: no opening, or different channels."""
     channels, _ = choose_channels([corpus.utterance(name) for name in names])
     if OPENING not in channels:
         raise CorpusError(f"{corpus.path}: systems are compared by the channel {OPENING!r}, which is not in it")
@@ -146,14 +133,7 @@ def take_quick_part(corpus: Corpus, seed: int) -> Corpus:
 
 @dataclass(frozen=True)
 class PartKey:
-    """What the finished parts of an experiment depend on, beside corpus and settings.
-
-    engine : with its configuration
-    names  : of the utterances
-    visual : kind of the channels
-    model  : on which the parts stand, or None
-    others : everything else, as text
-    """
+    """What the finished parts of an experiment depend on, beside corpus and settings."""
 
     engine: Engine[Any]
     names: Sequence[str]
@@ -163,10 +143,7 @@ class PartKey:
 
 
 def open_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSettings, key: PartKey) -> Checkpoint:
-    """Return the finished parts of an experiment, from which a call goes on after a stop.
-
-    folder : made if need be, in one that exists; None: nothing is kept
-    """
+    """Return the finished parts of an experiment, from which a call goes on after a stop."""
     if folder is None:
         return NO_CHECKPOINT
     make_folder(folder)

@@ -45,8 +45,6 @@ class Stamp:
 
         command : its words; of absolute paths the last name is kept, for figures are given to others
         The time is that of this call: a call that goes on after a stop does not count what was finished before.
-        Processor seconds are those of this process and of its processes that have ended. None: not known, or not
-        installed.
         """
         seconds, used = perf_counter() - self._start_s[0], sum(os.times()[:4]) - self._start_s[1]
         words = (word.rpartition("=") for word in command)

@@ -61,10 +61,7 @@ def read_page(folder: Traversable, before: str = "") -> Iterator[tuple[str, tupl
 
 
 def studio_application(studio: Studio, access: Access) -> Starlette:
-    """Return the application.
-
-    access : the token, and the addresses that the server has
-    """
+    """Return the application; access: the token, and the addresses that the server has."""
     recordings, project = RecordingReplies(studio, access), ProjectReplies(studio)
     page = dict(read_page(files("lipmotion_studio") / "page"))
 

@@ -14,9 +14,7 @@ from lipmotion_faces.outputs.shown_faces import shown_face
 class Preset:
     """Files that a program reads.
 
-    name   : of the preset
     title  : programs that read the files
-    files  : suffixes
     curves : what motion files hold, as of ``Outputs.curves``
     fps    : frames a second of motion files and videos; None: as usual
     """
@@ -52,10 +50,7 @@ _SUFFIX = re.compile(r"(?:\.[A-Za-z0-9]{1,10}){1,3}")
 
 
 def find_preset(name: str, files: tuple[str, ...]) -> Preset:
-    """Return a preset of a name; of an empty name, one of these suffixes of files.
-
-    Raises InputError: there is none of that name, or nothing is written of such a suffix.
-    """
+    """Return a preset of a name, or, of an empty one, of suffixes. Raises InputError: there is none."""
     if name:
         if name not in PRESETS:
             raise InputError(f"no preset {shorten(repr(name))}; required one of: {', '.join(PRESETS)}")

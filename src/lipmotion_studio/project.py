@@ -42,10 +42,8 @@ class ExportRecord:
     """What was exported of a recording.
 
     preset  : the preset that was used; empty: files were chosen
-    files   : digest of each file (SHA-256), by its path from the folder of the project
     edits   : path of the file of edits that the files were made from: a copy, which gives the same files again
     steps   : digest of the edits as they were
-    model   : digest of the model
     version : of lipmotion
     """
 
@@ -59,11 +57,7 @@ class ExportRecord:
 
 @dataclass(frozen=True)
 class EditVersion:
-    """Edits of a recording as they once were, to compare with and to go back to.
-
-    number : of the version, unique in its recording, from 1
-    steps  : its edits, as sentences
-    """
+    """Edits of a recording as they once were, as commands; ``number`` is unique in the recording, from 1."""
 
     number: int
     steps: tuple[str, ...]
@@ -83,7 +77,6 @@ class EditVersion:
 class ProjectRecording:
     """A recording that is worked on.
 
-    number     : of the recording in the project; never used again
     name       : path of its files without suffix, with ``/`` between folders; unique
     sound      : path of its sound from the folder of the project, or absolute
     sha256     : digest of the sound; empty: of an earlier version's project, until the recording is opened
@@ -92,7 +85,6 @@ class ProjectRecording:
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
     mark       : one of ``MARKS``
     marked     : digest of the edits when it was marked; empty: not known
-    exports    : in their order
     versions   : that were kept, in their order
     """
 
@@ -142,8 +134,6 @@ class Project:
     model      : path of the model from the folder of the project; empty: the one that ships
     language, recogniser : of new recordings, as of ``Request``
     preset     : that was used last for an export
-    characters : paths of characters, by their names
-    recordings : path of a folder of recordings that a voice or a face can be made of; empty: none
     given_model : path of the model that was used before one that was trained here; empty: the one that ships
     next_number : of the next recording
     """

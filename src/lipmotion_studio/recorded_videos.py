@@ -28,10 +28,7 @@ LOUDNESS_HZ = 100
 
 
 def find_real_video(recording: Path) -> Path | None:
-    """Return the path of the real video of a recording; None: there is none.
-
-    recording : a sound or a video
-    """
+    """Return the path of the real video of a recording, a sound or a video; None: there is none."""
     if recording.suffix.lower() in VIDEO_SUFFIXES:
         return recording if has_video(recording) else None
     siblings = (recording.with_suffix(suffix) for suffix in sorted(VIDEO_SUFFIXES))
@@ -39,10 +36,7 @@ def find_real_video(recording: Path) -> Path | None:
 
 
 def media_type(path: Path) -> str | None:
-    """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew.
-
-    What begins later than 0 is written anew, too, so that no browser has to say what its times are.
-    """
+    """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew."""
     kind, codecs = PLAYED.get(path.suffix.lower(), ("", ()))
     if not kind:
         return None
@@ -85,10 +79,7 @@ def _correlate(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 
 def write_playable(video: Path, sound: Path, path: Path) -> None:
-    """Write a video as browsers play it, with the sound of a recording. Raises InputError: it cannot be read.
-
-    Raises ExportError: it cannot be written.
-    """
+    """Write a video as browsers play it, with the sound of a recording. Raises InputError: it cannot be read."""
     frames, rate_hz = read_video_frames(video)
     even = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame in frames)
     write_mp4(path, even, fps=rate_hz, audio=read_sound(sound))

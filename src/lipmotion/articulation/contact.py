@@ -77,10 +77,7 @@ class ClosedPhone(NamedTuple):
 
 
 def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
-    """Return the closures of p, b and m, of the frame of least gap each, ascending; one for phones of one frame.
-
-    None where the motion has no ``opening``. Where the lips touch in several frames, it is the middle one.
-    """
+    """Return the closures of p, b and m, of the frame of least gap each, ascending; one for phones of one frame."""
     if "opening" not in motion.names:
         return []
     gap, phones = read_gap(motion), dict[int, ClosedPhone]()
@@ -124,7 +121,6 @@ def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
     """Return in which pictures the lips touch [shape=(len(time_s),), bool].
 
     contact : of frames at ``rate_hz`` [shape=(T,), bool]
-    time_s  : of the pictures in seconds, evenly spaced
     A picture shows contact if the frame nearest to it has it. Contact between two pictures is shown by the nearer one.
     """
     frames = np.clip(np.rint(time_s * rate_hz).astype(int), 0, max(len(contact) - 1, 0))

@@ -117,9 +117,8 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
 
 
 def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
-    """Return the action units that the moods of a motion ask for, 0 to 1 [each shape=(N,)]; none for a neutral face.
-
-    time_s : in seconds; None: the frames of the motion
+    """Return the action units that moods ask for, 0 to 1 [each shape=(N,)], at times (None: all frames); none if
+    neutral.
     """
     units: dict[int, Curve] = {}
     for name in motion.names:

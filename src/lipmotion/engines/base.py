@@ -96,10 +96,7 @@ class Animator(ABC, Generic[ModelT]):
         return Inputs()
 
     def recognise(self, model: ModelT, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
-        """Return the phones in time that a model recognises, or None if it was not trained on this voice.
-
-        speech : its ``units`` are empty
-        """
+        """Return the phones in time that a model recognises in speech without them; None: not trained on this voice."""
         return None
 
     def without_closures(self) -> Animator[ModelT]:
@@ -158,8 +155,6 @@ class Engine(Animator[ModelT]):
 class SourcePiece:
     """A piece of one recording that says several phones.
 
-    recording     : its name
-    start_s, end_s : of the piece, in the recording
     phones_s      : where phones begin, in the recording, by their number in what is said
     """
 

@@ -72,9 +72,8 @@ def align_states(
 def align_units(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> NDArray[np.intp]:
-    """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
-
-    Parameters and errors as for ``align_states``.
+    """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)]. Raises as
+    ``align_states``.
     """
     chain, path = align_states(hmm, log_likelihoods, units, windows)
     return np.append(np.searchsorted(chain.positions[path], np.arange(len(units))), log_likelihoods.frames)
@@ -97,8 +96,6 @@ class SpokenWord(NamedTuple):
 class PlacedWord(NamedTuple):
     """A word or a silence as it was pronounced, and where.
 
-    spoken : the pronunciation
-    start  : its first frame
     fit    : by how much its states are less probable than the best of all states, the mean of its frames in nats, 0 or
              less; NaN where it was not asked for
     """
@@ -229,9 +226,8 @@ def _check_room(hmm: UnitHmm, frames: int, words: Sequence[Sequence[Sequence[str
 def _append_units(
     builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]], pause: str
 ) -> list[tuple[int, float]]:
-    """Add the states of some units, joined to all open ends; return the new open ends: states and log P(leave).
-
-    Without units the open ends stay as they are; ``pause`` among them may be left out.
+    """Add the states of some units to all open ends (states, log P(leave)); return the new ends. ``pause`` may be left
+    out.
     """
     ends = open_ends
     for unit in units:

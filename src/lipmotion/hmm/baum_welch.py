@@ -61,10 +61,7 @@ def adapt_contexts(
     after_step: AfterStep = no_report,
     parallel_map: ParallelMap = map,
 ) -> EmResult[UnitHmm, UnitStatistics]:
-    """Adapt the states in context to their data by some steps of EM, with the states without context as their prior.
-
-    Parameters and result as for ``baum_welch``; the states without context, and all durations, stay as they are.
-    """
+    """Adapt states in context by EM, with those without as their prior, which stay; parameters as of ``baum_welch``."""
 
     def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
         plain, parents = len(model.log_stay), model.table.parents()
@@ -82,7 +79,6 @@ def adapt_contexts(
 def reestimate_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
     """Return the densities re-estimated from the statistics (the M-step).
 
-    data : all features, whose variance gives the variance floor
     A density with less than one frame of data stays as it is.
     """
     mixtures = hmm.mixtures.copy()
@@ -142,10 +138,7 @@ class UtteranceStatistics(NamedTuple):
 def collect_statistics(
     sequence: StateSequence, posterior: NDArray[np.float64], stay: NDArray[np.float64]
 ) -> UtteranceStatistics:
-    """Return the statistics of an utterance from its state posteriors [shape=(T, S)].
-
-    stay : [shape=(S,)], expected number of transitions from each state to itself
-    """
+    """Return the statistics of an utterance from its state posteriors [shape=(T, S)]."""
     frame, state = np.nonzero(posterior > MIN_POSTERIOR)
     weights = posterior[frame, state].astype(np.float32)
     return UtteranceStatistics(sequence.plain, stay, posterior.sum(axis=0), frame, sequence.densities[state], weights)
@@ -175,7 +168,6 @@ def _collect_batch(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int
 def group_by_length(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
     """Give the numbers of utterances in batches of similar length.
 
-    frames, states : of each utterance
     Padded to its longest utterance, a batch has at most ``CELLS`` cells, unless one utterance alone has more.
     """
     batch: list[int] = []
@@ -191,10 +183,7 @@ def group_by_length(frames: Sequence[int], states: Sequence[int]) -> Iterator[li
 
 
 class UnitStatistics:
-    """The sufficient statistics of one pass over the data, for the states of unit models.
-
-    log_likelihood, frames : of all utterances that have a path
-    """
+    """The sufficient statistics of one pass over the data, for the states of unit models."""
 
     def __init__(self, hmm: UnitHmm) -> None:
         self._hmm = hmm

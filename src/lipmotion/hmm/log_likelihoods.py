@@ -52,10 +52,7 @@ def compute_log_likelihoods(hmm: UnitHmm, features: NDArray[np.float32]) -> LogL
 
 
 def penalise_silence(hmm: UnitHmm, log_likelihoods: LogLikelihoods, loud: NDArray[np.bool_]) -> LogLikelihoods:
-    """Return log likelihoods that make silence improbable in loud frames [shape=(T,)], for forced alignment.
-
-    For a voice unlike those of the training, the densities hardly tell speech from silence; the energy does.
-    """
+    """Return log likelihoods that make silence improbable in loud frames [shape=(T,)], for forced alignment."""
     return _penalise(hmm, log_likelihoods, loud, LOUD_SILENCE_PENALTY, silent=True)
 
 

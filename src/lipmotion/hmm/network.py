@@ -97,10 +97,7 @@ class NetworkBuilder:
 def build_chain(
     densities: Iterable[int], log_stay: NDArray[np.floating[Any]], log_move: NDArray[np.floating[Any]]
 ) -> Network:
-    """Return the network of S states in a row: paths go through all of them, from the first to the last.
-
-    log_stay, log_move : log probabilities of staying in each state, and of leaving it [each shape=(S,)]
-    """
+    """Return the network of S states in a row, with log probabilities of staying and leaving [each shape=(S,)]."""
     builder = NetworkBuilder()
     for number, (density, stay) in enumerate(zip(densities, log_stay.tolist(), strict=True)):
         builder.state(int(density), stay)

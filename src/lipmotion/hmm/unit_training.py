@@ -52,10 +52,7 @@ class TranscribedUtterance:
 
 @dataclass(frozen=True)
 class UnitInventory:
-    """The units to model. ``silence`` surrounds every utterance, ``pause`` may stand between words.
-
-    energy : the column of the features that holds the log energy
-    """
+    """The units to model: ``silence`` surrounds every utterance, ``pause`` may stand between words."""
 
     silence: str
     pause: str
@@ -282,10 +279,7 @@ def _guess_path(energy: NDArray[np.float32], chain: StateSequence, units: int) -
 
 
 def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> UnitHmm:
-    """Return models with densities for all states in context that have enough frames in an alignment of the data.
-
-    The new densities are copies of those without context.
-    """
+    """Return models with densities, at first copies, for states in context with enough frames in an alignment."""
     frames: Counter[str] = Counter()
     for x, sequence in zip(data, sequences, strict=True):
         if len(x) >= sum(hmm.table.count(unit) for unit in sequence):

@@ -50,10 +50,7 @@ class ArcWeights(NamedTuple):
 
 
 def arc_layout(arc_from: Index, arc_start: Index) -> ArcLayout:
-    """Return the layout of a network whose arcs are sorted by target.
-
-    arc_from, arc_start : as in ``kernels.paths.NetworkArrays``
-    """
+    """Return the layout of a network whose arcs are sorted by target."""
     states = len(arc_start)
     arc_to = np.repeat(np.arange(states), np.diff(arc_start, append=len(arc_from)))
     groups = _groups(arc_from, arc_start)

@@ -186,7 +186,6 @@ def factorial_best_path(
 ) -> tuple[Index, Index, float]:
     """Return the most probable states of both loops [shapes=(T,)], and the log probability of path and recording.
 
-    logs    : log densities of the recording
     stretch : frames whose decisions are stored at once; those of the others are computed twice; None: as
         ``factorial_posteriors``
     Where there is no path: states 0, and -inf.  Of equally probable paths, any one.

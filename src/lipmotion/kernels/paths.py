@@ -111,10 +111,7 @@ def best_path(
 
 
 class _Block:
-    """Some frames, and the states that may have one of them: consecutive ones, in a network of their own.
-
-    The last frame is the first one of the block that follows.
-    """
+    """Some frames, and the states that may have one of them: consecutive ones, in a network of their own."""
 
     def __init__(self, network: NetworkArrays, windows: Windows | None, start: int, stop: int):
         self.whole, self.windows, self.start, self.stop = network, windows, start, stop

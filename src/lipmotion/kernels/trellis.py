@@ -73,9 +73,8 @@ def _entries(start: Array, products: Array) -> Array:
 
 
 def _cheapest(ways: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Return the least cost over the states before, and the state of it [shapes=(length, C, pieces)].
-
-    ways : [shape=(length, C, C, pieces)], the state before first
+    """Return the least cost over states before, and which [shapes=(length, C, pieces)], of ways [shape=(length, C, C,
+    pieces)].
     """
     least, which = ways[:, 0].copy(), np.zeros((len(ways), *ways.shape[2:]), np.uint8)
     for state in range(1, ways.shape[1]):

@@ -38,10 +38,7 @@ class AffineStatistics:
 
 
 class TransformStatistics(NamedTuple):
-    """The result of the E-step for a transform.
-
-    log_likelihood : of the frames under the transform so far
-    """
+    """The statistics of the E-step for a transform, and the log likelihood of the frames under the transform so far."""
 
     statistics: AffineStatistics
     log_likelihood: float
@@ -58,10 +55,7 @@ def identity(size: int) -> Array:
 
 
 def transformed(features: NDArray[np.float32], transform: Array) -> NDArray[np.float32]:
-    """Return the features after a transform [shape=(T, D)].
-
-    features : [shape=(T, D)];  transform : [shape=(D, D + 1)]
-    """
+    """Return the features [shape=(T, D)] after a transform [shape=(D, D + 1)]."""
     matrix, offset = transform[:, :-1].T.astype(np.float32), transform[:, -1].astype(np.float32)
     return np.asarray(features @ matrix + offset, np.float32)
 

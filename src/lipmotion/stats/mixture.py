@@ -153,9 +153,8 @@ class Mixtures:
     def responsibilities(
         self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Return the posteriors of the components of one density, times the density's own posterior [shape=(N, M)].
-
-        x, weights : as in ``em_update``
+        """Return the posteriors of the components of a density, times its own [shape=(N, M)]; arguments as of
+        ``em_update``.
         """
         components = self.log_components(x, np.array([density]))[:, 0]
         components -= components.max(axis=1, keepdims=True)
@@ -186,10 +185,7 @@ class QuadraticForm:
         return values
 
     def log_likelihood(self, x: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the log density of every frame under every mixture [shape=(T, G)].
-
-        x : [shape=(T, D)]
-        """
+        """Return the log density of every frame under every mixture [shape=(T, G)]."""
         result = np.empty((len(x), self.constant.shape[1]), np.float32)
         for start in range(0, len(x), BLOCK):
             components = self.log_components(x[start : start + BLOCK])

@@ -102,8 +102,6 @@ class TrainingSequence(NamedTuple):
 class TrainingPlan:
     """How a network is trained.
 
-    steps      : number of optimiser steps
-    batch_size : sequences of a step
     rate       : largest learning rate
     dropout    : share of the hidden units that are switched off at random
     seed       : of dropout and of the order of sequences
@@ -128,7 +126,6 @@ def fit_network(
     """Return a network that is trained from the given one for least weighted squared error.
 
     draw    : returns a version of a sequence, by a random generator and the number of the sequence
-    count   : number of sequences
     weights : of the outputs [shape=(O,)]
     report  : called after every step with its number, from 1, and the mean error
     Source: Loshchilov & Hutter 2019 (AdamW).

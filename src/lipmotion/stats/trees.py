@@ -30,7 +30,6 @@ class Question(NamedTuple):
     """The question whether the name at one position of a context is one of some.
 
     position : 0 the left neighbour, 1 the unit, 2 the right neighbour
-    name     : of the question
     members  : the names for which the answer is yes
     """
 

@@ -127,11 +127,7 @@ def mark_closing_phones(units: Timeline[Unit]) -> list[bool]:
 
 
 def describe_unknown_phone(phone: str, where: str = "") -> str:
-    """Return the error message for a phone that is not in the inventory.
-
-    phone : empty if a model recognised a unit of several phones
-    where : where the phone was found, with a blank before it
-    """
+    """Return the error message for a phone, empty or unknown, found ``where`` (with a blank before it)."""
     if not phone:
         return f"a unit without a phone{where}: only the model that recognised it can use it; give phones instead"
     return f"unknown phone {shorten(repr(phone))}{where}; the phones: {' '.join(PHONES)}"

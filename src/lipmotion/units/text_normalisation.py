@@ -40,10 +40,7 @@ ALWAYS_ALLOWED_PHONES = 1000
 
 
 def split_words(text: str) -> tuple[str, ...]:
-    """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money as they are said.
-
-    Of what may be said in several ways, the usual one. Raises InputError: there is no word in it.
-    """
+    """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money as they are said."""
     return tuple(word for token in require_tokens(text) for word in list_readings(token)[0])
 
 

@@ -82,9 +82,6 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
 class NoiseSource:
     """Adds noise to the pictures of one video.
 
-    noise : of the camera
-    size  : height and width of the pictures, px
-    seed  : of the video
     Noise is drawn once, for a field of twice the height and width that has no edges, and each frame is given
     another part of it: that is many times as fast as new noise for every frame.
     """

@@ -114,7 +114,6 @@ def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CAND
 def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Values | None = None) -> Candidates:
     """Return recorded mouth pictures as candidates, without those that are damaged.
 
-    eigenlips    : of the same person
     pictures     : those chosen [shape=(N, H, W, 3)], uint8
     coefficients : of the same pictures [shape=(N, 3·K)], for eigenlips of ``enlarge``; None: their projections
     A picture that differs from what its eigenlips restore by over ``LARGEST_DETAIL`` grey levels somewhere is left out.

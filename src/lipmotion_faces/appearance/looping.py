@@ -184,7 +184,6 @@ _DYNAMICS = ((-2, 0.125), (-1, 0.375), (0, 0.375), (1, 0.125))
 class Join:
     """A place where frames that were not neighbours in the background follow one another, or its direction changes.
 
-    at    : the frame of the order before which it is
     kind  : ``turn``, the background is then shown the other way round, or ``jump``
     cost  : of a turn, the speed of the background relative to its median; of a jump, the difference of the frames and
             of their neighbours relative to the ordinary difference of neighbours
@@ -227,8 +226,6 @@ def loop_order(
 ) -> LoopOrder:
     """Return an order of a background's frames for speech of any length.
 
-    descriptors : of every frame of the background
-    count       : frames that are wanted
     rate_hz     : frame rate of the background
     usable      : the frames that may be shown, all where it is not given [shape=(T,)]
     cuts        : frames before which the camera changes
@@ -377,12 +374,7 @@ def fade_frames(rate_hz: float) -> int:
 
 
 def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int, int]]:
-    """Return the parts of a background between cuts and frames that may not be shown.
-
-    allowed : the frames that may be shown [shape=(T,)]
-    cuts    : frames before which the camera changes
-    Each part is its first frame and the one after its last.
-    """
+    """Return the parts between cuts (first frame, end) of frames that may be shown [shape=(T,)]."""
     change = np.flatnonzero(np.diff(allowed.astype(int))) + 1
     ends = sorted({0, len(allowed), *change.tolist(), *(cut for cut in cuts if 0 < cut < len(allowed))})
     return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]

@@ -57,7 +57,6 @@ class FaceShape:
 def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
     """Return the shape of the part that is replaced.
 
-    jaw_half_width : half the distance between the ends of the jaw line, eye distances
     chin_px        : how far the tip of the chin is below the eyes in all frames [shape=(T,)]
     """
     half = float(np.clip(JAW_SHARE * jaw_half_width * EYE_DISTANCE_PX, NARROWEST_PX, WIDEST_PX))
@@ -81,9 +80,8 @@ def region_map(face_to_frame: Array, scale: float, corner: tuple[float, float] =
 
 
 def best_scale(face_to_frame: Array) -> int:
-    """Return the samples a pixel with which a person's footage loses nothing: 1 to ``LARGEST_SCALE``.
-
-    face_to_frame : maps of the frames [shape=(T, 2, 3)]
+    """Return the samples a pixel, 1 to ``LARGEST_SCALE``, with which footage of these maps [shape=(T, 2, 3)] loses
+    nothing.
     """
     size = np.sqrt(np.abs(np.linalg.det(face_to_frame[:, :, :2])))
     return int(np.clip(np.floor(np.median(size) + 0.25), 1, LARGEST_SCALE))

@@ -127,7 +127,6 @@ class FootagePictures:
 class FaceCodes:
     """What the lower face is like in every frame.
 
-    mouth   : eigenlips [shape=(T, 90)]
     jaw     : components of the jaw [shape=(T, 3·K)]
     chin_px : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
     """
@@ -372,10 +371,7 @@ REMEDY = "build the face again"
 
 
 def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
-    """Return the appearance of a person serialised as arrays (``APPEARANCE`` and those of ``PARTS``).
-
-    Pictures are coded (``storage.coded_video``), which changes them by about one grey level.
-    """
+    """Return the appearance of a person serialised as arrays (``APPEARANCE`` and those of ``PARTS``)."""
     parts = {
         "mouth": eigenlips_to_arrays(appearance.mouth),
         "jaw": eigenlips_to_arrays(appearance.jaw),
@@ -399,10 +395,7 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
 
 
 def appearance_from_arrays(arrays: Arrays) -> Appearance:
-    """Deserialise the appearance of a person.
-
-    Raises ModelFormatError: an array is missing, unknown, out of range, or the parts do not fit together.
-    """
+    """Deserialise the appearance of a person. Raises ModelFormatError: arrays are missing, unknown or do not fit."""
     inner = {part: arrays_under(arrays, f"{part}/") for part in PARTS}
     named = {name: array for name, array in arrays.items() if name.partition("/")[0] not in PARTS or "/" not in name}
     with format_errors("the appearance of the person", REMEDY):

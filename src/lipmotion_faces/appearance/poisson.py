@@ -193,7 +193,6 @@ class CloningSystem:
     def correction(self, source: Pictures, background: Pictures) -> NDArray[np.float32]:
         """Return what cloning adds to the source: float32 array [shape=(T, h, w, 3)], grey levels.
 
-        source, background : pictures [shape=(T, h, w, 3)], grey levels, uint8 or float
         In the region this is the membrane; outside it, the background minus the source.
         Raises InputError: as ``clone``.
         """

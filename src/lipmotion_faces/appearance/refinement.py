@@ -23,7 +23,6 @@ Pictures = NDArray[np.uint8]
 class RefinementOptions:
     """How the detail of each frame is chosen.
 
-    together   : one candidate for all three colours; False: one for each colour, as in the paper
     steadiness : weight of the change of detail between frames, beside the distance in the space of eigenlips; both
                  are squared grey levels. 0: the nearest candidate in every frame, as in the paper
     neighbours : number of nearest candidates of a frame that are considered, at most
@@ -84,10 +83,7 @@ def _more_at_the_lips(height: int, width: int, scale: int) -> NDArray[np.float32
 
 
 def moving_average(coefficients: Values, frames: int = 3) -> NDArray[np.float64]:
-    """Return curves [shape=(T, C)] smoothed by a moving average of an odd width, narrower at the ends.
-
-    Source: Xie & Liu 2007, §6.
-    """
+    """Return curves [shape=(T, C)] smoothed by a moving average, narrower at the ends (Xie & Liu 2007, §6)."""
     count = len(coefficients)
     sums = np.concatenate([np.zeros((1, coefficients.shape[1])), np.cumsum(coefficients, axis=0, dtype=np.float64)])
     middle = np.arange(count)
@@ -97,13 +93,7 @@ def moving_average(coefficients: Values, frames: int = 3) -> NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Refiner:
-    """Turns eigenlips into pictures with recorded detail.
-
-    eigenlips  : the space of mouth pictures
-    candidates : recorded mouths in the same space
-    options    : how detail is chosen
-    Raises InputError: the candidates are of other eigenlips.
-    """
+    """Turns eigenlips into pictures with the detail of candidates. Raises InputError: these are of other eigenlips."""
 
     eigenlips: Eigenlips
     candidates: Candidates
@@ -118,9 +108,8 @@ class Refiner:
             )
 
     def refine(self, coefficients: Values) -> Pictures:
-        """Return the pictures [shape=(T, H, W, 3)] at some eigenlips [shape=(T, 3·K)], one a frame of the video.
-
-        Raises InputError: as ``choose``.
+        """Return the pictures [shape=(T, H, W, 3)] at eigenlips [shape=(T, 3·K)] of a video. Raises InputError: as
+        ``choose``.
         """
         return self.pictures(coefficients, self.choose(coefficients))
 

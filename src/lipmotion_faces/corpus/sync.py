@@ -34,8 +34,6 @@ class CorpusOffsets:
     """Offsets of the sound of a corpus from the motion.
 
     clips       : offset of every utterance, by name
-    collections : offset of all utterances of a collection and a speaker together (as a rule, of one camera set-up)
-    members     : names of the utterances of every collection
     """
 
     clips: Mapping[str, Offset]
@@ -85,9 +83,7 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
 def offsets(corpus: Corpus) -> CorpusOffsets:
     """Return the offset of the sound of each utterance and of each collection.
 
-    Utterances without the channel ``opening`` are ignored.
     Offset zero is that of the GRID corpus, on which the prediction of lip speed was trained.
-    Raises CorpusError: an utterance is damaged.
     """
     scores: dict[str, NDArray[np.float64]] = {}
     members: dict[str, list[str]] = {}

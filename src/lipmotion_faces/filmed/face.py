@@ -55,7 +55,6 @@ class StoredBackground:
 class SpokenTake:
     """Some speech of the person, and the motion of the face in it: what other people's motion is mapped onto.
 
-    sound  : of the person alone
     motion : tracked, at the rate of the video
     seen   : frames in which the face was measured [shape=(T,)]
     """

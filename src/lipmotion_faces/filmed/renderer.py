@@ -55,7 +55,6 @@ LARGEST_DIFFERENCE = 20.0
 class Background:
     """One frame of footage.
 
-    frame         : uint8 array [shape=(H, W, 3)], RGB
     face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
     chin_px       : how far the tip of the chin is below the eyes, px of the face
     has_face      : whether the person is seen; False: the frame stays as it is
@@ -77,7 +76,6 @@ class StitchingOptions:
     average   : number of pictures over which the mouth is averaged before, odd; 1: none
     jaw_detail : how the detail of the jaw is chosen
     noise     : whether the noise of the camera is added
-    seed      : of the noise
     """
 
     jaw: bool = True
@@ -98,11 +96,7 @@ Eqs. 14–16.
 
 @dataclass(frozen=True, eq=False)
 class Stitcher:
-    """Stitches the mouth and the jaw of a person into frames of footage.
-
-    appearance : of the person
-    options    : how
-    """
+    """Stitches the mouth and the jaw of a person into frames of footage."""
 
     appearance: Appearance
     options: StitchingOptions = STITCHING
@@ -110,7 +104,6 @@ class Stitcher:
     def stitch(self, codes: FaceCodes, backgrounds: Iterable[Background]) -> Iterator[Picture]:
         """Yield frames, one for each frame of motion.
 
-        codes       : what the lower face is like, one row a frame of the video
         backgrounds : at least as many; taken a few at a time, so memory does not grow with the length
         Raises InputError: too few backgrounds.
         """

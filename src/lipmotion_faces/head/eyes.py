@@ -154,9 +154,8 @@ def lash_triangles() -> NDArray[np.int32]:
 
 
 def lashes(edge: Real, shut: float) -> Real:
-    """Return the places of the left eye's lashes, a dark wedge along the upper lid [shape=(3 * LASHES, 3)].
-
-    edge : of the upper lid from the inner corner to the outer one [shape=(LASHES, 3)]
+    """Return the places of the left lashes [shape=(3 * LASHES, 3)], a wedge along the upper lid's edge [shape=(LASHES,
+    3)].
     """
     share = np.linspace(0, 1, LASHES)
     thick = 0.004 + 0.018 * np.sin(np.pi * (0.12 + 0.8 * share)) ** 0.7 * share**0.4

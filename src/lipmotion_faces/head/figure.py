@@ -172,7 +172,6 @@ class Figure:
     triangles : of all parts [shape=(F, 3)]
     head      : the rows of the vertices that move; those of the body, behind them, never do
     colours   : diffuse reflection of the vertices, decode_srgb [shape=(V, 3)]
-    parts, rows : the parts, and the rows of the vertices of each by its name
     """
 
     def __init__(self) -> None:

@@ -70,9 +70,8 @@ def head(p: Real) -> Real:
 
 
 def along_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> Real:
-    """Return how far rays go from outside until they meet a form [shape=(N,)].
-
-    start     : [shape=(N, 3)];  direction : of length 1 [shape=(N, 3)]
+    """Return how far rays from outside [shape=(N, 3)], in a direction of length 1, go until they meet a form
+    [shape=(N,)].
     """
     far, going = np.zeros(len(start)), np.arange(len(start))
     for _ in range(steps):

@@ -78,10 +78,7 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
 
 
 def lower_drop(pose: CharacterPose) -> float:
-    """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones.
-
-    Round and oval lips hide the lower teeth, which drop further there than the chin shows.
-    """
+    """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones."""
     return pose.jaw + PARTED_TEETH * (1 - pose.bite) * (1 + max(pose.roundness, 1.4 * pose.oval))
 
 

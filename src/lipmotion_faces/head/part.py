@@ -20,11 +20,9 @@ Triple = tuple[float, float, float]
 class Part:
     """A surface that keeps its form.
 
-    name      : what it is
     places    : of its vertices at rest [shape=(V, 3)];  normals : of length 1 [shape=(V, 3)]
     triangles : counterclockwise from outside [shape=(F, 3)]
     colours   : diffuse reflection, linear [shape=(V, 3)]
-    finish    : how it reflects light
     strands   : directions of hair [shape=(V, 3)], or None
     """
 
@@ -71,10 +69,7 @@ def join_parts(name: str, parts: list[Part]) -> Part:
 
 
 def grid_triangles(rows: int, columns: int, *, closed: bool = False) -> Triangles:
-    """Return the triangles of a grid of vertices, row by row, as seen with rows going down and columns to the right.
-
-    closed : the last column is joined to the first
-    """
+    """Return the triangles of a grid of vertices, row by row; ``closed``: the last column is joined to the first."""
     index = np.arange(rows * columns).reshape(rows, columns)
     if closed:
         index = np.concatenate([index, index[:, :1]], axis=1)

@@ -80,8 +80,6 @@ def head_poses(
 ) -> list[CharacterPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
-    staging : seed, and what moves on its own; None: everything moves
-    prosody : of the speech, for accents of brows and head; None: they follow the opening
     Raises InputError: as ``spoken_mouth``.
     """
     mouth = spoken_mouth(motion, units, fps)

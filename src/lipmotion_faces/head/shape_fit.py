@@ -31,11 +31,7 @@ COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
 
 def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) -> dict[str, Real]:
-    """Return the weights of the shapes of lips, jaw and tongue in every pose, 0 to 1 [each shape=(T,)].
-
-    mesh : of this figure, from ``head_mesh``
-    The middles of the lips are apart as in the pose.
-    """
+    """Return the weights of the shapes of lips, jaw and tongue in every pose, 0 to 1 [each shape=(T,)]."""
     return _cached_fit(figure, mesh).weights(poses)
 
 
@@ -85,10 +81,7 @@ _cached_fit = lru_cache(maxsize=2)(_MouthFit)
 
 
 def lip_gap(moved: Real) -> Real:
-    """Return by how much displacements of the rings of the lips part their middle, in eye distances [shape=(...,)].
-
-    moved : [shape=(..., RINGS, COLUMNS, 3)]
-    """
+    """Return by how much displacements [shape=(..., RINGS, COLUMNS, 3)] part the lips' middle [shape=(...,)]."""
     upper, lower = _edges(moved)
     middle = upper.shape[-1] // 2
     return np.asarray(upper[..., middle] - lower[..., middle])

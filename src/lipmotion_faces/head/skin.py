@@ -79,9 +79,8 @@ class Binding:
         return Binding(places, columns, jaw, bound, self.shares[of[rows][bound]], cheeks, nose)
 
     def move(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
-        """Return the places in a pose [shape=(..., N, 3)].
-
-        contour : places of the outer contour of the lips [shape=(..., COLUMNS, 3)]; columns : its binding
+        """Return the places in a pose [shape=(..., N, 3)], bound to columns of the lips' contour [shape=(..., COLUMNS,
+        3)].
         """
         places = self._by_jaw(pose)
         places[..., self.bound, :] += self.shares @ (contour - columns._by_jaw(pose))
@@ -209,10 +208,7 @@ class Skin:
 
 
 def move_jaw(places: Real, drop: Any) -> Real:
-    """Return places turned with the jaw about its hinge, so that the chin drops by a length [shape=(..., N, 3)].
-
-    drop : a number, or several [shape=(T, 1)]
-    """
+    """Return places turned with the jaw about its hinge; the chin drops by a length, or several [shape=(T, 1)]."""
     angle, (y, z) = drop / 0.72, (places - HINGE)[:, 1:].T
     down, forward = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
     return np.stack([np.broadcast_to(places[:, 0], down.shape), HINGE[1] + down, HINGE[2] + forward], axis=-1)

@@ -60,7 +60,6 @@ def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     """Return the character at rest, its parts named, with a blendshape for each of ``POSES`` and ``SIDED_POSES``, and
     those that turn the eyes.
 
-    moods : whether it has the shapes of moods, too
     ``mouthClose`` brings the lips together while the jaw is open: it is the difference from ``jawOpen``.
     """
     rest = figure.place(REST)[0]
@@ -122,10 +121,7 @@ def camera_for(width: int, height: int) -> Camera:
 
 
 class Stage:
-    """Character, light and camera; may be used by several threads at once.
-
-    colour : red, green and blue of the background, 0 to 255; None: a soft gradient
-    """
+    """Character, light and camera, for several threads; colour: of the background, 0 to 255 (None: a gradient)."""
 
     def __init__(self, camera: Camera, colour: tuple[int, int, int] | None = None) -> None:
         self.figure = figure()

@@ -118,7 +118,6 @@ def write_drawn_face(  # noqa: PLR0913
     """Write generated motion as a drawn face, in the format of the suffix; brows and head move with the sound.
 
     prosody : loudness and pitch in the time of the motion; None: those of the sound, which begins with the motion
-    monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
     staged, drawn = stage_face(face, staging, prosody or measure_prosody(sound)), None

@@ -85,7 +85,6 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     """Write a character with its animation as ``.glb`` or ``.usda``, by the suffix.
 
     A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
-    sound : the file that is referred to, by its path from the folder of the output; None: none
     Raises ExportError: the file cannot be written.
     """
     with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))

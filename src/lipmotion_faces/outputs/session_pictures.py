@@ -21,7 +21,6 @@ from lipmotion_faces.registry import stage_face
 class SessionPictures:
     """Pictures of drawn faces with the motion of a session; what of a face does not move is painted once.
 
-    session : whose motion is shown
 
     >>> import lipmotion
     >>> pictures = lipmotion.SessionPictures(lipmotion.Session("examples/welcome.flac"))

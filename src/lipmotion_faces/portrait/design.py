@@ -138,7 +138,6 @@ class LipDesign:
 
     line_y       : height of the line where the closed lips meet
     half_width   : half the distance of the corners at rest
-    upper, lower : thickness of the lips
     seam         : half the thickness of the line between the closed lips
     smile        : how far the corners lie below the middle; negative: above. Round, oval and tucked lips have none
     outline      : thickness of a line around lips and mouth; 0: none
@@ -157,7 +156,6 @@ class LipDesign:
 class EyeDesign:
     """Eyes and brows.
 
-    x, y         : centre of the right iris at rest
     iris         : its radius
     upper, lower : lids of the right eye, from the inner to the outer corner, one x for both
     lashes       : thickness of the upper lashes, relative to the woman's; over 0.5 with a wing
@@ -177,12 +175,7 @@ class EyeDesign:
 
 @dataclass(frozen=True, eq=False)
 class Lock:
-    """A part of the hair in front of the forehead.
-
-    outline : of the part
-    light   : (x, y, radius x, radius y) of its light; None: none
-    strands : lines in it
-    """
+    """A part of the hair before the forehead: outline, (x, y, radius x, radius y) of its light or None, lines in it."""
 
     outline: Points
     light: tuple[float, float, float, float] | None = None

@@ -52,7 +52,6 @@ def lid_pose(shut: float, mood: UpperFace) -> LidPose:
 class EyePainter:
     """Paints both eyes of a character, with the lids.
 
-    iris : the irises, looking straight ahead [shape=(h, w, 4)]
     lids : returns what is under the irises, the openings between the lids, and what is over the irises, by the pose of
            the lids
     """

@@ -154,10 +154,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
 
 
 def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOutlines) -> MouthInterior:
-    """Return teeth and tongue of a pose between the lips, over the columns ``x`` [shape=(C, ...)].
-
-    outlines : of the lips of this pose
-    """
+    """Return teeth and tongue of a pose between the lips' outlines, over the columns ``x`` [shape=(C, ...)]."""
     edge = lips.line_y + TEETH_EDGE
     upper_edge = edge - 0.06 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
     upper = upper_edge - 0.35 * x * x

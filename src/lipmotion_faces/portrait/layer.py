@@ -20,10 +20,7 @@ Pixels = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class View:
-    """A square picture of ``size`` pixels with the coordinates of the drawing.
-
-    Coordinates are in eye distances: origin between the eyes, x to the right, y downwards.
-    """
+    """A square picture of ``size`` pixels with the coordinates of the drawing."""
 
     size: int
 
@@ -121,7 +118,6 @@ class Layer:
     ) -> None:
         """Paint the inside of an outline.
 
-        blur   : softness of the edge, eye distances
         within : another outline; nothing is painted outside it
         """
         softest = max([blur, *(shade.radius for shade in shades if isinstance(shade, Rim))])

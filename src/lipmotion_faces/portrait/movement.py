@@ -80,11 +80,7 @@ class SkinField:
 
 
 class BrowPose(NamedTuple):
-    """The brows in whole steps, so that pictures of them can be kept.
-
-    raised : both of them, ``BROW_STEPS`` a pixel
-    inner, outer, lowered : of a mood, ``MOOD_STEPS`` each
-    """
+    """The brows in whole steps: raised by ``BROW_STEPS`` a pixel, and by a mood in ``MOOD_STEPS``."""
 
     raised: int
     inner: int = 0

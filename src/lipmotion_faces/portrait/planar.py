@@ -49,7 +49,6 @@ class PlanarCanvas:
 
     planes : the picture before the head is moved [shape=(3, size, size)]
     packed : the same, packed for its warp
-    mouth  : a layer for the mouth [shape=(h, w, 4)]
     upper  : what the upper half shows: lids, gaze, brows
     """
 
@@ -61,10 +60,7 @@ class PlanarCanvas:
 
 
 class PlanarRasteriser:
-    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own.
-
-    background : ``scene`` (the character's own), or a colour
-    """
+    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own."""
 
     def __init__(self, design: Design, size: int, background: Colour | str = SCENE) -> None:
         view = View(size)
@@ -98,10 +94,7 @@ class PlanarRasteriser:
         return PlanarCanvas(self._still.copy(), self._parts.mouth)
 
     def picture(self, pose: FacePose, canvas: PlanarCanvas) -> Bytes:
-        """Return one frame: brightness, and below it the two colours [shape=(size · 3 / 2, size)].
-
-        canvas : from ``canvas``; changed
-        """
+        """Return one frame [shape=(size · 3 / 2, size)], brightness above the two colours; the canvas is changed."""
         jaw, mouth = self._parts.jaw, self._parts.mouth
         skin, still = self._jaw_layers
         lay_skin(skin, *self._skin_field.shifts(pose.mouth, pose.mood), *still, jaw.y0, jaw.x0, canvas.planes)
@@ -144,9 +137,8 @@ class PlanarRasteriser:
 
 
 def planes_of(frame: Bytes) -> tuple[Bytes, Bytes, Bytes]:
-    """Return the brightness [shape=(H, W)] and the two colours [shape=(H / 2, W / 2)] of a frame, which they share.
-
-    frame : brightness, and below it the two colours [shape=(H · 3 / 2, W)], contiguous
+    """Return brightness and both colours [shape=(H / 2, W / 2)] of a frame [shape=(H · 3 / 2, W)], which share its
+    memory.
     """
     height, width = len(frame) * 2 // 3, frame.shape[1]
     colours = frame[height:].reshape(2, height // 2, width // 2)

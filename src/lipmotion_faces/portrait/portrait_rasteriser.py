@@ -42,8 +42,6 @@ class FacePose(NamedTuple):
 
     lids           : how far the eyes are closed, 0..1
     gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
-    brows          : how far the brows are raised, in eye distances
-    mood           : what a mood does beside the mouth
     """
 
     mouth: MouthPose
@@ -96,10 +94,7 @@ def make_painter(drawing: Draws[CanvasT]) -> Callable[[FacePose], Picture]:
 
 
 class Rasteriser:
-    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own.
-
-    background : ``scene`` (the character's own), a colour, or None (transparent)
-    """
+    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own."""
 
     def __init__(self, design: Design, size: int, background: Colour | str | None = SCENE) -> None:
         view = View(size)
@@ -120,10 +115,7 @@ class Rasteriser:
         return self._still.copy()
 
     def picture(self, pose: FacePose, canvas: Canvas) -> Bytes:
-        """Return one frame [shape=(size, size, 3)], or where the background is transparent [shape=(size, size, 4)].
-
-        canvas : from ``canvas``; changed
-        """
+        """Return one frame [shape=(size, size, 3), or 4 channels where transparent]; the canvas is changed."""
         skin = self._move_skin(self._jaw, self._skin_field.shifts(pose.mouth, pose.mood))
         self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])

@@ -85,7 +85,6 @@ class Drawing:
 def read_drawing(path: Path) -> Drawing:
     """Return the drawing in an ``.svg`` file.
 
-    Raises InputError: no such file, no SVG, something that is not read, a reference to outside of the file, or more
     than a drawing may hold.
     """
     try:
@@ -116,12 +115,7 @@ def parse_drawing(data: bytes) -> Drawing:
 
 
 class _Group(NamedTuple):
-    """What an element hands down to those in it.
-
-    layers : names of the groups that hold them
-    matrix : to the units of the drawing [shape=(3, 3)]
-    style  : of the names in ``_INHERITED``
-    """
+    """What an element hands down: groups' names, the matrix to the drawing's units [shape=(3, 3)], inherited style."""
 
     layers: tuple[str, ...]
     matrix: Points
@@ -133,7 +127,6 @@ class _Group(NamedTuple):
 class _DrawingReader:
     """Takes the elements of one drawing as the parser finds them.
 
-    groups  : those that are open, the innermost last
     depth   : of elements that are open
     passed  : depth of the element that is passed over with all in it; 0: none
     """

@@ -29,9 +29,8 @@ _POINTS = {"C": STEPS, "S": STEPS, "Q": STEPS, "T": STEPS, "A": 4 * STEPS}
 
 
 def flatten_path(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
-    """Return the subpaths of a path's ``d``: points [shape=(N, 2)], and whether each returns to its beginning.
-
-    Raises InputError: not a path, or one of more than ``most`` points.
+    """Return a path's subpaths [shape=(N, 2)], and whether each is closed. Raises InputError: no path, or over ``most``
+    points.
     """
     lines: list[tuple[Points, bool]] = []
     current: list[Points] = []

@@ -53,10 +53,7 @@ class Finish:
 
 
 class Lighting:
-    """The lamps, and some finishes under them.
-
-    finishes : the finish of a vertex is given by its number among these
-    """
+    """The lamps, and some finishes under them, by whose numbers a vertex has its finish."""
 
     def __init__(self, finishes: Sequence[Finish]) -> None:
         rows = [[*f.wrap, f.gloss, f.focus, f.edge, f.strands] for f in finishes]
@@ -94,10 +91,7 @@ class Lighting:
 
 
 def tone_table() -> NDArray[np.uint8]:
-    """Return the grey level, 0 to 255, of light in even steps from 0 to ``WHITE`` [shape=(LEVELS,)].
-
-    The brightest light is compressed, as film does; the rest has the curve of sRGB.
-    """
+    """Return the grey level, 0 to 255, of light in even steps from 0 to ``WHITE`` [shape=(LEVELS,)]."""
     light = np.linspace(0, WHITE, LEVELS)
     knee = 0.7
     room = 1 - knee

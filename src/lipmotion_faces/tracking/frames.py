@@ -33,7 +33,6 @@ class VideoFrame:
 class OpenVideo:
     """An open video.
 
-    frames          : the pictures; each is decoded when the iterator reaches it
     stated_rates_hz : the frame rates that the container states, the most reliable first
     stated_s        : the duration that the container states, 0 if none
     damage          : a reason for every packet or picture that was left out so far
@@ -105,11 +104,7 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
 
 
 def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float) -> list[str]:
-    """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end.
-
-    times_s : times of the pictures that were decoded
-    rate_hz : nominal frame rate
-    """
+    """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end."""
     notes = []
     end_s = float(times_s[-1]) + 1 / rate_hz
     if video.damage:

@@ -47,10 +47,7 @@ def is_cut(before: Array | None, after: Array) -> bool:
 
 
 def face_thumbnail(image: Image, eyes: Array) -> Array:
-    """Return a thumbnail of the upper face, upright [shape=(24, 36, 3)].
-
-    eyes : x and y of the right and left outer eye corner, px [shape=(2, 2)]
-    """
+    """Return a thumbnail of the upper face, upright [shape=(24, 36, 3)]."""
     cv2 = import_opencv()
     across = eyes[1] - eyes[0]
     down, middle, (width, height) = np.array([-across[1], across[0]]), eyes.mean(axis=0), FACE_SIZE

@@ -61,7 +61,6 @@ def track(
 
     path    : a video that shows one face, more or less from the front
     crops   : whether mouth pictures are wanted
-    span    : the part of the video that is tracked
     person  : thumbnails of the face that is wanted, of ``VideoScan``; without any, the one with the most frames
     tracker : name of the tracker that finds the face and its points (``trackers``)
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the start of the container, or
@@ -169,7 +168,6 @@ class _Pictures:
 def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: str = MEDIAPIPE) -> TrackedFrames:
     """Return the pictures of a video and where one person's face is in them; the video is decoded once.
 
-    path, span, person, tracker, and errors : as of ``track``
     Memory: the points of every frame; no picture is kept.
     """
     pictures = _Pictures()
@@ -200,10 +198,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
 
 
 def distance_px(points: Array, pair: tuple[int, int]) -> Array:
-    """Return the distance in the image between two face-mesh points in every frame, px [shape=(T,)].
-
-    points : array [shape=(T, len(TRACKED_POINTS), 3)], px
-    """
+    """Return the distance in the image between two face-mesh points in every frame, px [shape=(T,)]."""
     between = points[:, COLUMN[pair[0]], :2] - points[:, COLUMN[pair[1]], :2]
     return np.linalg.norm(between, axis=1)
 

@@ -107,16 +107,14 @@ class LandmarkTracker(ABC):
 
     @abstractmethod
     def versions(self) -> dict[str, str]:
-        """Return the versions of the packages that the results depend on; one has the name of the tracker.
-
-        Raises MissingDependencyError: one is not installed.
+        """Return the versions of packages that results depend on, with the tracker's. Raises MissingDependencyError:
+        one is missing.
         """
 
     @abstractmethod
     def points(self, most: int = 1) -> PointFinder:
-        """Return what finds the points of at most so many faces in a clip; with 1, those of the most probable one.
-
-        Raises MissingDependencyError: a package is not installed.
+        """Return what finds the points of at most so many faces in a clip. Raises MissingDependencyError: a package is
+        missing.
         """
 
     @abstractmethod

@@ -28,10 +28,7 @@ LARGEST_PACKET_BYTES = 1 << 24
 
 
 def append_xmp(path: Path, packet: str) -> None:
-    """Append a packet to an mp4 file; nothing in the file moves, so all its offsets remain valid.
-
-    Raises ExportError: the file does not consist of whole boxes, or the packet is too large.
-    """
+    """Append a packet to an mp4 file; nothing in the file moves, so all its offsets remain valid."""
     content = packet.encode()
     if len(content) > LARGEST_PACKET_BYTES:
         raise ExportError(f"{path}: XMP metadata of {len(content)} bytes, at most {LARGEST_PACKET_BYTES} are possible")
@@ -125,10 +122,7 @@ def frame_rate(fps: float) -> Fraction:
 def check_frames(
     frames: Iterable[Frame], path: Path, kind: str, is_even: Callable[[tuple[int, ...]], bool]
 ) -> Iterator[Frame]:
-    """Yield the frames. Raises ExportError: there are none, or one has another type or size than required.
-
-    kind    : of colours, for the message;  is_even : whether a shape is of that kind and of even sizes
-    """
+    """Yield the frames. Raises ExportError: none, or one of another type or size than ``is_even`` asks."""
     shape: tuple[int, ...] | None = None
     for n, frame in enumerate(frames):
         shape = shape or frame.shape

@@ -54,8 +54,6 @@ class Compared(Protocol):
 def figures_of(clips: Sequence[ComparedClip], recordings: Compared, seed: int) -> dict[str, Any]:
     """Return the figures of one condition, by name; figures that cannot be computed are NaN.
 
-    recordings : of the clips
-    seed       : of the bootstrap interval
     Eigenlips have figures of their own, ``eigenlips``; without other channels, these are also the overall figures.
     """
     compared, threshold = recordings.channels, recordings.closed_under
@@ -156,10 +154,7 @@ def evaluate(
     """Return the figures of docs/measures.md, by name: from audio only and, if all have transcripts, with them.
 
     selection  : the utterances to compare; by default those of the list ``test``
-    lexicon    : pronunciations of words, ahead of those of the dictionary
     recogniser : ``own``, ``general`` or ``auto``, as in ``Request``
-    seed       : of the bootstrap interval
-    monitor    : called with reports of progress
 
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; in addition
     or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures

@@ -49,14 +49,11 @@ DISTANCES = (OPENING, "width", "outer")
 class HeldOutRecordings:
     """Recordings with which generated motion is compared, and their phones in time.
 
-    utterances   : the recordings
     channels     : names of the channels that are compared
     still        : names of the channels that are left out because they do not move
     closed_under : the opening under which the mouth counts as closed, in eye distances (None: no channel ``opening``)
     reference    : phones in time of every utterance: labelled, or aligned, or recognised
     conditions   : phones in time that the engine is given, by condition: ``audio only``, ``with transcript``
-    phones       : the recogniser of these phones
-    recognitions : what it recognised in every utterance
     eigenlips    : principal components of mouth pictures (None: their coefficients are not compared)
     prior        : the model on which the evaluated one stands (None: it stands on none)
     speakers     : maps of the people whom the evaluated model knows (None: it tells no people apart)
@@ -129,12 +126,8 @@ def load_held_out(  # noqa: PLR0913
 ) -> HeldOutRecordings:
     """Return held-out recordings with aligned and recognised phones. Raises as ``evaluate``.
 
-    phones    : the recogniser
-    selection : the utterances; by default those of the list ``test``
     channels  : the channels to compare, whether they move or not; None: from ``choose_channels``
     visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
-    prior     : the model on which the evaluated one stands, or None
-    speakers  : maps of the people whom the evaluated model knows, or None
     """
     lexicon = lexicon or Lexicon()
     utterances = [
@@ -191,11 +184,7 @@ def choose_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], t
 def generate_clips(
     recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
-    """Return recorded and generated motion of all utterances under a condition.
-
-    learned : the engine's model of motion
-    Raises CorpusError: the model has other channels.
-    """
+    """Return recorded and generated motion of all utterances. Raises CorpusError: the model has other channels."""
     speech = make_speech(recordings, condition, engine, learned)
     return generate_compared(recordings, speech, engine, learned)
 
@@ -225,12 +214,7 @@ def make_speech(
 def generate_compared(
     recordings: HeldOutRecordings, speech: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
-    """Return recorded and generated motion of all utterances.
-
-    speech  : from ``make_speech``, one for each utterance
-    learned : the engine's model of motion
-    Raises CorpusError: the model has other channels.
-    """
+    """Return recorded and generated motion of all utterances for their speech. Raises CorpusError: other channels."""
     clips, channels = [], recordings.channels
     for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True):
         generated = generate_for(recordings.person(utterance), engine, learned, spoken).motion

@@ -40,7 +40,6 @@ HOW_TO_READ = (
 class FinishedPart:
     """An experiment whose figures are there.
 
-    record : its file: figures, stamp, names of videos and pictures
     motion : of one clip, as ``shown_clip.ClipKeeper`` keeps it; empty: none was kept
     """
 
@@ -61,10 +60,7 @@ def report_html(
 ) -> str:
     """Return the page of a report.
 
-    about    : of the corpus and the run, by name
-    finished : experiments, in their order
     left_open, failed : names of those that are not finished, or failed, with the reasons
-    quick    : whether it is a quick run
     """
     style = resources.files(__package__).joinpath("report.css").read_text("utf-8")
     subtitle = "How the systems of three papers, and those of this project, do on a corpus."

@@ -61,9 +61,7 @@ QUICK_FOLDS = 2
 class PartRun:
     """What an experiment is run with.
 
-    work   : an existing folder for finished parts of it
     models : a folder of engines' models, which several experiments share
-    plots  : a folder for pictures; None: none are drawn
     """
 
     corpus: Corpus
@@ -78,10 +76,7 @@ class PartRun:
 class ReportPart:
     """An experiment of a report.
 
-    lists    : that the corpus must have
     share    : of the time that all take, roughly
-    run      : returns its figures
-    section  : returns what they say
     draws    : whether it writes pictures, for which it needs matplotlib
     """
 
@@ -157,7 +152,6 @@ NOT_CHOSEN = "not chosen"
 class WrittenReport:
     """A report that was written.
 
-    page     : its path
     verdicts : what was found, one sentence by experiment
     left_out : why experiments are not in it, by name
     failed   : errors of experiments that failed, by name; the same command tries them again
@@ -182,9 +176,6 @@ def experiment_report(
     """Run experiments on a corpus, and write a page of what they found, with its tables, pictures and videos.
 
     folder   : of the report, made if need be. What is finished in it is not computed again; a call after a stop goes on
-    only     : names of ``parts.PARTS``; None: all that the corpus has recordings for
-    quick    : few recordings and small models, to see that it runs
-    settings : of all experiments
     The page is written anew when an experiment is finished; where nothing is left to do, nothing is written. Every
     experiment has a folder of its own beside the page. Where the corpus lacks a list, the page says what is left out.
     An experiment that fails does not stop the others: the page says with what error it failed.
@@ -251,12 +242,7 @@ def _check_folder(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class _Writer:
-    """Runs experiments and writes their folders and the page.
-
-    lacking : why experiments are left out, by name
-    digest  : of all that the figures of every experiment depend on
-    failed  : errors of experiments that failed, by name
-    """
+    """Runs experiments and writes their folders and the page."""
 
     corpus: Corpus
     folder: Path
@@ -309,11 +295,7 @@ class _Writer:
                 unfinished.write_text(text, encoding="utf-8")
 
     def run(self, name: str, settings: ExperimentSettings) -> None:
-        """Run an experiment, and write its folder; where it fails, keep the error.
-
-        settings : with the monitor of this experiment
-        Raises ExportError: something cannot be written.
-        """
+        """Run an experiment with its settings, and write its folder, or keep its error. Raises ExportError."""
         try:
             self._run(name, settings)
         except ExportError:

@@ -23,7 +23,6 @@ class Column:
     """A figure of every row.
 
     key   : of the figure in a row; its interval and difference, where there are any, are beside it
-    title : above the column
     form  : how numbers are written; empty: a text
     note  : what the figure is, in words; empty: the title says it
     """
@@ -50,10 +49,7 @@ OPENING = (ACC, NRMSE, SCORE, PRECISION, RECALL, VARIANCE)
 class Table:
     """A table of a report.
 
-    name      : of its files
-    caption   : above it
     columns   : after the names of the rows
-    rows      : by name
     reference : the row that differences are from; empty: there are no differences
     head      : what the rows are
     """
@@ -96,10 +92,7 @@ class Table:
         return about | {"rows": self.records()}
 
     def as_html(self, folder: str) -> Html:
-        """Return the table on the page; where it is wider than the screen, it scrolls by itself.
-
-        folder : beside the page, that has the folder ``tables`` with its files
-        """
+        """Return the table on the page; where it is wider than the screen, it scrolls by itself."""
         heads = [
             element("th", self.head, scope="col"),
             *(element("th", each.title, scope="col", class_="number" if each.form else None) for each in self.columns),
@@ -149,13 +142,11 @@ FEW_CLIPS = 10
 class Section:
     """The words, charts and tables of one experiment.
 
-    title    : the paper, or what is compared
     about    : what was trained and compared, in sentences
     verdict  : what was found, in one sentence
     words    : what held and what did not, in sentences, by what they are of
     charts   : drawings
     table    : the most important one
-    more     : tables that are folded, each with the sentence above it
     shown    : systems whose motion is shown, by the names that ``ExperimentSettings.receive`` gets
     """
 
@@ -200,7 +191,6 @@ class PaperPair:
     """Two systems, of which the paper has the first as the better one.
 
     difference : here, in the figure's unit, positive as in the paper; None: not defined
-    interval   : its 95 % interval on the same recordings
     """
 
     better: str
@@ -218,9 +208,6 @@ class PaperPair:
 class PaperOrder:
     """The order of some systems by a figure, in a paper and here.
 
-    figure   : its name, in words
-    paper    : the paper's values
-    here     : the values here; None: not defined
     pairs    : every two systems
     form     : how a difference is written
     is_error : whether the smallest value is the best

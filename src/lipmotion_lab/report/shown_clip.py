@@ -80,10 +80,7 @@ class ClipKeeper:
 
 
 def draw_curves(content: Mapping[str, Any], systems: Sequence[str]) -> list[Html]:
-    """Return a chart of the opening for each of some systems, with the p, b and m of the recording.
-
-    content : from ``ClipKeeper``
-    """
+    """Return a chart of the opening for each of some systems, with the p, b and m of the recording."""
     column, time_s = content["channels"].index(OPENING), np.array(content["time_s"])
     recorded = np.array(content[RECORDED])[:, column]
     marked = [tuple(span) for span in content["spoken"] if span[2] in BILABIAL]
@@ -99,8 +96,6 @@ def write_videos(
 ) -> list[dict[str, str]]:
     """Write a video with sound for the recording and for each of some systems; return their files and captions.
 
-    content : from ``ClipKeeper``
-    folder  : an existing one
     The mouth as it was filmed is shown where the corpus has its pictures; else, and for every system, a drawn face.
     Raises ExportError: a video cannot be written.
     """

@@ -40,10 +40,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = "") -> None:
-    """Add the corpus, ``--workers``, and the options of ``add_figures_arguments``.
-
-    quick : what is small with ``--quick``, beside the recordings; without it there is no such option
-    """
+    """Add the corpus, ``--workers``, the figures, and, if it is said what is small then, ``--quick``."""
     add_input(parser, "corpus", what="corpus")
     if quick:
         help_text = f"see that it runs: 20 recordings to train on, at most 6 to compare, {quick}"
@@ -62,7 +59,6 @@ def run_experiment(
     """Call ``experiment(corpus, work=…, settings=…)``, print its table, and give its figures with their stamp.
 
     ``work`` is a folder of finished parts, from which a second run goes on; None without an output, and not
-    ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.files import unfinished_work

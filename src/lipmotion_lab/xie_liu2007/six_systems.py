@@ -88,7 +88,6 @@ TRIALS = "trials"
 class ComparisonOptions:
     """Which systems are compared, and in which conditions.
 
-    systems     : names of ``systems.COMPARED_SYSTEMS``; None: all whose packages are installed
     tuning      : how the settings of tuned systems are chosen, on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
@@ -127,16 +126,11 @@ def xieliu2007(  # noqa: PLR0913
     """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
     order, sizes : train on the first N names of a list, as in ``learning_curve``; by default on all of ``train``
-    plots        : a folder for pictures like Figs. 7, 10 and 11 of the paper, of the largest size
-    work         : a folder for what is finished, from which the same call goes on after a stop; None: nothing is kept
-    settings     : its workers share the forced alignment
     The phones in time are computed once for each size and are the same for all systems. The settings of tuned systems
     are chosen on the list ``val``, with systems trained on the first recordings of the list; then their number of
     Gaussians, and whether they are better than those printed, with systems of the size itself.
     Raises InputError: no such system, or sizes that the list does not have.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
-    Raises MissingDependencyError: a system or the pictures need a package that is not installed.
-    Raises ExportError: the pictures cannot be written.
     """
     names, seed = select_systems(options.systems), settings.seed
     check_visual(options.visual)
@@ -184,10 +178,7 @@ def xieliu2007(  # noqa: PLR0913
 
 @dataclass(frozen=True, eq=False)
 class _TrainedSystems:
-    """Systems trained on some utterances, and the held-out recordings.
-
-    used : names of the utterances that they were trained on
-    """
+    """Systems trained on some utterances, whose names are ``used``, and the held-out recordings."""
 
     used: tuple[str, ...]
     recordings: HeldOutRecordings
@@ -196,11 +187,7 @@ class _TrainedSystems:
 
 @dataclass(frozen=True, eq=False)
 class _TrainingSetup:
-    """What the trainings on all sizes have in common.
-
-    held_out, validation : names of utterances
-    work                 : folder for finished parts, or None
-    """
+    """What the trainings on all sizes have in common."""
 
     corpus: Corpus
     held_out: Sequence[str]
@@ -249,10 +236,7 @@ class _TrainingSetup:
     def _prepared(
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
     ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
-        """Return the examples of some utterances, and recordings with the phones of models trained on these.
-
-        The recordings are those of the list ``val`` and those ``held out``, by these names, where there are some.
-        """
+        """Return the examples of some utterances, and recordings with the phones of models trained on these."""
         lexicon, config = self.settings.lexicon or Lexicon(), self.settings.recogniser or HmmConfig()
         visual = self.options.visual
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
@@ -325,10 +309,7 @@ def _generate(
 def _paper_pairs(
     recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int
 ) -> list[dict[str, Any]]:
-    """Return how much better each system of the paper is than each that is worse in print, on the same clips.
-
-    Printed systems are compared with printed ones, and tuned ones with tuned ones; ``acc`` and ``amse``: difference.
-    """
+    """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
     by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
     rows = []
     for ending in ("", TUNED):

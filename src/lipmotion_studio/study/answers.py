@@ -99,10 +99,7 @@ def write_answers(path: Path, answers: Iterable[Answer]) -> None:
 
 
 def read_answers(path: Path) -> list[Answer]:
-    """Return the answers of a table.
-
-    Raises InputError: the file cannot be read, lacks a column, or has a value that no answer can have.
-    """
+    """Return the answers of a table. Raises InputError: it cannot be read, lacks a column, or has a wrong value."""
     table, answers = csv.DictReader(io.StringIO(read_text_file(path, "answers")), restval=""), []
     try:
         missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]

@@ -33,9 +33,6 @@ from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, 
 class RateLimit:
     """Allows so many requests a second for each asker, and some more at once.
 
-    rate_hz : requests a second in the long run
-    burst   : requests at once after a pause
-    clock   : returns the time in seconds
     Of askers whose allowance is full again nothing is kept: the memory is bounded by ``burst / rate_hz`` seconds of
     requests, and askers are few.
     """
@@ -114,7 +111,6 @@ def study_application(
 ) -> Starlette:
     """Return the application.
 
-    videos : paths of the videos by their names, of ``check_videos``
     names  : by which raters reach the server, besides addresses of numbers and the names of this machine
     Requests by other names, and of other sites' pages, are refused. Addresses of numbers are not: no other site can let
     a browser state one.

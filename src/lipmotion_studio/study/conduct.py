@@ -44,10 +44,7 @@ def serve_study(
 
 
 def collect_answers(folder: Path) -> list[Answer]:
-    """Return the answers of a study, in the order of raters and trials.
-
-    Raises InputError: no study, or nobody has answered yet.
-    """
+    """Return the answers of a study by rater and trial. Raises InputError: no study, or nobody has answered."""
     study = read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
         return list(list_answers(study, store.sheets()))
@@ -73,7 +70,6 @@ def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
 def forget_rater(folder: Path, name: str) -> int:
     """Delete a rater and all of the rater's answers; return how many there were.
 
-    name : as in the exported answers, and as the page shows it to the rater
     Files that were exported before are not changed.
     Raises InputError: no study, or no such rater.
     """

@@ -26,9 +26,6 @@ class StudyVideo:
     """A video that raters watch.
 
     file      : its name in the folder of videos
-    sentence  : name of the sentence that is said
-    condition : name of what made the motion
-    seconds   : how long it lasts
     sha256    : digest of its content
     made      : how it was made: texts by name, among them digests of what it was made from
     """
@@ -46,7 +43,6 @@ class StudyTrial:
     """What a rater sees on one page.
 
     videos   : numbers of videos in the study, in the order in which they are shown
-    practice : whether it is for practice, and does not count
     expected : the value that an attentive rater gives to every question; empty: there is none
     note     : what the page asks for besides, where the answer is told; otherwise empty
     """
@@ -62,7 +58,6 @@ class Study:
     """A study: what is shown, and what is asked.
 
     kind         : ``paired``, ``mos`` or ``ranking``
-    title        : shown to raters
     consent      : what raters agree to before they begin
     instructions : what raters are asked to do
     scales       : names of the scales of ``mos``
@@ -133,10 +128,7 @@ def read_study(folder: Path) -> Study:
 
 
 def check_videos(study: Study, folder: Path) -> dict[str, Path]:
-    """Return the paths of the videos of a study by their names.
-
-    Raises InputError: one is missing, or is not what it was when the study was designed.
-    """
+    """Return a study's videos by name. Raises InputError: one is missing, or not as when the study was designed."""
     paths = {video.file: folder / VIDEOS / video.file for video in study.videos}
     for video in study.videos:
         if not paths[video.file].is_file():

@@ -23,11 +23,7 @@ PREFERENCE, MATCH = "preference", "match"
 
 @dataclass(frozen=True)
 class OpinionScale:
-    """A five-point scale.
-
-    title : its name, as raters read it
-    asks  : the question
-    """
+    """A five-point scale: its name, as raters read it, and the question."""
 
     title: str
     asks: str
@@ -68,7 +64,6 @@ MIN_REGION_PX = 16
 class Region:
     """A part of pictures, as shares of their width and height, from the upper left corner.
 
-    Raises InputError: it is not inside.
 
     >>> Region.parsed("0.25,0.5,0.5,0.4")
     Region(left=0.25, top=0.5, width=0.5, height=0.4)
@@ -91,9 +86,8 @@ class Region:
 
     @classmethod
     def parsed(cls, text: str) -> Region:
-        """Return the region of a text ``LEFT,TOP,WIDTH,HEIGHT``; of an empty one, the whole picture.
-
-        Raises InputError: not four numbers, or not inside.
+        """Return the region of ``LEFT,TOP,WIDTH,HEIGHT``, or the whole picture. Raises InputError: not four numbers
+        inside.
         """
         if not text:
             return cls()

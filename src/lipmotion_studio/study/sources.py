@@ -55,10 +55,7 @@ Condition = Callable[[StudySentence, Path], MadeVideo]
 
 
 def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
-    """Return the sentences of files and folders of recordings, by the names of the files without suffix.
-
-    Raises InputError: none, two of one name, or a folder without recordings.
-    """
+    """Return the sentences of files and folders by name. Raises InputError: none, or two of one name."""
     found = [StudySentence(path.stem, path) for path in list_recordings(given)]
     if not found:
         raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
@@ -72,10 +69,7 @@ def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
 
 
 def parse_conditions(given: Sequence[str]) -> dict[str, str]:
-    """Return the sources of conditions by their names, of texts ``NAME=SOURCE`` or ``recording``.
-
-    Raises InputError: a text of another form, a name that is taken, or fewer than two.
-    """
+    """Return the sources of conditions by name. Raises InputError: another form, a name that is taken, or under two."""
     found: dict[str, str] = {}
     for text in given:
         name, equals, source = text.partition("=")
@@ -99,7 +93,6 @@ def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) 
 
     source : ``recording``; a model, ``shipped`` or a file; a job file; or a folder with a video or a motion file of
              each sentence, of its name
-    drawn  : how motion is drawn: the face and the frame rate of videos
     Raises InputError: no such source, or it lacks a sentence.
     """
     path = Path(source)
@@ -125,10 +118,7 @@ def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) 
 
 
 def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
-    """Return a condition of finished videos, which stay as they are, or of motion, drawn with the sentences' sound.
-
-    Raises InputError: there is none of a sentence, or several.
-    """
+    """Return a condition of finished videos or of motion to draw. Raises InputError: none or several of a sentence."""
     files: dict[str, Path] = {}
     for name in (sentence.name for sentence in sentences):
         there = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stem == name]

@@ -47,10 +47,8 @@ WHERE EXISTS (SELECT 1 FROM raters WHERE number = :rater) ON CONFLICT DO NOTHING
 class AnswerSheet:
     """The answers of a rater to all questions of one trial.
 
-    rater   : number of the rater
     trial   : number of the trial in the rater's order, from 0
     values  : one for each question
-    seconds : from the start of the trial to the answer
     plays   : how often its videos were played to their ends, all together
     """
 
@@ -153,10 +151,7 @@ class StudyStore:
         ]
 
     def forget(self, rater: int) -> int:
-        """Delete a rater and all answers, and overwrite them on the disk; return how many answers there were.
-
-        Raises InputError: no such rater.
-        """
+        """Delete a rater and all answers, on the disk too; return how many. Raises InputError: no such rater."""
 
         def work(database: sqlite3.Connection) -> int | None:
             (count,) = database.execute("SELECT count(*) FROM answers WHERE rater = ?", [rater]).fetchone()

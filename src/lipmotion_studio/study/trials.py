@@ -58,11 +58,7 @@ def main_trials(
 
 
 def anchor_trials(base: str, sentences: Sequence[str], videos: VideoNumbers) -> list[StudyTrial]:
-    """Return pairs of a condition and the same out of step; who watches prefers the one in step.
-
-    base      : the condition of which the anchor was made
-    sentences : one pair each, with the anchor second and first in turns
-    """
+    """Return pairs of a condition and the same out of step, for each sentence, second and first in turns."""
     trials = []
     for n, sentence in enumerate(sentences):
         pair = (videos[sentence, base], videos[sentence, ANCHOR])

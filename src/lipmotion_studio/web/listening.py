@@ -31,7 +31,6 @@ def serve(
 ) -> None:
     """Serve an application until the process is stopped; no client can keep it from serving the others.
 
-    place   : where connections come to, of ``open_socket``, at ``host``
     started : called with the address of the page once it can be opened
     """
     import uvicorn

@@ -133,10 +133,7 @@ def joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> Name
 
 
 def leads(chains: Chains, chain: int) -> tuple[int, ...]:
-    """Return the possible leads of a chain: by how many states it may be ahead of the first chain.
-
-    Empty for the first chain, and without a limit of asynchrony.
-    """
+    """Return by how many states a chain may be ahead of the first; empty: it is the first, or there is no limit."""
     limit = chains.structure.limit
     return () if limit is None or chain == 0 else tuple(range(-limit, limit + 1))
 
@@ -212,11 +209,7 @@ def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stre
 
 
 def _distance(inference: Inference, stream: int, row: int, mean: Array, variance: Array) -> float | None:
-    """Return how far an observation is from a Gaussian, in standard deviations (root mean square over dimensions).
-
-    mean, variance : of the Gaussian [shape=(D_s,)]
-    None: the stream was not observed in this frame.
-    """
+    """Return how far an observation is from a Gaussian, in standard deviations (RMS); None: it was not observed."""
     observed = inference.observations.observed[stream]
     if observed is not None and not observed[row]:
         return None
@@ -275,9 +268,8 @@ def _regression_name(structure: Structure, chain: int, regression_of_state: NDAr
 def _channel_values(
     model: CoupledModel, stream: VisualStream, means: Array, variances: Array
 ) -> Mapping[str, ChannelValue]:
-    """Return the values and standard deviations of the channels of a visual stream, by channel name.
-
-    means, variances : in the dimensions of the stream [shapes=(q,)]
+    """Return the values and standard deviations of the channels of a stream, by name, from its means and variances
+    [shape=(q,)].
     """
     space = model.space
     values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)

@@ -69,9 +69,6 @@ PREFIX = "joint_"
 class JointModel:
     """A joint model with the space of its motion.
 
-    units   : the unit of every phone
-    space   : the Q dimensions in which motion is modelled
-    hmm     : the joint model
     closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
     prior   : the table of articulation in the speaker's range (None: there is none)
     scaling : variance scaling about the rest pose (None: movements are not scaled)
@@ -156,9 +153,8 @@ class JointEngine(Engine[JointModel]):
         return Fit(self._with_filter(model, examples), {"frames": frames, **figures})
 
     def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
-        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``.
-
-        Raises as ``fit``.
+        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``. Raises
+        as that.
         """
         learning = self._learning(examples)
         classes = learning.units.classes()
@@ -286,11 +282,7 @@ class JointEngine(Engine[JointModel]):
 def _own_times(
     model: JointModel, observations: StreamObservations, units: Timeline[Unit], duration_s: float
 ) -> Timeline[Unit]:
-    """Return given units at the times that the model gives them by forced alignment.
-
-    Pauses that are shorter than the states of silence are left out. Units that do not fit into the recording keep the
-    times that they have.
-    """
+    """Return given units at the times that the model gives them by forced alignment."""
     least_s = model.hmm.inventory.states / FRAME_RATE_HZ
     spoken = [span for span in units if span.duration_s >= least_s or not is_silent(span.label.phone)]
     names = [model.units.unit_of(span.label) for span in spoken]

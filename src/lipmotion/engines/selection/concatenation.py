@@ -35,7 +35,6 @@ class Piece:
     """Units that were recorded in succession, and where they are used.
 
     first, stop : the phones of the target
-    unit        : the unit of the first phone; the others follow it in the inventory
     join        : kind of the join with the piece before: ``ABUTTING_JOIN``, ``JOIN_BEFORE`` or ``JOIN_AFTER``
     start_s     : time of that join in the target; the piece counts for half there
     overlap_s   : the pieces overlap from so much before this time to so much after it; 0 for a hard join
@@ -52,7 +51,6 @@ class Piece:
 def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
     """Return the pieces that a selection consists of, in order.
 
-    units : one for each phone of the target
     In one phone there is one overlap at most: where the search has two, the second join is of the next best kind.
     """
     kinds = [ABUTTING_JOIN]
@@ -131,10 +129,7 @@ class TimeMap:
 
     @classmethod
     def of(cls, inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> TimeMap:
-        """Return the map of a piece.
-
-        following : the piece after it (None: it is the last)
-        """
+        """Return the map of a piece."""
         first = piece.first - (piece.join == JOIN_BEFORE)
         stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
         shift = piece.unit - piece.first

@@ -59,10 +59,7 @@ ROUNDING_S = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class AcousticUnits(RecordedUnits):
-    """Units of which the sound is compared, not the motion.
-
-    acoustic : acoustic features of all recordings, one after the other [shape=(F, D)]
-    """
+    """Units of which the sound is compared, not the motion: features of all recordings in turn [shape=(F, D)]."""
 
     acoustic: Array
 
@@ -100,10 +97,7 @@ def typical_duration_s(inventory: RecordedUnits, phone: str) -> float:
 
 
 def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
-    """Return the timeline with the source of the unit of every phone as the name of its unit.
-
-    starts_s : start of every phone of the target
-    """
+    """Return the timeline with the source of the unit of every phone as the name of its unit."""
     return Timeline(
         tuple(
             replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))
@@ -227,10 +221,7 @@ class SelectionEngine(Engine[SelectionModel]):
 
 
 def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:
-    """Return the units that edited labels name, by the number of their phone in the target.
-
-    A label names a unit where both have one symbol: an edited phone is selected again.
-    """
+    """Return the units that edited labels name, by phone; those of another symbol than their phone are ignored."""
     if target.by_sound:
         return {}
     named = units_by_source(costs.inventory, (span.label.unit for span in units if span.label.unit))

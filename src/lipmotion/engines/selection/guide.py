@@ -21,12 +21,7 @@ NEW_SPEECH_EXPANSION = 1.05
 
 @dataclass(frozen=True, eq=False)
 class Guide:
-    """A predictor of motion, and how much narrower its predictions are than recorded motion.
-
-    predictor : of any kind
-    centre    : mean of the recorded motion [shape=(Q,)]
-    expansion : standard deviation of recorded by that of predicted motion [shape=(Q,)]
-    """
+    """A predictor of motion; mean of the motion [shape=(Q,)], and its deviation by that of predictions [shape=(Q,)]."""
 
     predictor: Predictor
     centre: Array
@@ -42,10 +37,7 @@ class Guide:
 
 
 def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequence[Array]) -> Guide:
-    """Return a guide.
-
-    values : motion of each example in the motion space [each shape=(T, Q)]
-    """
+    """Return a guide."""
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     predicted = np.concatenate([predictor.predict(e.speech)[0][e.valid] for e in examples])
     ratio = NEW_SPEECH_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
@@ -53,10 +45,7 @@ def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequenc
 
 
 def at_points(motion: Array, times_s: Array) -> Array:
-    """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)].
-
-    times_s : start and end of each phone [shape=(U, 2)]
-    """
+    """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)]."""
     start_s, end_s = times_s.T[:, :, None]
     points_s = start_s + FRACTIONS * (end_s - start_s)
     return interpolate_rows(motion, FRAME_RATE_HZ, points_s.ravel()).reshape(*points_s.shape, -1)

@@ -39,10 +39,7 @@ OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "sym
 
 
 def lip_reading_class(phone: str, invisible: Collection[str]) -> str:
-    """Return the class of a phone: ``protected``, ``invisible`` or ``normal``.
-
-    invisible : the phones that have no lip shape of their own
-    """
+    """Return the class of a phone: ``protected``, ``invisible`` or ``normal``."""
     if phone in PROTECTED_PHONES:
         return PROTECTED
     return INVISIBLE if phone in invisible else NORMAL

@@ -47,10 +47,7 @@ OLD_PREFIX = "store_"
 class SelectionModel:
     """Recorded phones with their motion, and what chooses among them.
 
-    motion    : turns motion in the motion space into that of all channels, with closures and limits
-    inventory : the recorded phones
     scale     : factors of the dimensions of motion in comparisons [shape=(Q,)]
-    rest      : the rest pose [shape=(Q,)]
     variances : of the error of static value, Δ and Δ² on recordings that were left out [shape=(3, Q)]
     guide     : predicts motion from the sound (None: the phones alone choose)
     phone_recogniser : recognises the phones of speakers that it was trained on (None: there was too little speech)
@@ -108,10 +105,8 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
 
 
 def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
-    """Deserialise a model.
-
-    filtered : there must be a modulation filter
-    Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
+    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: an array is missing or
+    wrong.
     """
     with format_errors("the model of recorded units"):
         if any(name.startswith(OLD_PREFIX) for name in arrays):

@@ -24,11 +24,7 @@ SETTLED_S = 0.06
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """The units that were chosen for a target.
-
-    units  : one for each phone of the target [shape=(U,)]
-    pieces : that they make
-    """
+    """The unit of each phone of a target [shape=(U,)], and the pieces that they make."""
 
     target: Target
     units: UnitNumbers
@@ -44,11 +40,7 @@ def motion_of_units(
     *,
     close: bool = False,
 ) -> tuple[Motion, ReducedVariance]:
-    """Return the motion of chosen units and its variance, as of ``LearnedMotion.generate``.
-
-    close : make the lips meet in every p, b and m
-    Raises InputError: as that.
-    """
+    """Return the motion of chosen units, lips closed if wanted, and its variance, as ``LearnedMotion.generate``."""
     frames = len(speech.features.values)
     track = concatenated(costs.inventory, chosen.target, chosen.pieces, frames)
     always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
@@ -69,7 +61,6 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
 
     It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
     silence there is no breath, as there may be in the silence that was recorded with the unit.
-    features : acoustic features [shape=(T, D)]
     always   : whether it is 1 in every silence, for no silence was recorded
     """
     silent = np.ones(len(features), bool) if always else find_digital_silence(features, units)

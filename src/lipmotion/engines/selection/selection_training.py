@@ -116,10 +116,8 @@ def fit_selection(
 
 
 def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
-    """Return the inventory of some examples.
-
-    values : motion of each in the motion space [each shape=(T, Q)]
-    Raises CorpusError: the motion of no phone of speech was measured throughout.
+    """Return the inventory of some examples, from motion in the motion space. Raises CorpusError: no phone was measured
+    whole.
     """
     timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = phone_windows(timelines)
@@ -151,11 +149,7 @@ def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Gu
 
 
 def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
-    """Return the factors of the dimensions in comparisons of motion [shape=(Q,)].
-
-    recorded : motion in the motion space [shape=(N, Q)]
-    A channel counts by its own deviation, a principal component by that of the first one.
-    """
+    """Return factors of dimensions in comparisons [shape=(Q,)]: a component counts by the deviation of the first."""
     deviations = np.maximum(recorded.std(axis=0), 1e-9)
     direct = len(space.direct)
     deviations[direct:] = deviations[direct:].max(initial=1e-9)
@@ -193,11 +187,7 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
 
 @dataclass(frozen=True, eq=False)
 class _LeftOut:
-    """What was chosen for a recording without its own units.
-
-    number : of its example
-    frames : whether motion, Δ and Δ² of each frame were measured [shape=(T,)]
-    """
+    """What was chosen for recording ``number`` without its own units, and the measured frames [shape=(T,)]."""
 
     number: int
     frames: NDArray[np.bool_]
@@ -218,11 +208,7 @@ def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence
 
 
 def _error_variances(left_out: Sequence[_LeftOut], costs: Costs, values: Sequence[Array], recorded: Array) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)].
-
-    values   : motion of all examples in the motion space [each shape=(T, Q)]
-    recorded : all measured motion [shape=(N, Q)]
-    """
+    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)], on motion in the motion space."""
     errors = []
     for out in left_out:
         original, chosen = values[out.number], out.chosen

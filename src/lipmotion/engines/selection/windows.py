@@ -121,10 +121,7 @@ class PhoneWindows:
 
 
 def covering(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
-    """Return phones in time without gaps, and without phones of no duration; at least one.
-
-    duration_s : of the recording
-    """
+    """Return phones in time without gaps, and without phones of no duration; at least one."""
     spans = tuple(span for span in close_gaps(units, duration_s) if span.duration_s > 0)
     return Timeline(spans or (Span(0.0, SHORTEST_S, Unit(SILENCE)),))
 

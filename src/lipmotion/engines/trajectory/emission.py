@@ -104,8 +104,6 @@ class Emission:
         """Return means and precisions [each shape=(N, 3, Q)] of N successive frames.
 
         rows     : the density of each frame [shape=(N,)]
-        features : acoustic features of the whole recording [shape=(T, D)]
-        frames   : the N frames of the recording
         """
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
         if self.regression is not None:
@@ -119,7 +117,6 @@ def add_acoustic_regression(
     """Add the regressions on the acoustic features to constant means, in place.
 
     means : of N frames [shape=(N, 3, Q)]
-    rows  : the density of each frame [shape=(N,)]
     z     : reduced acoustic features around each frame [shape=(N, F)]
     """
     used = regression.rows[rows]

@@ -68,13 +68,7 @@ class Experts:
 
     @cached_property
     def _share(self) -> Array:
-        """The share of the predictor in every frame, 0 to 1 [shape=(T,)].
-
-        It is ``network_share`` where training knows the phone in its context, and all where not; in the rest pose it is
-        less (``RESTING_SHARE``), and 0 for an unknown voice. Beside a predictor that uses the table of articulation
-        itself, contexts are not asked for. Phones that cannot be relied on leave all to the predictor; voices that
-        training does not know, most.
-        """
+        """The share of the predictor in every frame, 0 to 1 [shape=(T,)]."""
         familiarity = np.ones(len(self.rows))
         if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))

@@ -42,9 +42,7 @@ from lipmotion.units import UnitSet
 class TrajectoryModel:
     """Full-context hidden Markov models of motion.
 
-    units    : the unit of every phone
     space    : the Q dimensions in which motion is modelled
-    emission : densities of all tied states
     variance_factors : factors of variance scaling about the rest pose [shape=(Q,)]
     closure  : of the lips in p, b and m (None: the motion has no channel ``opening``)
     phone_recogniser : recognises the phones of speakers that it was trained on (None: there was too little speech)
@@ -105,8 +103,6 @@ def model_from_arrays(
 ) -> TrajectoryModel:
     """Deserialise a model.
 
-    layout : returns the states of phones and silences, for a unit set
-    units  : name of the unit set; the set itself is in the arrays
     filtered : there must be a modulation filter
     Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
     """

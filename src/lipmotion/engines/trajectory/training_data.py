@@ -56,7 +56,6 @@ class TrainingOptions:
 class TrainingClip:
     """One example, prepared for training.
 
-    speech   : of the example
     states   : full-context state of each frame [length T]
     frames   : int array [shape=(N,)], the frames that are valid and have valid neighbours
     rows     : float32 array [shape=(N, 3, Q)], static value, Δ and Δ² of the motion in these frames

@@ -84,11 +84,7 @@ def _frames(
     context: AcousticContext,
     owners: Sequence[_Node | None],
 ) -> Iterator[tuple[_Node, NDArray[np.float32], NDArray[np.float32]]]:
-    """Yield, block by block, the frames of each node with a regression.
-
-    Each item is the node, the reduced features around its frames [shape=(N, F)], and the motion in these frames minus
-    the mean of its density [shape=(N, 3·Q)].
-    """
+    """Yield, by blocks, each node with a regression, the features around its frames, and its motion less its mean."""
     numbers = {node: number for number, node in enumerate(dict.fromkeys(owners))}
     nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
@@ -210,7 +206,6 @@ def _share_of_predictor(
 ) -> float:
     """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
 
-    predictions : of each clip by predictors that were trained on the other folds [each shape=(T, Q)]
     direct      : number of channels that are modelled as they are; the weight is chosen for them
     The states are trained on the same folds. With a single clip, the predictor has all the weight.
     """
@@ -255,10 +250,7 @@ def _recorded_and_generated(
 
 
 def training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:
-    """Return an example prepared for training.
-
-    values : its motion in the motion space [shape=(T, Q)]
-    """
+    """Return an example prepared for training."""
     frames = np.nonzero(mark_known_dynamics(example.valid))[0]
     states = label_full_context(example.speech.units, len(values), layout)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
@@ -346,10 +338,7 @@ def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: Trainin
 def _rest_gaussian(
     clips: Sequence[TrainingClip], options: TrainingOptions, fallback: Array, overall: Array
 ) -> tuple[Array, Array]:
-    """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech.
-
-    Movements in these frames (breath, a lick of the lips) are not speech: Δ and Δ² have mean 0 and a small variance.
-    """
+    """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech."""
     poses = [
         clip.rows[number, 0]
         for clip in clips

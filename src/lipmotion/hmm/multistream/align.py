@@ -21,11 +21,7 @@ MIN_VARIANCE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class StatePath:
-    """The state of every frame.
-
-    states : those of the sequence of units
-    frames : [shape=(T,)], the number of the frame's state among them
-    """
+    """The states of a sequence of units, and which of them each frame has [shape=(T,)]."""
 
     states: TriphoneStates
     frames: NDArray[np.intp]
@@ -87,11 +83,7 @@ def check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
 def measure_durations(
     hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
 ) -> NDArray[np.float64]:
-    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)].
-
-    Utterances with fewer frames than states, or without a stream that is active in training, are left out. For a state
-    that never occurred they are those of the geometric distribution that its probability of staying gives.
-    """
+    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)]."""
     sums = np.zeros((len(hmm.log_stay), 3))
     for observed, units in utterances:
         active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)

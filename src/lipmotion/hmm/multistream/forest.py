@@ -130,7 +130,6 @@ def choose_positions(
 
     both_neighbours : in acoustic streams, all states ask about both; otherwise those before a unit's middle ask about
                       the left one, those after it about the right one, and the middle about none: fewer nodes to search
-    Motion, which is not searched, may always ask about both.
     """
     if stream == MOTION:
         return (0, 2) if unit in inventory.free else (0, 1, 2)

@@ -49,7 +49,6 @@ class Trajectory:
     """A generated trajectory.
 
     values, variance : [shape=(T, Q)], in units of the motion; the variance follows from the Gaussians
-    log_likelihoods  : of the trajectory with its dynamics, after every step of EM; they never fall
     """
 
     values: Array
@@ -92,9 +91,8 @@ def average_densities(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array)
 
 
 def average_path_densities(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
-    """Return one Gaussian for every frame, that of several equally probable paths (``JointRecogniser.draw_paths``).
-
-    Raises InputError: as ``average_densities``, or no paths, or of different lengths.
+    """Return one Gaussian for every frame, that of several equally probable paths. Raises InputError: as
+    ``average_densities``.
     """
     model, _, _ = _motion_gaussians(hmm)
     if not paths or len({len(path.frames) for path in paths}) > 1:
@@ -137,10 +135,7 @@ def solve_trajectory(
 
 
 def merge_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
-    """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)].
-
-    The Gaussians of a mixture are merged by their posteriors given the most probable trajectory, which EM finds.
-    """
+    """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)]."""
     if densities.log_weights.shape[1] == 1:
         return densities.means[:, 0], densities.precisions[:, 0]
     components = densities.log_components(solve_trajectory(densities).values)
@@ -167,9 +162,8 @@ def _solve(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int
 
 
 def _motion_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
-    """Return the model of motion, and means and weighted precisions of its leaves in its units [shape=(G, M, 3, Q)].
-
-    Raises InputError: there is none.
+    """Return the model of motion, its leaves' means and weighted precisions [shape=(G, M, 3, Q)]. Raises InputError:
+    none.
     """
     weight = hmm.config.synthesis.motion
     if MOTION not in hmm.models or not weight:

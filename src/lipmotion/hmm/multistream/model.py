@@ -91,7 +91,6 @@ class StreamModel:
 class JointHmm:
     """Models of all units, in several streams that share their transitions.
 
-    models    : of each stream, by name
     log_stay  : [shape=(R,)], log P(stay in the state) of every state without context (``Inventory.monophones``)
     durations : [shape=(R, 2)], mean and variance of each state's duration in the training's alignment, in frames
     spoken    : the units that occurred in training: those that recognition searches
@@ -106,10 +105,7 @@ class JointHmm:
     bigram: Bigram
 
     def standardise(self, observed: StreamObservations, weights: StreamWeights) -> dict[str, NDArray[np.float32]]:
-        """Return the active streams, standardised by their scales (``StreamScale.standardise``).
-
-        Raises InputError: none of them was observed, or one has other dimensions than the model's.
-        """
+        """Return the active streams, standardised. Raises InputError: none is there, or one has other dimensions."""
         active = [name for name in weights.active if name in observed.streams and name in self.models]
         if not active:
             raise InputError(
@@ -129,11 +125,7 @@ class JointHmm:
     def log_density(
         self, streams: Mapping[str, NDArray[np.float32]], leaves: Mapping[str, NDArray[np.intp]], weights: StreamWeights
     ) -> NDArray[np.float64]:
-        """Return the weighted sum of the streams' log densities of S states in every frame [shape=(T, S)].
-
-        streams : from ``standardise``
-        leaves  : of the states, in each stream [shape=(S,)]
-        """
+        """Return the weighted sum of the log densities of S states [shape=(T, S)], of standardised streams."""
         total = np.zeros((1, 1))
         for name, rows in streams.items():
             model = self.models[name]
@@ -178,10 +170,7 @@ context."""
 
 
 def joint_to_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
-    """Serialise a model; its configuration is not included.
-
-    precision : of means and variances; float32 keeps them exactly
-    """
+    """Serialise a model; its configuration is not included."""
     arrays: dict[str, NDArray[Any]] = {
         "units": np.array(hmm.inventory.names),
         "free": np.array(hmm.inventory.free),

@@ -30,7 +30,6 @@ Leaves = Mapping[str, NDArray[np.intp]]
 class PreparedUtterance:
     """The standardised streams of an utterance, and the S states of its units.
 
-    streams    : from ``StreamScale.standardise``, by name
     monophones : [shape=(S,)], the number of each state without context
     triphones  : [shape=(S,)], the number of each state in its context, in ``PreparedUtterances.triphones``
     distinct   : [shape=(N,)], the numbers in ``triphones``, each once
@@ -65,7 +64,6 @@ class PreparedUtterances:
 class StatePosteriors(NamedTuple):
     """The posteriors of the states of one utterance.
 
-    utterance : its number
     states    : [shape=(T, S)], the posterior of each state in every frame
     stay      : [shape=(S,)], expected number of transitions from each state to itself
     """
@@ -101,10 +99,7 @@ class StreamStatistics:
 def prepare_utterances(
     hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
 ) -> PreparedUtterances:
-    """Return utterances, given as observations and units, in the model's scale and states.
-
-    Raises InputError: an unknown unit.
-    """
+    """Return utterances in the model's scale and states. Raises InputError: an unknown unit."""
     index: dict[TriphoneState, int] = {}
     items = []
     for observed, units in utterances:
@@ -122,10 +117,7 @@ def prepare_utterances(
 
 
 def iterate_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[StatePosteriors]:
-    """Give the state posteriors of utterances, in order of their lengths.
-
-    Utterances with fewer frames than states, or without a stream that is active in training, are left out.
-    """
+    """Give the state posteriors of utterances by length; too short ones, or without an active stream, are left out."""
     leaves, log_move, weights = utterances.leaves(hmm), hmm.log_move, hmm.config.training
     usable = [i for i, item in enumerate(utterances.items) if item.fits and set(weights.active) & set(item.streams)]
     items = [utterances.items[i] for i in usable]
@@ -174,10 +166,7 @@ class _MixtureAccumulator:
 def accumulate_statistics(
     hmm: JointHmm, utterances: PreparedUtterances, posteriors: Iterator[StatePosteriors] | None = None
 ) -> StreamStatistics:
-    """Return the sufficient statistics of utterances (the E-step).
-
-    posteriors : of the states of the utterances; None: those under the model
-    """
+    """Return the sufficient statistics of utterances (E-step), with their state posteriors (None: the model's)."""
     triphones = {
         name: GaussianStatistics.zeros(len(utterances.triphones), 1, len(model.scale.mean))
         for name, model in hmm.models.items()

@@ -110,9 +110,8 @@ def grow_joint(
 def _start(
     utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig
 ) -> tuple[JointHmm, PreparedUtterances]:
-    """Return models without context, estimated from states of equal length inside known bounds, and the utterances.
-
-    Raises as ``grow_joint``.
+    """Return models without context, from states of equal length inside known bounds, and the utterances. Raises as
+    ``grow_joint``.
     """
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
@@ -161,10 +160,7 @@ def _make_equal_models(
 
 
 def _spread_states(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
-    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long.
-
-    positions : [shape=(S,)], the unit that each state belongs to
-    """
+    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long."""
     if bounds is None:
         return np.arange(frames) * len(positions) // frames
     path = np.empty(frames, np.intp)
@@ -217,9 +213,8 @@ def _tie_states(
 def _split(
     hmm: JointHmm, prepared: PreparedUtterances, held_out: PreparedUtterances, name: str, monitor: Monitor
 ) -> JointHmm | None:
-    """Return the models with the Gaussians of a stream split, and trained.
-
-    None: none has enough data to be split, or the likelihood of the held-out utterances does not rise.
+    """Return the models with a stream's Gaussians split, and trained; None: too little data, or no gain on held-out
+    speech.
     """
     model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared).leaves[name]
     if not model.tied.can_split(statistics):

@@ -43,7 +43,6 @@ SCORE = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 class OwnPhoneRecogniser:
     """The joint model as a recogniser of phones.
 
-    hmm            : the joint model; recognition uses its streams of speech and F0
     training_score : mean speaker similarity score of its training data
     """
 
@@ -73,7 +72,6 @@ def fit_phone_recogniser(
 ) -> OwnPhoneRecogniser | None:
     """Return a recogniser of phones that is trained on sound and motion, or None if there is too little speech.
 
-    values : motion of each example in the motion space [each shape=(T, Q)]
     Source: Hofer 2008, §4 to §6: all streams are trained together; those of speech and F0 are used in recognition.
     """
     spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))

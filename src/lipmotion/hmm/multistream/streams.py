@@ -21,10 +21,7 @@ ACOUSTIC_STREAMS = (SPEECH, *F0_STREAMS)
 
 @dataclass(frozen=True)
 class StreamWeights:
-    """Factors of the streams' log densities; 0 switches a stream off.
-
-    Raises InputError: a weight is negative or not finite.
-    """
+    """Factors of the streams' log densities; 0: off. Raises InputError: a weight is negative or not finite."""
 
     speech: float = 1.0
     f0: float = 1.0

@@ -41,9 +41,7 @@ extensions are accepted as well."""
 class GltfDocument:
     """The JSON of a glTF file, and its buffers.
 
-    json    : the document as it was written
     parts   : what is used of it, of the types and in the ranges of ``gltf_schema``
-    folder  : where the files are that the document names
     budget  : what has been read so far
     buffers : by number; a buffer that only the extension for compression could use is missing
     """
@@ -61,7 +59,6 @@ class GltfDocument:
     def linked(self, uri: str, kind: str) -> bytes:
         """Return what an address in the document stands for: bytes inside of it, or a file in the same folder.
 
-        kind : what it should be, for messages
         Raises InputError: no such file, a file elsewhere, too large, or damaged.
         """
         if uri.startswith("data:"):
@@ -275,7 +272,6 @@ DEEPEST_NESTING = 256
 class PlacedNode:
     """A node of a scene.
 
-    matrix : from its own frame to that of the scene [shape=(4, 4)]
     kinds  : the node of each kind of bone that it is or hangs on; of several, the one nearest to the root
     """
 

@@ -58,10 +58,8 @@ TURNING = (NECK, HEAD)
 class _Track:
     """Curves of one channel of an animation.
 
-    names  : of the S curves
     time_s : of the K keys
     keys   : values, with the tangents before and after where they are splines [shape=(K, S) or (K, 3, S)]
-    kind   : the interpolation
     """
 
     names: tuple[str, ...]

@@ -93,10 +93,7 @@ def decode_exponents(elements: Bytes) -> NDArray[np.float32]:
 
 
 def decode_indices(data: bytes, count: int) -> NDArray[np.uint32]:
-    """Return the numbers of a stream of indices without triangles [shape=(count,)].
-
-    Raises InputError: another version, or data that is too short.
-    """
+    """Return the vertices of a stream of indices [shape=(count,)]. Raises InputError: another version, or too short."""
     _check_header(data, INDICES, (0, 1))
     reader = _Reader(data, 1, len(data) - INDEX_TAIL)
     last = [0, 0]
@@ -206,10 +203,7 @@ class _Triangles:
 
 
 def decode_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
-    """Return the vertices of a stream of triangles [shape=(count,)]; ``count`` is three times their number.
-
-    Raises InputError: another version, or data that is too short.
-    """
+    """Return the vertices of a stream of triangles [shape=(count,)]. Raises InputError: another version, or short."""
     _check_header(data, TRIANGLES, (0, 1))
     cached_codes = 13 if data[0] & 15 else 15
     end = len(data) - TRIANGLE_TAIL

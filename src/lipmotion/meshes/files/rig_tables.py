@@ -149,9 +149,8 @@ def table_path(character: Path) -> Path:
 
 
 def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
-    """Return the rows of the table beside a character by its blendshapes; without limits: 0 to 1. None: no table.
-
-    Raises InputError: a damaged table, no such blendshape or curve, or a blendshape that occurs twice.
+    """Return the rows of the table beside a character by its blendshapes, None without one. Raises InputError: a
+    damaged table.
     """
     path = table_path(character)
     if not is_file(path):

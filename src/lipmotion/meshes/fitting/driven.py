@@ -108,11 +108,7 @@ def plain_row(control: str, source: str) -> RigRow:
 
 
 def list_rows(mesh: Mesh, shapes: FaceShapes | None, others: Mapping[str, str]) -> Iterator[RigRow]:
-    """Yield the rows of a table that change nothing: every blendshape of a mesh, with the curve that moves it.
-
-    shapes : of its mouth;  others : the curves of eyes and brows by blendshapes
-    Blendshapes that nothing moves have an empty source.
-    """
+    """Yield rows of a table that change nothing: every blendshape of a mesh, with its curve; an empty source: none."""
     for shape in mesh.shapes:
         solved = None if shapes is None else _find_solved_name(shape, shapes)
         source = others.get(shape.name, "")
@@ -130,10 +126,8 @@ def _find_solved_name(shape: Blendshape, shapes: FaceShapes) -> str | None:
 
 
 class DrivenPose(NamedTuple):
-    """What moves a character in one frame.
-
-    mouth  : weights of its blendshapes of the mouth [shape=(S,)], or displacements of points [shape=(52, 3)]
-    others : weights of its blendshapes of eyes and brows [shape=(S',)]
+    """What moves a character in one frame: weights of its mouth's shapes, or displacements of points [shape=(52, 3)],
+    and of others.
     """
 
     mouth: Array
@@ -225,10 +219,7 @@ class DrivenCharacter:
         return map(self.place_vertices, self.poses(motion, units, time_s, others))
 
     def place_vertices(self, pose: DrivenPose) -> Array:
-        """Return the vertices in a pose [shape=(V, 3)].
-
-        Raises InputError: the character has neither blendshapes of the mouth nor a binding.
-        """
+        """Return the vertices in a pose [shape=(V, 3)]."""
         of_mouth, of_others = self._displacements
         if self.shapes is not None:
             vertices = self.mesh.vertices.copy()
@@ -256,9 +247,8 @@ class DrivenCharacter:
         return known in others or (self.shapes is not None and known in self.shapes.known)
 
     def weigh_others(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
-        """Return the weights of the blendshapes of eyes and brows over time, by the mesh's names [each shape=(T,)].
-
-        others : weights of ARKit's blendshapes [each shape=(T,)]; those that are missing are 0;  count : of frames
+        """Return the weights of the blendshapes of eyes and brows over ``count`` frames, by the mesh's names; missing
+        ones are 0.
         """
         nothing = np.zeros(count)
         return {row.control: row.alone(others.get(row.source, nothing)) for row in self._other_rows}

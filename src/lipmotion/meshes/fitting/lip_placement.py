@@ -145,9 +145,8 @@ def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, i
 
 
 def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
-    """Return how a mesh hangs together whose lip points are named: its lips are apart, also where they touch.
-
-    Raises InputError: as ``place_lips_by_points``.
+    """Return how a mesh hangs together, its named lips apart even where they touch. Raises InputError: as
+    ``place_lips_by_points``.
     """
     _check_named(named, len(mesh.vertices))
     surface = build_surface(mesh)

@@ -72,10 +72,8 @@ PRESS_WEIGHT, UPPER_ROLL_WEIGHT, LOWER_ROLL_WEIGHT, TONGUE_WEIGHT = 0.2, 0.1, 0.
 
 @dataclass(frozen=True)
 class CurveCosts:
-    """What curves cost beside their distance from the targets.
-
-    ridge  : of the squared weights themselves, against shapes that move much to change little
-    smooth : of their squared second differences in time
+    """Costs of curves beside their targets: of squared weights (``ridge``), and of squared second differences
+    (``smooth``).
     """
 
     ridge: float = 1e-3
@@ -231,10 +229,7 @@ def _solve_free_weights(
 
 
 def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
-    """Return weights of blendshapes with lips at least as round as they are protruded [shape=(T, S)].
-
-    weights : as solved from the points [shape=(T, S)];  protrusion : 0 to 1 [shape=(T,)]
-    """
+    """Return weights with lips at least as round as they are protruded, 0 to 1 [shapes=(T, S), (T,)]."""
     result, template = weights.copy(), mouth_template()
     right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
     present = {row: full for name, full in ROUNDING.items() if (row := shapes.row(name)) is not None}
@@ -268,10 +263,7 @@ def _add_mood(weights: Array, mood: Array | None) -> Array:
 
 
 def expression_weights(moods: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the weights of VRM's expressions, 0 to 1, by their names [each shape=(T,)].
-
-    moods : how strong each mood is, 0 to 1 [each shape=(T,)]
-    """
+    """Return the weights of VRM's expressions for moods, 0 to 1, both by name [each shape=(T,)]."""
     weights: dict[str, Array] = {}
     for mood, strength in moods.items():
         for name, full in EXPRESSIONS[mood]:

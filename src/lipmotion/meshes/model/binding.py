@@ -90,9 +90,8 @@ class ControlBinding:
         return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
 
     def moved(self, mesh: Mesh, displacements: Array) -> Array:
-        """Return the vertices when control points are displaced [shape=(V, 3)].
-
-        displacements : one of each control point, eye distances, in the head frame of motion [shape=(C, 3)]
+        """Return the vertices [shape=(V, 3)] when control points are displaced, in eye distances, head frame [shape=(C,
+        3)].
         """
         matrices = np.tile(np.eye(3, 4), (len(displacements), 1, 1))
         matrices[:, :, 3] = self.placement.to_mesh(displacements)

@@ -72,9 +72,8 @@ ORDER = "YXZ"
 
 
 def head_quaternions(angles: Array) -> Array:
-    """Return rotations of a head as quaternions x, y, z, w [shape=(T, 4)]; neighbours are less than half a turn apart.
-
-    angles : of ``ANGLES`` [shape=(T, 3)]
+    """Return rotations of a head as quaternions x, y, z, w [shape=(T, 4)], near their neighbours, from ``ANGLES``
+    [shape=(T, 3)].
     """
     from scipy.spatial.transform import Rotation
 

@@ -57,7 +57,6 @@ class Budget:
     def file_bytes(self, path: Path, kind: str) -> bytes:
         """Return the content of a file, which counts.
 
-        kind : what it should be, for messages
         Raises InputError: no such file, not a file, empty, too large, or not readable.
         """
         check_source(path, kind)

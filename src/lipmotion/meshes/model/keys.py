@@ -78,10 +78,7 @@ def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Arr
 
 
 def place_keys(time_s: Array, rows: Array, stepped: Sequence[bool], thinning: Thinning) -> tuple[Array, Array]:
-    """Return the keys of evenly spaced rows, with straight lines between them: times and values.
-
-    time_s : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : as of ``with_jumps``
-    """
+    """Return times and values of keys, with straight lines between, of even rows; arguments as of ``with_jumps``."""
     all_s, all_rows = with_jumps(time_s, rows, stepped)
     chosen = thinning.choose(all_s, all_rows)
     return all_s[chosen], all_rows[chosen]

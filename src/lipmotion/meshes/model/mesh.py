@@ -20,7 +20,6 @@ OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
 class Material:
     """How a part of a mesh looks.
 
-    name     : any text, for people
     colour   : red, green and blue of the diffuse reflection, sRGB, 0 to 1
     gloss    : 0 is dull as cloth, 1 shines as a wet eye
     opacity  : 0 is clear as air, 1 hides what is behind
@@ -93,10 +92,7 @@ class Blendshape:
     def between(
         cls, name: str, neutral: NDArray[np.float64], shape: NDArray[np.float64], *, smallest: float = 0.0
     ) -> Blendshape:
-        """Return the blendshape that moves the vertices ``neutral`` to ``shape`` [shape=(V, 3), both].
-
-        smallest : vertices that move no further than this, in the unit of the mesh, are left where they are
-        """
+        """Return the blendshape that moves the vertices ``neutral`` to ``shape`` [shape=(V, 3), both]."""
         moved = shape - neutral
         rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > smallest)
         return cls(name, rows, moved[rows])
@@ -163,10 +159,7 @@ class Mesh:
         return tuple(shape.name for shape in self.shapes)
 
     def displacements(self, rows: NDArray[np.int64], names: Sequence[str] | None = None) -> NDArray[np.float64]:
-        """Return how far blendshapes move the vertices ``rows`` [shape=(N,)] at weight 1 [shape=(S, N, 3)].
-
-        names : of blendshapes that it has; None: all of them
-        """
+        """Return how far blendshapes move the vertices ``rows`` [shape=(N,)] at weight 1 [shape=(S, N, 3)]."""
         by_name = {shape.name: shape for shape in self.shapes}
         shapes = self.shapes if names is None else [by_name[name] for name in names]
         moved = np.zeros((len(shapes), len(rows), 3))

@@ -31,11 +31,7 @@ Figures = dict[str, Any]
 
 
 def power_of(components: Components, difference: float, raters: int, sentences: int) -> float:
-    """Return the probability that the test of ``crossed_mean`` tells a mean difference from 0, at the 5 % level.
-
-    Every rater judges every sentence; two raters and two sentences at least. Judgements are normal: mean squares are
-    then chi-squared, drawn with a fixed seed, and independent of the mean, whose probability is exact for each draw.
-    """
+    """Return the probability that the test of ``crossed_mean`` tells a mean difference from 0, at the 5 % level."""
     from scipy.special import ndtr, stdtrit
 
     rater, sentence, rest = components.rater / raters, components.sentence / sentences, components.residual
@@ -53,10 +49,7 @@ def power_of(components: Components, difference: float, raters: int, sentences: 
 
 
 def raters_needed(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
-    """Return the smallest number of raters that tells a difference with some power.
-
-    None: even ``MAX_RATERS`` do not; then the sentences are too few.
-    """
+    """Return the least number of raters that tells a difference; None: ``MAX_RATERS`` do not, for want of sentences."""
     low, high = 1, 2  # the power grows with the raters; one rater is no panel
     while power_of(components, difference, high, sentences) < power:
         low, high = high, 2 * high

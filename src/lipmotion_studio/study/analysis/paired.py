@@ -76,10 +76,7 @@ def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
 
 
 def link_groups(comparisons: Array) -> list[list[int]]:
-    """Return the groups of conditions that are linked by comparisons.
-
-    comparisons : how often i was compared with j, in this order [shape=(C, C)]
-    """
+    """Return the groups of conditions that are linked by comparisons [shape=(C, C)]."""
     from scipy.sparse.csgraph import connected_components
 
     count, labels = connected_components(comparisons, directed=False)
@@ -155,9 +152,7 @@ ALL_EQUAL = "raters, all agree"
 class PairTable:
     """Answers to paired comparisons, N of them.
 
-    conditions, raters, sentences : their names, in alphabetical order
     shown    : which conditions were shown first and second [shape=(N, 2)]
-    is_first : whether the first was preferred [shape=(N,)]
     rater, sentence : of each answer [shape=(N,)]
     """
 
@@ -202,10 +197,7 @@ class PairTable:
 
 
 def pair_table(answers: Sequence[Answer]) -> PairTable:
-    """Return the table of answers to paired comparisons.
-
-    Raises InputError: a condition is compared with itself, or with nothing.
-    """
+    """Return the table of answers to paired comparisons. Raises InputError: a condition meets itself, or nothing."""
     for answer in answers:
         if not answer.other or answer.other == answer.condition:
             raise InputError(
@@ -288,10 +280,7 @@ def binomial_p(wins: int, count: int) -> float:
 
 
 def consistency(table: PairTable) -> Figures:
-    """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice.
-
-    Chance alone gives one half, and so do conditions that look alike.
-    """
+    """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice."""
     agreed = order_agreement(table)
     count = int(agreed[:, 1].sum())
     share = float(agreed[:, 0].sum() / count) if count else np.nan
@@ -343,10 +332,7 @@ def strength_figures(table: PairTable) -> Figures:
 
 
 def share_components(table: PairTable) -> Components | None:
-    """Return the mean variances of the effects on shares over all pairs, each divided by that of one answer.
-
-    None: they cannot be told apart in any pair, or all its answers agree.
-    """
+    """Return the mean variances of effects on shares, by that of one answer; None: they cannot be told apart."""
     found = []
     for _, _, cells in _pair_cells(table):
         share = crossed_mean(cells, 1.0)

@@ -24,7 +24,6 @@ class RatingTable:
     """The judgements on one scale.
 
     values : mean judgement of each rater of each sentence in each condition; NaN where there is none [shape=(C, R, S)]
-    count  : of the judgements
     scale  : lowest and highest value
     """
 
@@ -68,10 +67,7 @@ def rating_table(answers: Sequence[Answer]) -> RatingTable:
 
 
 def rating_figures(table: RatingTable, baseline: str | None) -> Figures:
-    """Return the figures of one scale: means, differences of all pairs, improvement relative to a baseline.
-
-    baseline : condition to which the others are relative; None: that with the lowest mean
-    """
+    """Return means, differences of all pairs, and improvement on a baseline (None: the lowest mean) of one scale."""
     means = []
     for number, name in enumerate(table.conditions):
         values = table.of(name)

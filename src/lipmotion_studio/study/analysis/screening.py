@@ -44,11 +44,7 @@ RULES = {
 
 @dataclass(frozen=True)
 class Screening:
-    """Which raters are left out, and why.
-
-    raters : all of them
-    found  : for each that is left out, what was found, by rule
-    """
+    """All raters, and for each that is left out what was found, by rule."""
 
     raters: tuple[str, ...]
     found: Mapping[str, Mapping[str, str]]
@@ -139,10 +135,7 @@ def _check_sides(mine: Sequence[Answer]) -> str:
 
 
 def _find_fast(answers: Sequence[Answer]) -> dict[str, str]:
-    """Return the raters who are too fast, with what share of the usual time they took.
-
-    A rater's time is the median logarithm of the time for an answer over the usual time for the same question.
-    """
+    """Return raters too fast, with their share of the usual time: the median over answers, in logarithms."""
     timed = [each for each in answers if 0 < each.seconds < np.inf]
     logs: dict[tuple[str, str], list[float]] = {}
     for each in timed:

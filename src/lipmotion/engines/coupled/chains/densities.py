@@ -39,9 +39,8 @@ class AudioVisualObservations:
     def with_stream(
         self, stream: int, values: Single, observed: NDArray[np.bool_] | None = None
     ) -> AudioVisualObservations:
-        """Return the observations with other values of one stream [shape=(T, D_s)].
-
-        observed : in which frames these values were observed [shape=(T,)]; None: in all
+        """Return the observations with other values of a stream [shape=(T, D_s)], observed in these frames
+        [shape=(T,)].
         """
         streams, masks = list(self.streams), list(self.observed)
         streams[stream], masks[stream] = values, observed
@@ -52,7 +51,6 @@ class AudioVisualObservations:
 class StreamGroup:
     """The emission densities of one or more streams that share their mixture components.
 
-    streams  : the numbers of the streams
     columns  : for each of these streams, its columns among the D dimensions of the mixtures
     mixtures : G densities over all of these streams
     weights  : the exponent of each stream's density

@@ -27,10 +27,7 @@ VISIBLE_FRAMES = 10
 
 @dataclass(frozen=True, eq=False)
 class FactorialProduct:
-    """Two chains, each of which may be in any of its states; joint state = first chain's state · N_1 + second's.
-
-    grammar : each chain has its own
-    """
+    """Two chains, each of which may be in any of its states; joint state = first chain's state · N_1 + second's."""
 
     structure: Structure
     grammar: Grammar
@@ -209,10 +206,7 @@ def factorial_lattice(
 
 
 def _visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the units of the second chain that each frame may belong to [shape=(T, V)].
-
-    These correspond to the units of the first chain [shape=(T, U)] that are allowed within 100 ms.
-    """
+    """Return the units of the second chain that correspond to those allowed within 100 ms [shape=(T, V)]."""
     padded = np.pad(allowed_units.astype(np.intp), ((VISIBLE_FRAMES + 1, VISIBLE_FRAMES), (0, 0)))
     total = np.cumsum(padded, axis=0)
     near = (total[2 * VISIBLE_FRAMES + 1 :] - total[: -2 * VISIBLE_FRAMES - 1]) > 0

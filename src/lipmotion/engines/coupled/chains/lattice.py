@@ -46,16 +46,12 @@ class Lattice(ABC):
     def posteriors(self, transitions: Any, logs: Sequence[Single]) -> LatticePosteriors:
         """Return the posteriors of states, by the forward–backward algorithm.
 
-        transitions : of the chains that the lattice belongs to
         logs        : log densities of each stream group [each shape=(T, G')]
         """
 
     @abstractmethod
     def best_path(self, transitions: Any, logs: Sequence[Single]) -> tuple[Index, float]:
-        """Return the most probable path of joint states [shape=(T,)] and its log probability (-inf: there is no path).
-
-        Arguments as in ``posteriors``.
-        """
+        """Return the most probable path of joint states [shape=(T,)] and its log probability (-inf: there is none)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,7 +87,6 @@ def network_lattice(
 ) -> NetworkLattice:
     """Return the lattice of the joint states whose units are allowed in some frame.
 
-    ties          : for each stream group, the density of each joint state [each shape=(S,)]
     allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
     """
     product = transitions.product
@@ -130,7 +129,6 @@ class Chains:
     """Chains of hidden states with their transitions and emission densities.
 
     streams     : the names of the streams; the first is speech
-    transitions : with the product of the chains
     groups      : the stream groups; speech is in the first
     """
 
@@ -159,10 +157,7 @@ class Chains:
         return self._lattice(None)
 
     def lattice(self, allowed_units: NDArray[np.bool_]) -> Lattice:
-        """Return the lattice of the joint states that an utterance may be in.
-
-        allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]
-        """
+        """Return the lattice of the joint states that an utterance may be in, given allowed units [shape=(T, U)]."""
         return self._lattice(allowed_units)
 
     def _lattice(self, allowed_units: NDArray[np.bool_] | None) -> Lattice:

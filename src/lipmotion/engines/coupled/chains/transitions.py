@@ -84,9 +84,8 @@ class Transitions:
         return current
 
     def tied(self, frames: NDArray[Any]) -> Transitions:
-        """Return the transitions with one shared row for rare joint states of the same own state and asynchrony.
-
-        frames : number of frames spent in each joint state [shape=(S,)]
+        """Return the transitions with one shared row for joint states, of an own state and asynchrony, with few frames
+        [shape=(S,)].
         """
         rows, advance = [], []
         for chain, own in enumerate(self.rows):
@@ -104,10 +103,8 @@ class Transitions:
         return np.where(self.product.moves[chain], advance, 1 - advance)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
-        """Return the transitions after one step of iterative scaling of one chain's table.
-
-        counts   : of each arc [shape=(E,)]
-        expected : what the present tables expect instead of the counts [shape=(E,)]
+        """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs
+        [shape=(E,)].
         """
         row, moves = self.rows[chain][self.product.arc_from], self.product.moves[chain]
         size = len(self.advance[chain])

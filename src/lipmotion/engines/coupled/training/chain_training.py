@@ -34,7 +34,6 @@ CONVERGENCE_GAIN = 0.02
 class TrainingStep:
     """One step of EM.
 
-    mixtures       : Gaussians per density of each stream group
     log_likelihood : mean log likelihood per frame before the step
     """
 
@@ -54,7 +53,6 @@ class MixtureSchedule:
     """How many Gaussians densities get, and how many steps of EM.
 
     mixtures   : Gaussians per density of each stream group in the end, powers of two
-    weights    : exponents of the streams
     most_steps : greatest number of EM steps between one splitting and the next
     """
 
@@ -102,7 +100,6 @@ def train_to_convergence(
     """Return the result of EM with a fixed number of components.
 
     floors      : the least variance of each stream [each shape=(D_s,)]
-    most_steps  : greatest number of steps; fewer if the likelihood stops rising
     speech_only : re-estimate the densities of speech, and keep all else
     """
     streams = range(1 if speech_only else len(chains.streams))

@@ -32,10 +32,7 @@ FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
 
 @dataclass(frozen=True, eq=False)
 class LatticeUtterance:
-    """The observations of an utterance, and the joint states that it may be in.
-
-    weight : how often the utterance counts
-    """
+    """The observations of an utterance, the joint states that it may be in, and how often it counts."""
 
     observations: AudioVisualObservations
     lattice: Lattice
@@ -43,10 +40,7 @@ class LatticeUtterance:
 
 
 def lattice_utterance(chains: Chains, utterance: AlignedUtterance, weight: float = 1.0) -> LatticeUtterance:
-    """Return an utterance with the joint states that its phone labels allow.
-
-    weight : how often the utterance counts
-    """
+    """Return an utterance, which counts ``weight`` times, with the joint states that its phone labels allow."""
     allowed = allowed_units(chains.structure, utterance.phones, utterance.observations.frames)
     return LatticeUtterance(utterance.observations, chains.lattice(allowed), weight)
 
@@ -55,7 +49,6 @@ def lattice_utterance(chains: Chains, utterance: AlignedUtterance, weight: float
 class ChainStatistics:
     """Sufficient statistics of chains, accumulated over utterances by their weights.
 
-    emissions         : of each stream group
     transition_counts : of the transitions [shape=(C,)]
     log_likelihood, frames : of the utterances that have a path through the chains
     """
@@ -107,8 +100,6 @@ def m_step(
     """Return the chains that maximise the expected log likelihood.
 
     floors      : the least variance of each stream [each shape=(D_s,)]
-    streams     : the streams whose densities are re-estimated
-    transitions : whether transitions are re-estimated
     """
     groups = [
         reestimated_group(group, own, [floors[s] for s in group.streams], LEAST_FRAMES, streams)

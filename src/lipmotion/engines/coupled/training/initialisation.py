@@ -59,10 +59,7 @@ def with_joint_state_densities(
 
 
 def _unlimited(transitions: Transitions, structure: Structure, frequent: NDArray[np.intp]) -> FactorialTransitions:
-    """Return transitions of independent chains: the probability of moving on is the mean over joint states.
-
-    frequent : joint states with densities of their own, as the states of both chains [shape=(P, 2)]
-    """
+    """Return transitions of independent chains, which move on with the mean probability of joint states."""
     product = transitions.product
     first, second = (
         _mean_by_state(product.chain_states[chain], advance[rows], count)
@@ -74,12 +71,7 @@ def _unlimited(transitions: Transitions, structure: Structure, frequent: NDArray
 
 
 def _mean_by_state(states: NDArray[np.intp], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return the mean of the values of the joint states that have each state of a chain [shape=(N,)].
-
-    states : the chain's state in each joint state [shape=(S,)]
-    values : of the joint states [shape=(S,)]
-    count  : the number of the chain's states, N
-    """
+    """Return the mean, for each of ``count`` states, of the values [shape=(S,)] of the joint states that have it."""
     return np.bincount(states, values, count) / np.maximum(np.bincount(states, minlength=count), 1)
 
 
@@ -96,8 +88,6 @@ def initial_chains(
 ) -> Chains:
     """Return chains with one Gaussian for each density, learned by Viterbi training.
 
-    streams : the names of the streams
-    weights : the exponents of the streams
     floors  : the least variance of each stream [each shape=(D_s,)]
     A structure without a limit of asynchrony has one, ``start_limit``, during the Viterbi training.
     """
@@ -184,10 +174,8 @@ def _reestimated_along(
 def _with_borrowed_densities(
     group: StreamGroup, learned: NDArray[np.bool_], structure: Structure, chain: int
 ) -> StreamGroup:
-    """Return the group in which states without data have the densities of the unit that is most similar to theirs.
-
-    learned : whether each density had data [shape=(G,)]
-    chain   : the chain of the group
+    """Return the group in which states without data have the densities of the most similar unit (``learned``
+    [shape=(G,)]).
     """
     units, unit_set = structure.units[chain], structure.chains[chain]
     source = np.arange(len(learned))
