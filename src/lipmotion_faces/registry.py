@@ -24,7 +24,10 @@ FACES: Registry[type[Face]] = Registry(
 
 
 def make_face(name: str = "portrait") -> Face:
-    """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md)."""
+    """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md).
+
+    Raises InputError: none of that name, a drawing that cannot be used, or what an installed package adds is no face.
+    """
     if name.lower().endswith(".svg"):
         from lipmotion_faces.portrait.layered import LayeredFace
 

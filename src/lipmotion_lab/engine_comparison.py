@@ -176,6 +176,7 @@ def engines(
     The phones in time are those of the trajectory engine's phone models, for all of them.
     Raises CorpusError: no training list, no utterances of this split or some of the training list among them, or
     motion without an opening.
+    Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
     """
     held_out = corpus.required(split)
     check_training_names(corpus, corpus.required("train"), held_out)

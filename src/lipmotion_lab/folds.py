@@ -93,6 +93,8 @@ def folds(
     The figures are those of one split of all clips, not means over parts. The threshold of a closed mouth is that of
     the whole training list, for all parts alike.
     Raises InputError: fewer than two parts, or more than utterances, or than speakers.
+    Raises CorpusError: no training list, or motion without an opening.
+    Raises AlignmentError: a transcript does not fit its recording.
     """
     names = corpus.required("train")
     groups: list[tuple[str, ...]] = [(name,) for name in names]  # of what is never divided

@@ -56,6 +56,7 @@ def learning_curve(
     the utterances of the split.
     Raises InputError: sizes under 1 or over the list, or an empty list.
     Raises CorpusError: names that are not in the corpus, twice in the list or in the split; no utterances of this
+    split; or motion without an opening.
     """
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), settings.seed)
     held_out = corpus.required(split)

@@ -191,6 +191,8 @@ def minnis2000(
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
     the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/test_minnis2000.py).
+    Raises CorpusError: no utterances to train on or of ``test``, or motion without an opening.
+    Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
     """
     splits = [split for split in ("val", "test") if split == "test" or corpus.names(split)]
     lists = {split: corpus.required(split) for split in splits}

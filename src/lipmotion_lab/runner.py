@@ -85,6 +85,7 @@ def train_and_generate(
     """Train the default engine on the utterances ``names``; return the ``channels`` it generates for ``held_out``.
 
     The names are sorted, so their order does not matter: all names of a list give the model of ``lipmotion train``.
+    Raises as ``train`` and ``evaluate``.
     """
     monitor, lexicon = settings.monitor, settings.lexicon
     start_s = perf_counter()

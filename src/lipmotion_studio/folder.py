@@ -154,7 +154,7 @@ class ProjectFolder:
 
     @contextmanager
     def check_out(self, number: int, revision: int) -> Iterator[ProjectRecording]:
-        """Give a recording to be changed by somebody who saw this revision; nobody else changes it in the meantime."""
+        """Give a recording, seen at this revision, to be changed. Raises RevisionError: changed. InputError: gone."""
         with self.lock:
             recording = self.recording(number)
             check_revision("the recording", revision_of(recording, self.summary(recording)), revision)
@@ -457,7 +457,10 @@ def _is_new(source: Path) -> bool:
 
 @contextmanager
 def open_folder(source: Path | None, out: Path | None = None) -> Iterator[ProjectFolder]:
-    """Open the project of ``project_path``, created if needed, with the recordings of the source."""
+    """Open the project of ``project_path``, created if needed, with the recordings of the source.
+
+    Raises ExportError: another process works on it, or it cannot be written.  Raises InputError: it cannot be read.
+    """
     path = project_path(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with lock_folder(path):

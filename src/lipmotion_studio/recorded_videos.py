@@ -79,7 +79,7 @@ def _correlate(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 
 def write_playable(video: Path, sound: Path, path: Path) -> None:
-    """Write a video as browsers play it, with the sound of a recording. Raises InputError: it cannot be read."""
+    """Write a video as browsers play it, with a recording's sound. Raises InputError, ExportError."""
     frames, rate_hz = read_video_frames(video)
     even = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame in frames)
     write_mp4(path, even, fps=rate_hz, audio=read_sound(sound))

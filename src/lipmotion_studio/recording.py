@@ -261,7 +261,10 @@ class OpenRecording:
         write_mp4(path, pictures, fps=DRAWN_HZ, audio=sound)
 
     def write_film(self, path: Path, start_s: float, end_s: float, person: ShownPerson) -> None:
-        """Write a stretch as a video of a filmed face: its pictures are those of the full video."""
+        """Write a stretch as a video of a filmed face: its pictures are those of the full video.
+
+        Raises InputError: as ``write_video``, or edits ask for what a filmed face cannot do.
+        """
         performance = self.performance(person)
         person.check(performance.settings)
         person.check_video(path, performance.settings)

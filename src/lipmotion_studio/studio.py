@@ -282,7 +282,10 @@ class Studio:
         return True
 
     def mark(self, number: int, revision: int, mark: str) -> dict[str, Any]:
-        """Mark a recording as its edits are now; return its row."""
+        """Mark a recording as its edits are now; return its row.
+
+        Raises InputError: no such mark, or its edits are damaged. RevisionError: somebody else has changed it.
+        """
         with self.folder.check_out(number, revision) as recording:
             self.folder.has_edits(recording)  # which is refused where they are damaged
             marked = replace(recording, mark=mark, marked=self.folder.summary(recording).digest)
@@ -311,7 +314,7 @@ class Studio:
         return self._videos[sound]
 
     def prepare_video(self, number: int) -> tuple[Path, str]:
-        """Return the path of a recording's real video as browsers play it, and its media type."""
+        """Return path and media type of a recording's video for browsers. Raises HTTPException: none. InputError."""
         video, _ = self.find_video(number) or (None, 0.0)
         if video is None or not video.is_file():
             raise HTTPException(404, "the recording has no video")

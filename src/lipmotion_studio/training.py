@@ -86,6 +86,7 @@ class TrainingOrder:
 def run_training(order: TrainingOrder, report: Report) -> None:
     """Make what is ordered; report its progress, warnings, recordings that are not used, and how it ended.
 
+    A report is one of ``stage`` with ``share`` (0 to 1), ``warning``, ``skipped`` or ``noted`` with ``reason``, and at
     the end ``report`` or ``error``.
     """
 

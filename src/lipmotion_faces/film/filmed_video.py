@@ -190,7 +190,10 @@ def face_codes(
     rate_hz: float,
     eigenlips: Eigenlips | None = None,
 ) -> FaceCodes:
-    """Return what the lower face is like in ``count`` frames at the rate of a video."""
+    """Return what the lower face is like in ``count`` frames at the rate of a video.
+
+    Raises InputError: motion without the channels that the face needs.
+    """
     time_s = np.arange(count) / rate_hz
     values, contact = motion.at(time_s), None
     if "opening" in motion.names and np.isfinite(motion.values).all():

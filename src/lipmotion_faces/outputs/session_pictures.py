@@ -21,7 +21,6 @@ from lipmotion_faces.registry import stage_face
 class SessionPictures:
     """Pictures of drawn faces with the motion of a session; what of a face does not move is painted once.
 
-
     >>> import lipmotion
     >>> pictures = lipmotion.SessionPictures(lipmotion.Session("examples/welcome.flac"))
     >>> pictures.picture(1.2, lipmotion.Edits().then("set size 64")).shape

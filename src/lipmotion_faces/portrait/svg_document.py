@@ -85,6 +85,7 @@ class Drawing:
 def read_drawing(path: Path) -> Drawing:
     """Return the drawing in an ``.svg`` file.
 
+    Raises InputError: no such file, no SVG, something that is not read, a reference to outside of the file, or more
     than a drawing may hold.
     """
     try:

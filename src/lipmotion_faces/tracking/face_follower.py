@@ -119,6 +119,7 @@ class FaceFollower:
     The mesh finds a face that takes a fifth of the picture or more; smaller ones are found by the full-range detector
     and followed in a window.
     person  : thumbnails of the person who is to be followed; without any, it is the one with the most frames
+    Raises InputError: no tracker of that name.
     """
 
     def __init__(self, person: Sequence[Array] = (), tracker: str = MEDIAPIPE) -> None:

@@ -86,6 +86,7 @@ def footage_frames(footage: Footage, start: int = 0, stop: int | None = None) ->
     Each is a uint8 array [shape=(H, W, 3)], RGB: the picture whose time is nearest to that of the frame, which is shown
     again where pictures were dropped. One picture is in memory at a time; the file is open until the iterator is
     exhausted or closed. The beginning is sought in the file.
+    Raises InputError: no such frames, or the video cannot be read or has changed since it was tracked.
     """
     stop = len(footage) if stop is None else stop
     if not 0 <= start <= stop <= len(footage):
@@ -97,6 +98,7 @@ def footage_groups(footage: Footage, most_bytes: int = MAX_DECODED_BYTES) -> Fra
     """Return access to the frames of a tracked video in any order, also backwards, in bounded memory.
 
     most_bytes : decoded frames that are kept
+    Reading a frame raises InputError: the video cannot be read, or has changed since it was tracked.
     Cost: forwards each picture is decoded once; backwards, those between the video's own key frame and a group of up to
     ``GROUP`` frames are decoded again for every group. A video that is played backwards often is better copied into a
     ``storage.coded_video.StoredVideo``.
@@ -171,6 +173,7 @@ def read_video_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
     """Return the frames of a video in constant order, and their rate; no face is looked for.
 
     Each is a uint8 array [shape=(H, W, 3)], RGB: the last picture that begins at or before the time of the frame. The
+    video must be read to its end, or the iterator be closed.
     Raises InputError: no such video, or one that states no frame rate.
     """
     with open_video(path) as video:

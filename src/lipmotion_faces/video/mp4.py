@@ -28,7 +28,10 @@ LARGEST_PACKET_BYTES = 1 << 24
 
 
 def append_xmp(path: Path, packet: str) -> None:
-    """Append a packet to an mp4 file; nothing in the file moves, so all its offsets remain valid."""
+    """Append a packet to an mp4 file; nothing in the file moves, so all its offsets remain valid.
+
+    Raises ExportError: the file does not consist of whole boxes, or the packet is too large.
+    """
     content = packet.encode()
     if len(content) > LARGEST_PACKET_BYTES:
         raise ExportError(f"{path}: XMP metadata of {len(content)} bytes, at most {LARGEST_PACKET_BYTES} are possible")

@@ -64,6 +64,7 @@ def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
     """Write frames as numbered pictures; a name like ``frame%05d.png`` says where the number, from 0 on, is put.
 
     frames : RGB or RGBA with straight alpha [shape=(H, W, 3 or 4)], at least one; taken one at a time
+    Each file is whole or not there. Raises ExportError: no frames, unsuitable frames, or a file cannot be written.
     """
     from PIL import Image
 

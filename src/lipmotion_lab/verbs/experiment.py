@@ -59,6 +59,7 @@ def run_experiment(
     """Call ``experiment(corpus, work=…, settings=…)``, print its table, and give its figures with their stamp.
 
     ``work`` is a folder of finished parts, from which a second run goes on; None without an output, and not
+    ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.files import unfinished_work

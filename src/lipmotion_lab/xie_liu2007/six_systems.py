@@ -131,6 +131,8 @@ def xieliu2007(  # noqa: PLR0913
     Gaussians, and whether they are better than those printed, with systems of the size itself.
     Raises InputError: no such system, or sizes that the list does not have.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
+    Raises MissingDependencyError: a system or the pictures need a package that is not installed.
+    Raises ExportError: the pictures cannot be written.
     """
     names, seed = select_systems(options.systems), settings.seed
     check_visual(options.visual)

@@ -62,8 +62,7 @@ MIN_REGION_PX = 16
 
 @dataclass(frozen=True)
 class Region:
-    """A part of pictures, as shares of their width and height, from the upper left corner.
-
+    """A part of pictures, as shares from the upper left. Raises InputError: not inside.
 
     >>> Region.parsed("0.25,0.5,0.5,0.4")
     Region(left=0.25, top=0.5, width=0.5, height=0.4)

@@ -219,7 +219,7 @@ class DrivenCharacter:
         return map(self.place_vertices, self.poses(motion, units, time_s, others))
 
     def place_vertices(self, pose: DrivenPose) -> Array:
-        """Return the vertices in a pose [shape=(V, 3)]."""
+        """Return the vertices in a pose [shape=(V, 3)]. Raises InputError: no blendshapes of the mouth, no binding."""
         of_mouth, of_others = self._displacements
         if self.shapes is not None:
             vertices = self.mesh.vertices.copy()
