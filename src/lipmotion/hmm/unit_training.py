@@ -132,10 +132,6 @@ class _Training:
             self._done, self._sequences = int(arrays["done"]), [tuple(s.split()) for s in arrays["said"].tolist()]
             stored = {name: array for name, array in arrays.items() if name not in ("done", "said")}
             self._hmm = hmm_from_arrays(stored, config)
-        self._stages = self._list_stages(config)
-        self._total = sum(stage.steps for stage in self._stages)
-
-    def _list_stages(self, config: HmmConfig) -> list[_Stage]:
         steps = config.iterations
         stages = [
             _Stage("flat start", None, baum_welch, 2 * steps),
@@ -146,12 +142,13 @@ class _Training:
         while count < config.mixtures and frames >= 2 * count * FRAMES_A_GAUSSIAN * config.states * len(units):
             count *= 2
             stages.append(_Stage(f"{count} Gaussians", self._split, baum_welch, steps))
-        return [
+        self._stages = [
             *stages,
             _Stage("pronunciations again", self._choose_pronunciations, baum_welch, steps),
             _Stage("states in context", self._add_contexts, adapt_contexts, 0),
             _Stage("contexts", None, adapt_contexts, steps),
         ]
+        self._total = sum(stage.steps for stage in self._stages)
 
     def run(self) -> UnitHmm:
         """Take all steps that are not done yet; return the models."""

@@ -123,19 +123,15 @@ def improve_transform(
         for row in range(len(result)):
             columns = np.flatnonzero(free[row])
             cofactors = np.append(np.linalg.inv(result[:, :-1])[:, row], 0.0)
-            result[row, columns] = _best_row(result[row], columns, cofactors, statistics, row)
+            old = result[row]
+            fixed = np.where(np.isin(np.arange(len(old)), columns), 0.0, old)
+            inverse = np.linalg.inv(statistics.quadratic[row][np.ix_(columns, columns)])
+            target = (statistics.linear[row] - statistics.quadratic[row] @ fixed)[columns]
+            volume, offset = cofactors[columns], float(cofactors @ fixed)
+            # α maximises β log|α·a + b + offset| − α²·a / 2
+            a, b = float(volume @ inverse @ volume), float(volume @ inverse @ target) + offset
+            root = np.sqrt(b * b + 4 * a * statistics.count)
+            alphas = np.array([(-b + root) / (2 * a), (-b - root) / (2 * a)])
+            values = statistics.count * np.log(np.abs(alphas * a + b)) - alphas * alphas * a / 2
+            result[row, columns] = np.asarray((alphas[int(values.argmax())] * volume + target) @ inverse)
     return result
-
-
-def _best_row(old: Array, columns: NDArray[np.intp], cofactors: Array, statistics: AffineStatistics, row: int) -> Array:
-    """Return the best values of some columns of a row, given the other columns, and the cofactors of the other rows."""
-    fixed = np.where(np.isin(np.arange(len(old)), columns), 0.0, old)
-    inverse = np.linalg.inv(statistics.quadratic[row][np.ix_(columns, columns)])
-    target = (statistics.linear[row] - statistics.quadratic[row] @ fixed)[columns]
-    volume, offset = cofactors[columns], float(cofactors @ fixed)
-    # α maximises β log|α·a + b + offset| − α²·a / 2
-    a, b = float(volume @ inverse @ volume), float(volume @ inverse @ target) + offset
-    root = np.sqrt(b * b + 4 * a * statistics.count)
-    alphas = np.array([(-b + root) / (2 * a), (-b - root) / (2 * a)])
-    values = statistics.count * np.log(np.abs(alphas * a + b)) - alphas * alphas * a / 2
-    return np.asarray((alphas[int(values.argmax())] * volume + target) @ inverse)

@@ -298,11 +298,6 @@ def cloning_system(mask: Mask) -> CloningSystem:
             "use a smaller or smoother mask"
         )
     grids = nested_grids(region)
-    return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, _solve_response(grids, edge))
-
-
-def _solve_response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
-    """Return the membrane at the nodes for 1 at each pixel of the edge [shape=(K, B)], by Galerkin's method."""
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import splu
 
@@ -318,7 +313,7 @@ def _solve_response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
     response = np.empty(right.shape, np.float32)
     for start in range(0, len(edge), BATCH):
         response[:, start : start + BATCH] = factors.solve(right[:, start : start + BATCH].toarray())
-    return response
+    return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, response)
 
 
 def _round_levels(pictures: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -298,7 +298,15 @@ def divide_video(
         LOG.info("%s: %s", recording.file, separate.note)
         audio = align_sound(separate, audio.duration_s)
     levels = levels_db(audio)
-    parts = _read_lines(recording) or [SpokenPart(*span) for span in spoken_spans(levels)]
+    transcript = find_transcript(recording.file)
+    lines = [] if transcript is None else spoken_lines(transcript)
+    if transcript is not None and not lines:
+        LOG.warning(
+            "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
+            "transcript. Give one with times: subtitles, labels, or what a recogniser writes",
+            recording.file,
+        )
+    parts = lines or [SpokenPart(*span) for span in spoken_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
     parts = [replace(part, end_s=min(part.end_s, end_s)) for part in parts if part.start_s < end_s]
     spans = utterance_spans(parts, scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
@@ -308,19 +316,6 @@ def divide_video(
         held_out = round(HELD_OUT_SHARE * len(spans))
     splits = [recording.split] * (len(spans) - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
     return [_cut_part(span, recording, split, audio, scan) for span, split in zip(spans, splits, strict=True)]
-
-
-def _read_lines(recording: SourceRecording) -> list[SpokenPart]:
-    """Return the lines in time beside a video, with a warning where there are words without times."""
-    transcript = find_transcript(recording.file)
-    lines = [] if transcript is None else spoken_lines(transcript)
-    if transcript is not None and not lines:
-        LOG.warning(
-            "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
-            "transcript. Give one with times: subtitles, labels, or what a recogniser writes",
-            recording.file,
-        )
-    return lines
 
 
 def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:

@@ -211,7 +211,17 @@ class Figure:
         self._wall = lips[VISIBLE_RINGS + 1 : RINGS].ravel()
         self._kinds[lips[VISIBLE_RINGS + 2 :].ravel()] = palette.FINISHES.index(palette.MOUTH_FINISH)
         self._lighting = Lighting(palette.FINISHES)
-        self._reaches = self._bake_light()
+        places, normals = self.place(REST)
+        inner = ("tongue", "teeth", "upper teeth", "catchlights", "right catchlights", "lashes", "right lashes")
+        fully_lit: list[slice | NDArray[np.intp]] = [self._wall, *(self.rows[name] for name in inner)]
+        hiding = np.ones(len(places), bool)
+        for rows in (*fully_lit, self.rows["eye"], self.rows["right eye"]):
+            hiding[rows] = False
+        lit = reaches(places, normals, self.triangles, hiding)
+        for rows in fully_lit:
+            lit[rows] = 1
+        lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
+        self._reaches = lit
         self._held = np.zeros((stops[-1], 1))
         share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
         self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
@@ -298,17 +308,3 @@ class Figure:
         arrives[self.rows["upper teeth"]] *= UPPER_TEETH_LIGHT
         arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
         return colours, arrives
-
-    def _bake_light(self) -> Real:
-        """Return the parts of sky and key light that reach the vertices at rest [shape=(V, 2)]."""
-        places, normals = self.place(REST)
-        inner = ("tongue", "teeth", "upper teeth", "catchlights", "right catchlights", "lashes", "right lashes")
-        fully_lit: list[slice | NDArray[np.intp]] = [self._wall, *(self.rows[name] for name in inner)]
-        hiding = np.ones(len(places), bool)
-        for rows in (*fully_lit, self.rows["eye"], self.rows["right eye"]):
-            hiding[rows] = False
-        lit = reaches(places, normals, self.triangles, hiding)
-        for rows in fully_lit:
-            lit[rows] = 1
-        lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
-        return lit

@@ -81,21 +81,16 @@ def is_possible(kind: str, value: str) -> bool:
 COLUMNS = tuple(field.name for field in fields(Answer))
 
 
-def answers_text(answers: Iterable[Answer]) -> str:
-    """Return a table of answers in CSV (RFC 4180), with a line of column names; no spreadsheet executes a field."""
-    file = io.StringIO()
-    table = csv.DictWriter(file, COLUMNS)
-    table.writeheader()
-    for answer in answers:
-        row = asdict(answer) | {"practice": int(answer.practice)}
-        table.writerow({name: as_field(value) if isinstance(value, str) else value for name, value in row.items()})
-    return file.getvalue()
-
-
 def write_answers(path: Path, answers: Iterable[Answer]) -> None:
     """Write a table of answers. Raises ExportError: it cannot be written."""
     with atomic_file(path) as temporary:
-        temporary.write_text(answers_text(answers), encoding="utf-8", newline="")
+        file = io.StringIO()
+        table = csv.DictWriter(file, COLUMNS)
+        table.writeheader()
+        for answer in answers:
+            row = asdict(answer) | {"practice": int(answer.practice)}
+            table.writerow({name: as_field(value) if isinstance(value, str) else value for name, value in row.items()})
+        temporary.write_text(file.getvalue(), encoding="utf-8", newline="")
 
 
 def read_answers(path: Path) -> list[Answer]:

@@ -197,9 +197,12 @@ def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stre
         visual = model.visual[stream - 1]
         means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
         channels = _channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
+    states = chains.transitions.product.chain_states[:, group.tie == density]
     return DominantGaussian(
         chains.streams[stream],
-        _density_name(chains, group.tie, density),
+        " | ".join(
+            chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
+        ),
         int(component) + 1,
         len(weight),
         float(weight[component, position]),
@@ -215,14 +218,6 @@ def _distance(inference: Inference, stream: int, row: int, mean: Array, variance
         return None
     error = inference.observations.streams[stream][row] - mean
     return float(np.sqrt(np.mean(error * error / variance)))
-
-
-def _density_name(chains: Chains, tie: NDArray[np.intp], density: int) -> str:
-    """Return the name of a density: the states of the chains that all joint states with this density share."""
-    states = chains.transitions.product.chain_states[:, tie == density]
-    return " | ".join(
-        chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
-    )
 
 
 def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:

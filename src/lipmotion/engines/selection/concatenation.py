@@ -181,7 +181,7 @@ def _smooth(
     recording = inventory.windows.recording
     left, right = (inventory.at(recording[[piece.unit]], clock(np.array([join_s])))[0] for piece, clock in sides)
     jump = right - left
-    kept = [is_protected(target, number) for number in (after.first - 1, after.first)]
+    kept = [PHONES[target.windows.phones[number]] in PROTECTED_PHONES for number in (after.first - 1, after.first)]
     shares = (0.0, 1.0) if kept[0] and not kept[1] else (1.0, 0.0) if kept[1] and not kept[0] else (0.5, 0.5)
     spans_s = (
         SMOOTHED_SHARE * (join_s - times_s[before.first, 0]),
@@ -193,8 +193,3 @@ def _smooth(
         near = (away_s > 0 if side == 0 else away_s >= 0) & (away_s < width_s)
         bend = (1 + np.cos(np.pi * away_s[near] / width_s)) / 2
         motion[near] += (share if side == 0 else -share) * bend[:, None] * jump
-
-
-def is_protected(target: Target, number: int) -> bool:
-    """Return whether the lip shape of a phone of the target must be preserved."""
-    return PHONES[target.windows.phones[number]] in PROTECTED_PHONES

@@ -128,16 +128,7 @@ def _variances(
         add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
         np.add.at(squares, rows, np.square(clip.rows - means))
         np.add.at(counts, rows, 1)
-    return _shrunk(emission, squares, counts, options.variance_shrinkage)
-
-
-def _shrunk(emission: Emission, squares: Array, counts: Array, strength: float) -> NDArray[np.float32]:
-    """Return the variances of all densities [shape=(L, 3, Q)], shrunk towards their prior.
-
-    squares  : sums of squared deviations from the regressed means [shape=(L, 3, Q)]
-    counts   : frames of each density [shape=(L,)]
-    strength : weight of the prior, in frames
-    """
+    strength = options.variance_shrinkage
     before = emission.variances.astype(float)
     ratio = squares[:-1].sum(axis=0) / np.maximum((before[:-1] * counts[:-1, None, None]).sum(axis=0), 1e-30)
     prior = before * np.clip(ratio, 0, 1)  # variances without regression, reduced by the mean share that it explains

@@ -64,7 +64,19 @@ def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
     if is_shrunk:
         made = HALF_WIN * (first_wins + second_wins > 0)
         first_wins, second_wins = first_wins + made, second_wins + made
-    strengths, order = _maximise(first_wins, second_wins, has_order)
+    comparisons = first_wins + second_wins
+    wins = first_wins.sum(axis=1) + second_wins.sum(axis=0)
+    worth, place = np.ones(len(wins)), 1.0
+    for _ in range(MOST_STEPS):
+        before = np.append(worth, place)
+        weight = comparisons / (place * worth[:, None] + worth)
+        worth = wins / (place * weight.sum(axis=1) + weight.sum(axis=0))
+        worth /= np.exp(np.log(worth).mean())
+        if has_order:
+            place = first_wins.sum() / (comparisons * worth[:, None] / (place * worth[:, None] + worth)).sum()
+        if np.abs(np.append(worth, place) / before - 1).max() < SMALLEST_STEP:
+            break
+    strengths, order = np.log(worth), float(np.log(place))
     probability = _logistic(strengths[:, None] - strengths + order)
     weights = (first_wins + second_wins) * probability * (1 - probability)
     pairs = np.argwhere(weights > 0)
@@ -81,23 +93,6 @@ def link_groups(comparisons: Array) -> list[list[int]]:
 
     count, labels = connected_components(comparisons, directed=False)
     return [np.flatnonzero(labels == label).tolist() for label in range(count)]
-
-
-def _maximise(first_wins: Array, second_wins: Array, has_order: bool) -> tuple[Array, float]:
-    """Return log strengths, mean 0 [shape=(C,)], and the effect of the order."""
-    comparisons = first_wins + second_wins
-    wins = first_wins.sum(axis=1) + second_wins.sum(axis=0)
-    worth, place = np.ones(len(wins)), 1.0
-    for _ in range(MOST_STEPS):
-        before = np.append(worth, place)
-        weight = comparisons / (place * worth[:, None] + worth)
-        worth = wins / (place * weight.sum(axis=1) + weight.sum(axis=0))
-        worth /= np.exp(np.log(worth).mean())
-        if has_order:
-            place = first_wins.sum() / (comparisons * worth[:, None] / (place * worth[:, None] + worth)).sum()
-        if np.abs(np.append(worth, place) / before - 1).max() < SMALLEST_STEP:
-            break
-    return np.log(worth), float(np.log(place))
 
 
 def _has_maximum(first_wins: Array, second_wins: Array, has_order: bool) -> bool:

@@ -92,10 +92,6 @@ class EmissionEvaluator:
         The responsibilities [shape=(T, M, G')] sum to 1 over the M components; they are None where M is 1.
         A stream that was not observed is left out. This is exact: its density integrates to 1.
         """
-        return normalised_components(self._component_log_densities(observations, densities))
-
-    def _component_log_densities(self, observations: AudioVisualObservations, densities: Index) -> Single:
-        """Return log weight + weighted log density of every component [shape=(T, M, G')]."""
         group = self.group
         log_weights = group.mixtures.log_weights[densities].T
         total = np.zeros((observations.frames, *log_weights.shape), np.float32)
@@ -110,7 +106,7 @@ class EmissionEvaluator:
                 log[~observed] = 0
             total += log
         total += log_weights
-        return total
+        return normalised_components(total)
 
 
 def _restricted(form: QuadraticForm, densities: Index) -> QuadraticForm:

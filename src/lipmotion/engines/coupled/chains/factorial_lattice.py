@@ -188,9 +188,15 @@ def factorial_lattice(
         for units, allowed in zip(structure.units, (allowed_units, visible_units), strict=True)
     )
     states = _kernel_states(first, structure.states), _kernel_states(second, structure.states)
-    own_density_positions = _positions_of(transitions.own_density_states, states, structure)
+    columns = []
+    for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
+        position = np.full(count, -1)
+        position[own] = np.arange(len(own))
+        columns.append(position[transitions.own_density_states[:, chain]])
+    own_density_positions = np.stack(columns, axis=1)
     inside = np.flatnonzero((own_density_positions >= 0).all(axis=1))
-    densities = _needed_densities(len(ties), states, inside, structure)
+    chains = [min(number, 1) for number in range(len(ties))]
+    densities = tuple(np.concatenate([states[chain], structure.state_counts[chain] + inside]) for chain in chains)
     return FactorialLattice(
         transition_index=_transition_index(states, structure),
         densities=densities,
@@ -220,19 +226,6 @@ def _kernel_states(units: Index, states: int) -> Index:
     return np.concatenate([units * states + state for state in range(states)])
 
 
-def _positions_of(joint_states: Index, states: tuple[Index, Index], structure: Structure) -> Index:
-    """Return where the chains' states in joint states [shape=(P, 2)] stand among ``states`` [shape=(P, 2)]; -1: absent.
-
-    states : of each chain [each shape=(N'_c,)]
-    """
-    columns = []
-    for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
-        position = np.full(count, -1)
-        position[own] = np.arange(len(own))
-        columns.append(position[joint_states[:, chain]])
-    return np.stack(columns, axis=1)
-
-
 def _transition_index(states: tuple[Index, Index], structure: Structure) -> Index:
     """Return the positions of the transition statistics of ``states`` among those of all states."""
     index, start = [], 0
@@ -240,17 +233,6 @@ def _transition_index(states: tuple[Index, Index], structure: Structure) -> Inde
         index += [start + own, start + count + own]
         start += 2 * count
     return np.concatenate(index)
-
-
-def _needed_densities(
-    groups: int, states: tuple[Index, Index], inside: Index, structure: Structure
-) -> tuple[Index, ...]:
-    """Return, for each stream group, the densities of its chain's ``states``, then those of joint states.
-
-    inside : the joint states of the lattice with densities of their own, by number [shape=(P',)]
-    """
-    chains = [min(number, 1) for number in range(groups)]
-    return tuple(np.concatenate([states[chain], structure.state_counts[chain] + inside]) for chain in chains)
 
 
 def _within(densities: Index, tie: Index) -> Index:

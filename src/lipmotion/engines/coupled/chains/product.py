@@ -228,15 +228,12 @@ class _Successors:
                 0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
             )
             ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
-            if not self._within_limit(states, ahead):
+            positions = [state + self.structure.states * out for state, out in zip(states, ahead, strict=True)]
+            if not (self.structure.limit is None or max(positions) - min(positions) <= self.structure.limit):
                 continue
             relative_ahead = (False,) * len(ahead) if all(ahead) else ahead
             for units, probability in self._entered(joint, leaving):
                 yield JointState(units, states, relative_ahead), moved, probability
-
-    def _within_limit(self, states: tuple[int, ...], ahead: tuple[bool, ...]) -> bool:
-        positions = [state + self.structure.states * out for state, out in zip(states, ahead, strict=True)]
-        return self.structure.limit is None or max(positions) - min(positions) <= self.structure.limit
 
     def _entered(self, joint: JointState, leaving: tuple[bool, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
         """Yield the units of all chains after those in ``leaving`` entered the next unit, and their probability."""

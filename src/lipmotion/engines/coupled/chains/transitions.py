@@ -58,7 +58,8 @@ class Transitions:
         """Log probability of every arc [shape=(E,)]."""
         weight = self.product.unit_probability.copy()
         for chain in range(len(self.rows)):
-            weight *= self._factor(chain)
+            advance = self.advance[chain][self.rows[chain]][self.product.arc_from]
+            weight *= np.where(self.product.moves[chain], advance, 1 - advance)
         total = np.bincount(self.product.arc_from, weight, len(self.product.joint_states))
         return np.log(weight / total[self.product.arc_from])
 
@@ -96,11 +97,6 @@ class Transitions:
             rows.append(row.astype(np.intp))
             advance.append(self.advance[chain][own[first[: len(distinct)]]])
         return replace(self, rows=tuple(rows), advance=tuple(advance))
-
-    def _factor(self, chain: int) -> Array:
-        """Return the probability that a chain moves on or stays as each arc says [shape=(E,)]."""
-        advance = self.advance[chain][self.rows[chain]][self.product.arc_from]
-        return np.where(self.product.moves[chain], advance, 1 - advance)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
         """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs

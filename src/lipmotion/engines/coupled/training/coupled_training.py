@@ -159,7 +159,12 @@ def growing_models(
         chains = grown.model
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
-            chains = _second_stage(chains, data, speech_only, config, second_monitor)
+            schedule = SpeechOnlySchedule(
+                config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight
+            )
+            most_steps = schedule.most_steps * max(schedule.mixtures // config.mixtures, 1).bit_length()
+            report = _reporter("more speech", most_steps, second_monitor)
+            chains = train_on_speech(chains, data, speech_only, schedule, report, workers())
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
@@ -213,20 +218,6 @@ def _schedule(structure: Structure, visual: Sequence[VisualStream], config: Coup
         mixtures[:1] if structure.kind == HMM else mixtures,
         (config.audio_weight, *(weights[stream.name] for stream in visual)),
     )
-
-
-def _second_stage(
-    chains: Chains,
-    data: Sequence[AlignedUtterance],
-    speech_only: Sequence[AlignedUtterance],
-    config: CoupledConfig,
-    monitor: Monitor,
-) -> Chains:
-    """Return the chains after the second stage of training, on speech without motion as well."""
-    schedule = SpeechOnlySchedule(config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight)
-    most_steps = schedule.most_steps * max(schedule.mixtures // config.mixtures, 1).bit_length()
-    report = _reporter("more speech", most_steps, monitor)
-    return train_on_speech(chains, data, speech_only, schedule, report, workers())
 
 
 def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[TrainingStep], None]:

@@ -124,21 +124,17 @@ def _untrained_chains(
     for members in stream_groups:
         edges = np.cumsum([0, *(dimensions[s] for s in members)])
         chain = structure.chain_of(members[0])
+        shape = (structure.state_counts[chain], 1, int(edges[-1]))
         groups.append(
             StreamGroup(
                 members,
                 tuple(slice(a, b) for a, b in pairwise(edges.tolist())),
-                _standard_normals(structure.state_counts[chain], int(edges[-1])),
+                Mixtures(np.zeros(shape[:2], np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32)),
                 tuple(weights[s] for s in members),
                 product.chain_states[chain],
             )
         )
     return Chains(streams, transitions, tuple(groups))
-
-
-def _standard_normals(count: int, size: int) -> Mixtures:
-    shape = (count, 1, size)
-    return Mixtures(np.zeros((count, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
 
 
 def _reestimated_along(
