@@ -43,14 +43,7 @@ from lipmotion_lab.evaluation.held_out import (
     load_held_out,
     make_speech,
 )
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    ExperimentSettings,
-    PartKey,
-    check_opening,
-    open_parts,
-    opening_row,
-)
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, PartKey, check_opening, open_parts, opening_row
 
 PAPER_SCORES: dict[str, float] = {"eVis": 68.8, "pbVis": 67.7, "sVis": 67.4, "2vis": 66.5, "phone": 65.2}
 """Closure scores of Table 1, the best first."""

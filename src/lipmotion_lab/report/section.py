@@ -102,10 +102,7 @@ class Table:
             for name, row in self.rows.items()
         ]
         table = element(
-            "table",
-            element("caption", self.caption),
-            element("thead", element("tr", *heads)),
-            element("tbody", *lines),
+            "table", element("caption", self.caption), element("thead", element("tr", *heads)), element("tbody", *lines)
         )
         # the star, the files, and what the columns are
         files = [element("a", kind.upper(), href=f"{folder}/tables/{self.name}.{kind}") for kind in ("csv", "json")]

@@ -24,13 +24,7 @@ from lipmotion_studio.study.sources import (
     parse_conditions,
     read_sentences,
 )
-from lipmotion_studio.study.trials import (
-    anchor_trials,
-    attention_trials,
-    main_trials,
-    practice_trials,
-    shuffled,
-)
+from lipmotion_studio.study.trials import anchor_trials, attention_trials, main_trials, practice_trials, shuffled
 
 MAX_TEXT_BYTES = 1 << 16
 DEFAULTS = StudySettings()

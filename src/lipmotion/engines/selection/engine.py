@@ -26,17 +26,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import (
-    Configuration,
-    Constraints,
-    Example,
-    Generation,
-    Monitor,
-    Speech,
-    StateTrace,
-    Timeline,
-    Unit,
-)
+from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
 
 Array = NDArray[np.float64]
 SOUND: dict[str, Any] = {

@@ -23,14 +23,7 @@ from lipmotion.hmm.multistream.phone_recogniser import (
 from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_from_arrays, learned_motion_to_arrays
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.predictors import list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
-from lipmotion.storage.schema import (
-    POSITIVE,
-    Arrays,
-    ArraySpec,
-    check_arrays,
-    format_errors,
-    refuse_undeclared,
-)
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES
 

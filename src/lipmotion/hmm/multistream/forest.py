@@ -13,14 +13,7 @@ from lipmotion.hmm.multistream.densities import GaussianStatistics
 from lipmotion.hmm.multistream.streams import MOTION
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState
 from lipmotion.printable import printable
-from lipmotion.stats.trees import (
-    Context,
-    Question,
-    Tree,
-    gaussian_log_likelihood,
-    grow_tree,
-    multispace_log_likelihood,
-)
+from lipmotion.stats.trees import Context, Question, Tree, gaussian_log_likelihood, grow_tree, multispace_log_likelihood
 
 
 @dataclass(frozen=True, eq=False)

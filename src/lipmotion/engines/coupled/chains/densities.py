@@ -178,11 +178,7 @@ def component_posteriors(posterior: Single, responsibilities: Single | None) -> 
 
 
 def reestimated_group(
-    group: StreamGroup,
-    statistics: EmissionStatistics,
-    floors: Sequence[Single],
-    least: float,
-    streams: Sequence[int],
+    group: StreamGroup, statistics: EmissionStatistics, floors: Sequence[Single], least: float, streams: Sequence[int]
 ) -> StreamGroup:
     """Return the group with the mixtures that maximise the expected log likelihood (M-step).
 

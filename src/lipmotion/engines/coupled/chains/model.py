@@ -9,12 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import (
-    AudioVisualObservations,
-    EmissionEvaluator,
-    Single,
-    StreamGroup,
-)
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, EmissionEvaluator, Single, StreamGroup
 from lipmotion.engines.coupled.chains.factorial_lattice import FactorialTransitions, factorial_lattice
 from lipmotion.engines.coupled.chains.lattice import Index, JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
 from lipmotion.engines.coupled.chains.structures import Structure

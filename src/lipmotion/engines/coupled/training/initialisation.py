@@ -17,12 +17,7 @@ from lipmotion.engines.coupled.chains.product import Product, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions, initial_transitions
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, estimated_grammar, uniform_path
-from lipmotion.engines.coupled.training.em_steps import (
-    ChainStatistics,
-    LatticeUtterance,
-    lattice_utterance,
-    m_step,
-)
+from lipmotion.engines.coupled.training.em_steps import ChainStatistics, LatticeUtterance, lattice_utterance, m_step
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import find_similar_phone
 
