@@ -10,6 +10,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.mouth import frame_times
 from lipmotion.errors import InputError
@@ -236,8 +237,7 @@ class MeshStage:
             return np.clip(share, 0, 1), pivot if usual and not np.ptp(share) < 1e-9 else PIVOT
         if self._rest[face, 1].min() > 2 * NECK_TOP:  # a head without a neck
             return np.ones(len(self._rest)), PIVOT
-        along = np.clip((self._rest[:, 1] - NECK_BOTTOM) / (NECK_TOP - NECK_BOTTOM), 0, 1)
-        return along * along * (3 - 2 * along), PIVOT
+        return smooth_step((self._rest[:, 1] - NECK_BOTTOM) / (NECK_TOP - NECK_BOTTOM)), PIVOT
 
     def _eye(self, bone: Bone) -> tuple[Rows, Array, Array]:
         """Return the vertices of an eye, how far each follows it [shape=(N, 1)], and its middle [shape=(3,)]."""

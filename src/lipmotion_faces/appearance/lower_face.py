@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.errors import InputError
 from lipmotion.motion import mouth_region
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
@@ -249,5 +250,4 @@ def _move_columns(picture: Pictures, chin_px: float, drops: Array, scale: int) -
 
 def _rise(values: Array, start: Array | float, stop: Array | float) -> Array:
     """Return 0 up to ``start``, 1 from ``stop`` on, and a smooth rise between (3t² − 2t³)."""
-    share = np.clip((values - start) / (np.asarray(stop) - start), 0, 1)
-    return share * share * (3 - 2 * share)
+    return smooth_step((values - start) / (np.asarray(stop) - start))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.base import rotate_head
@@ -223,8 +224,7 @@ class Figure:
         lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
         self._reaches = lit
         self._held = np.zeros((stops[-1], 1))
-        share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
-        self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
+        self._held[self.rows["neck"], 0] = smooth_step((-1.0 - self._places[self.rows["neck"], 1]) / 0.6)
 
     def place(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices in a pose, the head not turned [shape=(V, 3), both]."""

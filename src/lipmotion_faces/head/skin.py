@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
@@ -175,7 +176,7 @@ class Skin:
         up = np.sin(angle) ** 2
         reach = np.where(angle > 0, 0.18, 0.36) * up + 0.44 * (1 - up)
         near = np.clip(1 - nearest / reach, 0, 1) * (face[:, 2] > -0.65)
-        self.lip_weight = near * near * (3 - 2 * near)
+        self.lip_weight = smooth_step(near)
         bound = np.flatnonzero(self.lip_weight)
         length = np.linalg.norm(np.roll(contour, -1, axis=0) - np.roll(contour, 1, axis=0), axis=1)
         width = (0.016 + 0.55 * nearest[bound])[:, None]
@@ -188,7 +189,7 @@ class Skin:
         cheeks[len(face) - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
         out = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
         nose[:, 1] = np.exp(-out) * (face[:, 2] > -0.5)
-        jaw = _step((-0.47 - face[:, 1]) / 0.40) * _step((face[:, 2] + 0.98) / 0.45)
+        jaw = smooth_step((-0.47 - face[:, 1]) / 0.40) * smooth_step((face[:, 2] + 0.98) / 0.45)
         return Binding(face, np.arange(COLUMNS), jaw, bound, shares, cheeks, nose)
 
     def places(self, pose: CharacterPose) -> Real:
@@ -212,11 +213,6 @@ def move_jaw(places: Real, drop: Any) -> Real:
     angle, (y, z) = drop / 0.72, (places - HINGE)[:, 1:].T
     down, forward = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
     return np.stack([np.broadcast_to(places[:, 0], down.shape), HINGE[1] + down, HINGE[2] + forward], axis=-1)
-
-
-def _step(share: Real) -> Real:
-    clipped = np.clip(share, 0, 1)
-    return np.asarray(clipped * clipped * (3 - 2 * clipped))
 
 
 def _fill(contour: Real, edges: Real) -> Real:

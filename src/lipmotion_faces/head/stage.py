@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_BROW_RISE, FULL_LOOK_RAD
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
+from lipmotion.meshes.model.textures import encode_srgb
 from lipmotion_faces.head.figure import Figure
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import REST
@@ -86,17 +87,11 @@ def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     parts, first = [], 0
     for name, count, each in pieces:
         seen = np.unique(figure.triangles[first : first + count])
-        red, green, blue = (float(value) for value in _encoded(figure.colours[seen].mean(axis=0)))
+        red, green, blue = encode_srgb(np.clip(figure.colours[seen].mean(axis=0), 0, 1)).tolist()
         material = Material(name, (red, green, blue), min(2 * each.finish.gloss, 1.0))
         parts.append(MeshPart(name, first, first + count, material))
         first += count
-    return Mesh(rest, figure.triangles, tuple(parts), tuple(shapes), colours=_encoded(figure.colours))
-
-
-def _encoded(light: Real) -> Real:
-    """Return linear reflection as sRGB, 0 to 1."""
-    clipped = np.clip(light, 0, 1)
-    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
+    return Mesh(rest, figure.triangles, tuple(parts), tuple(shapes), colours=encode_srgb(np.clip(figure.colours, 0, 1)))
 
 
 PICTURE_HEIGHT = 3.35

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.meshes.model.textures import encode_srgb
 from lipmotion_faces.kernels.shading import shade
 
 Real = NDArray[np.float64]
@@ -96,9 +97,7 @@ def tone_table() -> NDArray[np.uint8]:
     knee = 0.7
     room = 1 - knee
     light = np.minimum(light, knee) + room * (1 - np.exp(-np.maximum(light - knee, 0) / room))
-    light = light / light[-1]
-    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.rint(255 * encoded).astype(np.uint8)
+    return np.rint(255 * encode_srgb(light / light[-1])).astype(np.uint8)
 
 
 def unit(vectors: Real) -> Real:
