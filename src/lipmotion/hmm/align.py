@@ -164,25 +164,19 @@ def place_words(
     starts = np.flatnonzero(np.diff(slot_of[path], prepend=-1))
     fits = np.full(len(starts), np.nan)
     if windows is not None:
-        fits = _measure_fits(log_likelihoods, plain, network.emission[path], starts)
+        densities = network.emission[path]
+        frame_fits = np.empty(len(densities))
+        for first in range(0, len(densities), FIT_BLOCK):
+            end = min(first + FIT_BLOCK, len(densities))
+            values = log_likelihoods.log_density(first, end, plain)
+            frame_fits[first:end] = values[np.arange(end - first), densities[first:end]] - values.max(axis=1)
+        fits = np.add.reduceat(frame_fits, starts) / np.diff(starts, append=len(densities))
     placed = []
     for states, start, fit in zip(np.split(path, starts[1:]), starts.tolist(), fits.tolist(), strict=True):
         spoken = nodes[states[0]][0]
         units = tuple(spoken.units[place] for place in dict.fromkeys(nodes[state][2] for state in states.tolist()))
         placed.append(PlacedWord(spoken._replace(units=units), start, fit))
     return placed
-
-
-def _measure_fits(
-    log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp], densities: NDArray[np.intp], starts: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Return the fit of stretches of a path, given the density of each frame, and the first frame of each stretch."""
-    fit = np.empty(len(densities))
-    for first in range(0, len(densities), FIT_BLOCK):
-        end = min(first + FIT_BLOCK, len(densities))
-        values = log_likelihoods.log_density(first, end, chosen)
-        fit[first:end] = values[np.arange(end - first), densities[first:end]] - values.max(axis=1)
-    return np.add.reduceat(fit, starts) / np.diff(starts, append=len(densities))
 
 
 def _slot_windows(windows: Windows, frames: int) -> Windows:

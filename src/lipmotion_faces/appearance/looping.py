@@ -278,7 +278,15 @@ class _Plan:
         self._scene_of = np.full(len(allowed), -1)
         for index, (start, stop) in enumerate(self.scenes):
             self._scene_of[start:stop] = index
-        self.busy = _find_blinks(descriptors.eyes, rate_hz, self.scenes)
+        from scipy.ndimage import binary_dilation
+
+        change = np.zeros(len(descriptors.eyes))
+        for first, last in self.scenes:
+            steps = np.sqrt(np.square(np.diff(descriptors.eyes[first:last], axis=0)).mean(axis=1))
+            change[first : last - 1] = steps
+            change[first + 1 : last] = np.maximum(change[first + 1 : last], steps)
+        ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
+        self.busy = binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
         self.restless = _measure_restlessness(descriptors, self.scenes) + BUSY_COST * self.busy
         self._least = max(1, round(LEAST_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
@@ -378,19 +386,6 @@ def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int
     change = np.flatnonzero(np.diff(allowed.astype(int))) + 1
     ends = sorted({0, len(allowed), *change.tolist(), *(cut for cut in cuts if 0 < cut < len(allowed))})
     return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]
-
-
-def _find_blinks(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
-    """Return the frames in a blink, or near one: the eyes change much [shape=(T,)]."""
-    from scipy.ndimage import binary_dilation
-
-    change = np.zeros(len(eyes))
-    for start, stop in scenes:
-        steps = np.sqrt(np.square(np.diff(eyes[start:stop], axis=0)).mean(axis=1))
-        change[start : stop - 1] = steps
-        change[start + 1 : stop] = np.maximum(change[start + 1 : stop], steps)
-    ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
-    return binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
 
 
 def _measure_restlessness(descriptors: FrameDescriptors, scenes: Sequence[tuple[int, int]]) -> Array:

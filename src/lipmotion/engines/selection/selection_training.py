@@ -99,11 +99,23 @@ def fit_selection(
     inventory = inventory_of(examples, values, guide)
     monitor(Progress(_STAGE, 2, 3, 0.92))
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-    scale = comparison_scale(recorded, motion.space)
+    deviations = np.maximum(recorded.std(axis=0), 1e-9)
+    count = len(motion.space.direct)
+    deviations[count:] = deviations[count:].max(initial=1e-9)
+    weights = np.ones(len(deviations))
+    weights[:count] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in motion.space.direct_names]
+    scale = np.sqrt(weights) / deviations
     rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
     costs, left_out = model.costs(config), _left_out(model, config, examples)
-    model = replace(model, variances=_error_variances(left_out, costs, values, recorded))
+    errors = []
+    for one in left_out:
+        original, chosen = values[one.number], one.chosen
+        joined = concatenated(costs.inventory, chosen.target, chosen.pieces, len(original))
+        errors.append(with_dynamics(original - joined)[one.frames])
+    spread = with_dynamics(recorded).var(axis=0)
+    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
+    model = replace(model, variances=np.maximum(variances, 1e-4 * spread + 1e-12))
     compared = (
         (values[out.number][out.frames], motion.space.reduce(made.values.astype(float))[out.frames])
         for out in left_out
@@ -146,16 +158,6 @@ def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Gu
     kept = _kept(examples, first)
     motion = np.concatenate(values)[np.concatenate([np.arange(start, stop) for start, stop in kept])].astype(np.float16)
     return RecordedUnits(names, windows, usable, first, np.array(kept, np.intp), motion, predicted)
-
-
-def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
-    """Return factors of dimensions in comparisons [shape=(Q,)]: a component counts by the deviation of the first."""
-    deviations = np.maximum(recorded.std(axis=0), 1e-9)
-    direct = len(space.direct)
-    deviations[direct:] = deviations[direct:].max(initial=1e-9)
-    weights = np.ones(len(deviations))
-    weights[:direct] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in space.direct_names]
-    return np.sqrt(weights) / deviations
 
 
 def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int]]:
@@ -205,18 +207,6 @@ def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence
             chosen = _chosen(model, costs, examples[number], costs.inventory.windows.recording == number)
             found.append(_LeftOut(number, frames, chosen))
     return found
-
-
-def _error_variances(left_out: Sequence[_LeftOut], costs: Costs, values: Sequence[Array], recorded: Array) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)], on motion in the motion space."""
-    errors = []
-    for out in left_out:
-        original, chosen = values[out.number], out.chosen
-        track = concatenated(costs.inventory, chosen.target, chosen.pieces, len(original))
-        errors.append(with_dynamics(original - track)[out.frames])
-    spread = with_dynamics(recorded).var(axis=0)
-    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
-    return np.maximum(variances, 1e-4 * spread + 1e-12)
 
 
 def _chosen(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Chosen:

@@ -53,7 +53,11 @@ def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], o
     that of its parent node, so that states with few frames share the regression of their relatives.
     """
     context = fit_acoustic_context((clip.features for clip in clips), options.acoustic_components)
-    owners = _owners(emission, options)
+    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
+    nodes: list[_Node | None] = []
+    for name, tree in emission.forest.items():
+        nodes += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
+    owners = [*nodes, None]
     components, outputs = context.basis.shape[1], emission.means[0].size
     statistics = {node: zero_statistics(components, outputs) for node in dict.fromkeys(owners) if node is not None}
     for node, z, error in _frames(emission, clips, options, context, owners):
@@ -66,15 +70,6 @@ def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], o
 
 _Node = tuple[str, int]
 """A node of a tree: name of the tree, number of the node."""
-
-
-def _owners(emission: Emission, options: TrainingOptions) -> list[_Node | None]:
-    """Return, for every density, the node whose regression it uses; None for the rest pose."""
-    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
-    owners: list[_Node | None] = []
-    for name, tree in emission.forest.items():
-        owners += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
-    return [*owners, None]
 
 
 def _frames(

@@ -92,7 +92,9 @@ class Transitions:
         for chain, own in enumerate(self.rows):
             key, count = own.copy(), len(self.advance[chain])
             rare = frames < LEAST_FRAMES
-            key[rare] = count + _own_state_and_asynchrony(self.product, chain)[rare]
+            parts: Sequence[Index] = [self.product.chain_states[chain], *(self.product.lead - self.product.lead[chain])]
+            _, number = np.unique(np.stack(parts), axis=1, return_inverse=True)
+            key[rare] = count + np.asarray(number, np.intp).reshape(-1)[rare]
             distinct, first, row = np.unique(key, return_index=True, return_inverse=True)
             rows.append(row.astype(np.intp))
             advance.append(self.advance[chain][own[first[: len(distinct)]]])
@@ -126,10 +128,3 @@ def initial_transitions(product: Product) -> Transitions:
     rows = [own if coupled else states for states in product.chain_states]
     counts = [len(own) if coupled else count for count in product.structure.state_counts]
     return Transitions(product, tuple(rows), tuple(np.full(count, INITIAL_ADVANCE) for count in counts))
-
-
-def _own_state_and_asynchrony(product: Product, chain: int) -> Index:
-    """Return a number for each joint state that is the same where the chain's state and all leads are [shape=(S,)]."""
-    key: Sequence[Index] = [product.chain_states[chain], *(product.lead - product.lead[chain])]
-    _, number = np.unique(np.stack(key), axis=1, return_inverse=True)
-    return np.asarray(number, np.intp).reshape(-1)
