@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.engines.joint.config import JointEngineConfig
-from lipmotion.engines.joint.engine import JointEngine, JointModel
+from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream.streams import SPEECH

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
-from lipmotion.kernels.trellis import best_segments
+from lipmotion.kernels.paths import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import parse_clock, parse_number
 from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones

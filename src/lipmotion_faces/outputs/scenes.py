@@ -20,10 +20,8 @@ from lipmotion.meshes.files.usd_writer import asset, write_usda
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
-from lipmotion.meshes.model.bones import head_quaternions
-from lipmotion.meshes.model.keys import Thinning
-from lipmotion.meshes.model.mesh import Blendshape
-from lipmotion.meshes.model.scene import HeadTurn, Scene
+from lipmotion.meshes.model.mesh import Blendshape, head_quaternions
+from lipmotion.meshes.model.scene import HeadTurn, Scene, Thinning
 from lipmotion.pipeline.outputs.curve_sets import edit_weights, known_names
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
@@ -116,8 +114,7 @@ def head_scene(
     """
     from lipmotion_faces.head.figure import PIVOT
     from lipmotion_faces.head.pose import pose_head
-    from lipmotion_faces.head.shape_fit import mouth_weights
-    from lipmotion_faces.head.stage import figure, mesh_of_figure
+    from lipmotion_faces.head.stage import figure, mesh_of_figure, mouth_weights
 
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)

@@ -36,7 +36,7 @@ from lipmotion_lab.engine_comparison import engines
 from lipmotion_lab.folds import FOLDS, folds
 from lipmotion_lab.learning_curve import learning_curve
 from lipmotion_lab.minnis2000 import minnis2000
-from lipmotion_lab.report.page import FinishedPart, report_html
+from lipmotion_lab.report.page import ClipKeeper, FinishedPart, report_html, write_videos
 from lipmotion_lab.report.section import Section
 from lipmotion_lab.report.sections import (
     engines_section,
@@ -46,7 +46,6 @@ from lipmotion_lab.report.sections import (
     minnis_section,
     xie_liu_section,
 )
-from lipmotion_lab.report.shown_clip import ClipKeeper, write_videos
 from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, check_opening, take_quick_part
 from lipmotion_lab.stamp import Stamp
 from lipmotion_lab.xie_liu2007 import six_systems

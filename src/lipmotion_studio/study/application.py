@@ -23,10 +23,9 @@ from lipmotion.errors import InputError
 from lipmotion.formats.web_page import colour_code
 from lipmotion.types.values import items, members, number, text, whole
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
-from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial
+from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_questions, order_trials
 from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name
-from lipmotion_studio.study.trials import list_questions, order_trials
 from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, foreign_refusal, json_reply, read_json
 
 

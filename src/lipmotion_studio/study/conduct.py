@@ -8,9 +8,8 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import Answer, write_answers
-from lipmotion_studio.study.manifest import Study, check_videos, read_study
+from lipmotion_studio.study.manifest import Study, check_videos, list_questions, order_trials, read_study
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name, rater_number
-from lipmotion_studio.study.trials import list_questions, order_trials
 from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 PORT = 8000

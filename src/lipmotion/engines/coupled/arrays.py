@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Grammar, reachable
+from lipmotion.engines.coupled.chains.product import Grammar, Transitions, reachable
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
-from lipmotion.engines.coupled.chains.transitions import Transitions
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression

@@ -9,13 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.concatenation import Chosen, concatenated, motion_of_units, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
-from lipmotion.engines.selection.guide import Guide, at_points, fit_guide
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
+from lipmotion.engines.selection.model import Guide, SelectionModel, at_points, fit_guide
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError

@@ -10,8 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
-from lipmotion.engines.trajectory.experts import NETWORK_SHARE
+from lipmotion.engines.trajectory.emission import (
+    EMISSION,
+    NETWORK_SHARE,
+    Emission,
+    emission_arrays,
+    emission_from_arrays,
+)
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,

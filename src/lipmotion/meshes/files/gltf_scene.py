@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_document import (
+    COMPONENTS,
+    LARGEST_NUMBER,
+    MOST_GROUPS,
+    WIDTHS,
     GltfArrays,
     GltfDocument,
     PlacedNode,
@@ -23,9 +27,7 @@ from lipmotion.meshes.files.gltf_document import (
     plain_name,
     read_gltf_document,
 )
-from lipmotion.meshes.files.gltf_schema import COMPONENTS, LARGEST_NUMBER, MOST_GROUPS, WIDTHS
-from lipmotion.meshes.model.bones import Bone, merge_bones
-from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Material, Mesh, MeshPart, PartNames
+from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Bone, Material, Mesh, MeshPart, PartNames, merge_bones
 from lipmotion.meshes.model.textures import Texture, decode_srgb, encode_srgb, read_texture
 
 Array = NDArray[np.float64]

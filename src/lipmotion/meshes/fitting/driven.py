@@ -29,9 +29,8 @@ from lipmotion.meshes.fitting.lip_placement import (
 from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights, with_gap
 from lipmotion.meshes.model.binding import ControlBinding, bind, paint_weights
-from lipmotion.meshes.model.bones import JAW
 from lipmotion.meshes.model.face_shapes import FaceShapes, find_face_shapes, measure_lip_parting, numbers_by_name
-from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.mesh import JAW, Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import GAZE_COUNTER_SHARE, Liveliness, compute_liveliness
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights
-from lipmotion.meshes.model.bones import ANGLES
+from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, SIDES
 from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
 from lipmotion.types.motion import RADIAN, WEIGHT

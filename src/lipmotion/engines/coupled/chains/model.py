@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, EmissionEvaluator, Single, StreamGroup
 from lipmotion.engines.coupled.chains.factorial_lattice import FactorialTransitions, factorial_lattice
 from lipmotion.engines.coupled.chains.lattice import Index, JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
+from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.engines.coupled.chains.transitions import Transitions
 from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.paths import NetworkArrays, best_path
 
