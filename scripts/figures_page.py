@@ -41,7 +41,7 @@ def sheets() -> dict[str, Sheet]:
 def current_models() -> frozenset[str]:
     """Return the stamps of what makes figures now: the shipped model, every engine with its defaults, no model."""
     from lipmotion.engines import ENGINES
-    from lipmotion_lab.stamp import engine_digest
+    from lipmotion_lab.runner import engine_digest
 
     (model,) = (ROOT / "src" / "lipmotion").rglob(SHIPPED)
     shipped = f"shipped {hashlib.sha256(model.read_bytes()).hexdigest()[:8]}"

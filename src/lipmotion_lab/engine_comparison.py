@@ -21,8 +21,7 @@ from lipmotion.storage.files import make_folder, unfinished_work
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
-from lipmotion_lab.comparison import correlation_statistic, opening_curves, significance_mark
-from lipmotion_lab.evaluation.evaluate import figures_of
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
 from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,

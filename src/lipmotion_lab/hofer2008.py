@@ -24,14 +24,14 @@ from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS, Lexicon
-from lipmotion_lab.comparison import (
+from lipmotion_lab.evaluation.evaluate import (
     closing_score_statistic,
     correlation_statistic,
+    figures_of,
     opening_curves,
     sign_of_difference,
     significance_mark,
 )
-from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,

@@ -31,9 +31,8 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
-from lipmotion_lab.comparison import correlation_statistic, opening_curves, significance_mark
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
-from lipmotion_lab.evaluation.evaluate import figures_of
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     DISTANCES,

@@ -19,7 +19,7 @@ from starlette.routing import Route
 
 from lipmotion.formats.web_page import colour_code
 from lipmotion_studio.folder import RevisionError
-from lipmotion_studio.recording_replies import ProjectReplies, RecordingReplies
+from lipmotion_studio.page_replies import ProjectReplies, RecordingReplies
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, failed

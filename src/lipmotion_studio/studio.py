@@ -32,8 +32,17 @@ from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, revision_of
 from lipmotion_studio.meshes import Faces
-from lipmotion_studio.presets import PRESETS, Preset, suffixes
-from lipmotion_studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectRecording, digest_of
+from lipmotion_studio.project import (
+    EDITS_SUFFIX,
+    MARKS,
+    PRESETS,
+    ExportRecord,
+    Preset,
+    Project,
+    ProjectRecording,
+    digest_of,
+    suffixes,
+)
 from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
 from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer

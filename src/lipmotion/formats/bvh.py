@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat, format_rows
-from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import Generation, Motion
 
 Array = NDArray[np.float64]

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import NetworkBuilder, build_chain
+from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, build_chain
 from lipmotion.kernels.paths import Windows
 
 FIT_BLOCK = 2048

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import Neighbour, StateTable, UnitHmm
-from lipmotion.hmm.network import Network, NetworkBuilder
+from lipmotion.hmm.network import LogLikelihoods, Network, NetworkBuilder
 
 StateNodes = dict[Neighbour, int]
 """The nodes of one state of a unit: by neighbour, and under None the node for all other neighbours."""

@@ -21,9 +21,9 @@ from lipmotion.hmm.baum_welch import (
     max_mean_durations,
     reestimate_mixtures,
 )
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import make_equal_gaussians
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint

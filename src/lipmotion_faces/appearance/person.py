@@ -39,6 +39,8 @@ from lipmotion_faces.appearance.candidates import (
     LARGEST_COEFFICIENT,
     LARGEST_DETAIL,
     Candidates,
+    RefinementOptions,
+    Refiner,
     choose_candidates,
     draw_to_recorded,
     make_candidates,
@@ -67,7 +69,6 @@ from lipmotion_faces.appearance.motion_map import (
     motion_map_arrays,
     motion_map_from_arrays,
 )
-from lipmotion_faces.appearance.refinement import RefinementOptions, Refiner
 
 Array = NDArray[np.float64]
 Values = NDArray[np.floating[Any]]

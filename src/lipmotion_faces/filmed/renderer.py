@@ -12,6 +12,15 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion_faces.appearance.camera_noise import NoiseSource
+from lipmotion_faces.appearance.candidates import (
+    PAPER,
+    SHARPENING,
+    STEADY,
+    RefinementOptions,
+    Refiner,
+    moving_average,
+    sharpen,
+)
 from lipmotion_faces.appearance.lower_face import (
     HEIGHT,
     WIDTH,
@@ -27,15 +36,6 @@ from lipmotion_faces.appearance.lower_face import (
 from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
 from lipmotion_faces.appearance.placing import cut, feather, place
 from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
-from lipmotion_faces.appearance.refinement import (
-    PAPER,
-    SHARPENING,
-    STEADY,
-    RefinementOptions,
-    Refiner,
-    moving_average,
-    sharpen,
-)
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

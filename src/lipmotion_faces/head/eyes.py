@@ -10,8 +10,17 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter
 
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.forms import EYE, EYEBALL_RADIUS, head, seen_from_front
-from lipmotion_faces.head.part import Part, grid_triangles, join_parts, part, tube
+from lipmotion_faces.head.part import (
+    EYE,
+    EYEBALL_RADIUS,
+    Part,
+    grid_triangles,
+    head,
+    join_parts,
+    part,
+    seen_from_front,
+    tube,
+)
 from lipmotion_faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]

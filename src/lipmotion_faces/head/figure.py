@@ -1,4 +1,4 @@
-"""The whole character: its parts put together, and the places and the light of all vertices in a pose."""
+"""The whole character: hair and other parts put together, and places and light of all vertices in a pose."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.base import rotate_head
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
-from lipmotion_faces.head.forms import EYE, MIDDLE, head, seen_from_middle
 from lipmotion_faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
 from lipmotion_faces.head.lips import ACROSS, RINGS, VISIBLE_RINGS, closed_share
-from lipmotion_faces.head.part import Part, grid_triangles, join_parts, part, tube
+from lipmotion_faces.head.part import EYE, MIDDLE, Part, grid_triangles, head, join_parts, part, seen_from_middle, tube
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import AT_CORNER, REST, Skin, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches, unit

@@ -12,7 +12,6 @@ from scipy.spatial import Delaunay, cKDTree
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
-from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion_faces.head.lips import (
     ACROSS,
     COLUMNS,
@@ -23,6 +22,7 @@ from lipmotion_faces.head.lips import (
     lip_surface,
     section_points,
 )
+from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.rendering.lighting import unit
 

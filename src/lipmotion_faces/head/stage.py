@@ -1,4 +1,4 @@
-"""The character before the camera: pictures of poses."""
+"""The character before the camera, its pictures, and its blendshapes."""
 
 from __future__ import annotations
 

@@ -135,8 +135,7 @@ def frame_count(generation: Generation, fps: float) -> int:
 
 def write_frames(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, sound: Audio) -> None:
     """Write pictures with their sound in the format of the suffix. Raises ExportError: the file cannot be written."""
-    from lipmotion_faces.video.mp4 import write_mp4
-    from lipmotion_faces.video.transparent import write_pictures, write_with_alpha
+    from lipmotion_faces.video.mp4 import write_mp4, write_pictures, write_with_alpha
 
     if is_picture_sequence(path):
         write_pictures(path, frames)

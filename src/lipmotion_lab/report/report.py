@@ -46,8 +46,7 @@ from lipmotion_lab.report.sections import (
     minnis_section,
     xie_liu_section,
 )
-from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, check_opening, take_quick_part
-from lipmotion_lab.stamp import Stamp
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_CAPTIONS
 from lipmotion_lab.xie_liu2007.systems import COMPARED_SYSTEMS, select_systems

@@ -11,7 +11,7 @@ from typing import Any
 from lipmotion.formats.web_page import Html, element, joined
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.text_table import as_field
-from lipmotion_lab.comparison import sign_of_difference, significance_mark
+from lipmotion_lab.evaluation.evaluate import sign_of_difference, significance_mark
 
 INTERVAL, DIFFERENCE = "_95", "_gain_95"
 """Endings of the keys under which a row has the interval of a figure, and that of its difference from a reference."""

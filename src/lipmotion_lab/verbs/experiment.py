@@ -63,8 +63,7 @@ def run_experiment(
     """
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.files import unfinished_work
-    from lipmotion_lab.runner import ExperimentSettings, take_quick_part
-    from lipmotion_lab.stamp import Stamp
+    from lipmotion_lab.runner import ExperimentSettings, Stamp, take_quick_part
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
         stamp = Stamp()
@@ -171,7 +170,7 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its table."""
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
-    from lipmotion_lab.noise import NoiseConditions, read_talkers
+    from lipmotion_lab.evaluation.held_out import NoiseConditions, read_talkers
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, table, xieliu2007
 
     if options.quick and options.order:

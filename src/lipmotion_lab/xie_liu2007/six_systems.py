@@ -31,24 +31,25 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Example, Monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
-from lipmotion_lab.comparison import (
+from lipmotion_lab.evaluation.evaluate import (
     ClipStatistic,
     correlation_statistic,
     distance_statistic,
+    figures_of,
     opening_curves,
     significance_mark,
 )
-from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
     ComparedClip,
     HeldOutRecordings,
+    NoiseConditions,
+    add_noise,
     generate_clips,
     load_held_out,
 )
 from lipmotion_lab.learning_curve import check_training_names, choose_sizes
-from lipmotion_lab.noise import NoiseConditions, add_noise
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     QUICK_CLIPS,

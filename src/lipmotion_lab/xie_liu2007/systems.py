@@ -22,7 +22,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
 from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, LoudnessRegression, MeanPose, import_torch
-from lipmotion_lab.comparison import correlation_statistic, distance_statistic
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
 
 Options = Mapping[str, Any]

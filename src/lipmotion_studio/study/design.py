@@ -1,4 +1,4 @@
-"""Design of a study: from conditions and sentences to a folder that raters can be shown."""
+"""Design of a study: from conditions and sentences, with their sources, to a folder that raters can be shown."""
 
 from __future__ import annotations
 

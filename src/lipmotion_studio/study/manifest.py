@@ -1,4 +1,4 @@
-"""Studies as folders: ``study.json``, which says what is shown and how it was made, and ``videos/``."""
+"""Studies as folders: ``study.json``, which says what is shown and how it was made, its trials, and ``videos/``."""
 
 from __future__ import annotations
 

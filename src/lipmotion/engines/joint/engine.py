@@ -1,4 +1,4 @@
-"""The joint engine: one hidden Markov model of five streams, of speech, F0 and motion, after Hofer 2008."""
+"""The joint engine and its options: one hidden Markov model of five streams of speech, F0 and motion."""
 
 from __future__ import annotations
 

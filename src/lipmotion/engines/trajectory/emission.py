@@ -1,4 +1,4 @@
-"""Emission densities of motion: a Gaussian for each tied state, whose mean may be regressed on acoustic features."""
+"""Emission densities of motion, a Gaussian for each tied state, and how states and predictor are combined."""
 
 from __future__ import annotations
 

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import TriphoneStates, expand_triphones
-from lipmotion.hmm.network import build_chain
+from lipmotion.hmm.network import LogLikelihoods, build_chain
 
 MIN_VARIANCE = 1.0
 """Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""

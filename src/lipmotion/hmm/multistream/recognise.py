@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import UnitLoop, decode_units
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, expand_triphones
-from lipmotion.hmm.network import NetworkBuilder
+from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder
 from lipmotion.kernels.paths import sample_paths
 
 Grid = NDArray[np.intp]

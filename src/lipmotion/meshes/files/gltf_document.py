@@ -1,4 +1,4 @@
-"""A glTF 2.0 document (``.glb``, ``.gltf``, ``.vrm``): its JSON and buffers, the arrays in them, and its nodes."""
+"""A glTF 2.0 document (``.glb``, ``.gltf``, ``.vrm``): its schema, JSON, buffers, the arrays in them, its nodes."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_character_table, table_path, with_sources
+from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.meshes.fitting.lip_placement import (
     LipPlacement,
     find_opening_shape,
@@ -26,7 +27,6 @@ from lipmotion.meshes.fitting.lip_placement import (
     place_lips_by_points,
     place_lips_by_shape,
 )
-from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights, with_gap
 from lipmotion.meshes.model.binding import ControlBinding, bind, paint_weights
 from lipmotion.meshes.model.face_shapes import FaceShapes, find_face_shapes, measure_lip_parting, numbers_by_name

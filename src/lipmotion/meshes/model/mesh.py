@@ -1,4 +1,4 @@
-"""A character's surface: vertices, triangles, parts with a material, and named blendshapes."""
+"""A character's surface: vertices, triangles, parts with a material, named blendshapes, and bones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The product of chains: the joint states that they can reach together, and the arcs between them."""
+"""The product of chains: the joint states they can reach together, and the arcs between them with probabilities."""
 
 from __future__ import annotations
 

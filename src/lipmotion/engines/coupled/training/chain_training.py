@@ -1,4 +1,4 @@
-"""EM training of coupled chains from speech with motion, with more and more Gaussians."""
+"""EM training of coupled chains, from Viterbi training on, with more and more Gaussians."""
 
 from __future__ import annotations
 

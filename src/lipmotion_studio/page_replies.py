@@ -1,4 +1,4 @@
-"""What is replied to requests for one recording (docs/extend/studio.md)."""
+"""What is replied to requests for one recording, and for the project (docs/extend/studio.md)."""
 
 from __future__ import annotations
 
@@ -23,8 +23,7 @@ from lipmotion.types.values import items
 from lipmotion.units import PHONES, split_words
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_studio.folder import RevisionError
-from lipmotion_studio.presets import find_preset
-from lipmotion_studio.project import APPROVED, MAX_RECORDINGS, ProjectRecording
+from lipmotion_studio.project import APPROVED, MAX_RECORDINGS, ProjectRecording, find_preset
 from lipmotion_studio.recording import OpenRecording
 from lipmotion_studio.requests import Access, member, objects, read_content, seconds, stretch, text, texts, whole
 from lipmotion_studio.studio import Studio
