@@ -4,8 +4,8 @@ A sheet is one JSON file: ``page``, the page that it belongs to; ``tables`` by n
 its stamp; ``stated``, what the text of that page says in figures beside the tables. The stamp of that is the table
 ``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
 ``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A page shows the model, and
-the command as long as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file; an engine and the
-digest of its default options; ``none``, where no model takes part; or words.
+the command as long as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file;
+an engine and the digest of its default options; ``none``, where no model takes part; or words.
 
 In a page a table stands between ``<!-- figures: SHEET.TABLE -->`` and ``<!-- end -->``. Run
 ``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.
@@ -65,7 +65,7 @@ def stamp(table: Sheet, current: frozenset[str]) -> str:
     gone = any(not (ROOT / "benchmarks" / name).exists() for name in re.findall(r"benchmarks/(\w+\.py)", command))
     if not table["columns"]:
         made = made.replace("Earlier", "earlier") if "Earlier" in made else ""
-    line = " · ".join(filter(None, [made, "driver removed" if gone else f"`{command}`" if command else ""]))
+    line = " · ".join(filter(None, [made, f"`{command}`" if command and not gone else ""]))
     title = "" if table["columns"] else "Figures in the text: "
     return f"*{title}{line}*" if line else ""
 
@@ -114,20 +114,18 @@ def not_held(page: Path, text: str, found: Mapping[str, Sheet]) -> list[str]:
 
 
 def overview(found: Mapping[str, Sheet], current: frozenset[str]) -> str:
-    """Return the page of all figures: those at a glance, then the pages with figures of today's and of earlier models."""
+    """Return the page of all figures: those at a glance, then the pages with figures of earlier models."""
     glance = found["glance"]
     lines = ["# Figures at a glance", "", *glance["text"], ""]
     for table in glance["tables"].values():
         lines += [f"## {table['title']}", "", *table.get("text", []), "", rendered(table, current)]
     lines += ["## All figures", "", *glance["all"], ""]
-    pages: dict[bool, dict[str, str]] = {False: {}, True: {}}
+    earlier: dict[str, str] = {}
     for name, sheet in found.items():
-        if name != "glance":
-            earlier = any("Earlier" in made_by(table["model"], current) for table in sheet["tables"].values())
+        if name != "glance" and any("Earlier" in made_by(each["model"], current) for each in sheet["tables"].values()):
             target = f"../{sheet['page']}".replace("../results/", "")
-            pages[earlier][target] = f"[{name}]({target})"
-    lines += [f"- Today's models, or none: {', '.join(pages[False].values())}"]
-    lines += [f"- With figures of an earlier model: {', '.join(pages[True].values())}"]
+            earlier.setdefault(target, f"[{Path(target).stem}]({target})")
+    lines += [f"Pages with figures of an earlier model: {', '.join(earlier.values())}."]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"
 
 
