@@ -63,10 +63,10 @@ def stamp(table: Sheet, current: frozenset[str]) -> str:
     """
     command, made = table.get("command", ""), made_by(table["model"], current)
     gone = any(not (ROOT / "benchmarks" / name).exists() for name in re.findall(r"benchmarks/(\w+\.py)", command))
-    if not table["columns"]:
+    title = f"{table['title']}: " if table.get("title") and not table["columns"] else ""
+    if title:
         made = made.replace("Earlier", "earlier") if "Earlier" in made else ""
     line = " · ".join(filter(None, [made, f"`{command}`" if command and not gone else ""]))
-    title = "" if table["columns"] else "Figures in the text: "
     return f"*{title}{line}*" if line else ""
 
 
