@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, CorpusError
-from lipmotion.hmm.align import StateSequence, align_states, choose_pronunciations, expand_states
+from lipmotion.hmm.align import align_states, choose_pronunciations, expand_states
 from lipmotion.hmm.baum_welch import (
     UnitStatistics,
     adapt_contexts,
@@ -251,28 +251,20 @@ def _flat_start(
     for x, sequence in zip(data, sequences, strict=True):
         chain = expand_states(hmm, sequence)
         posterior = np.zeros((len(x), len(chain.plain)))
-        posterior[np.arange(len(x)), _guess_path(x[:, inventory.energy], chain, len(sequence))] = 1
+        energy = x[:, inventory.energy]
+        # silence lasts up to the first loud frame, and from the last one; the other states divide the rest evenly
+        above = np.nonzero(smooth_level(energy, ONSET_FRAMES) > 0)[0]
+        onset, offset = (int(above[0]), int(above[-1]) + 1) if len(above) else (0, len(energy))
+        silence = int((chain.positions == 0).sum())
+        speech = int(((chain.positions > 0) & (chain.positions < len(sequence) - 1)).sum())
+        path = np.empty(len(energy), np.intp)
+        path[:onset] = np.arange(onset) * silence // max(onset, 1)
+        path[onset:offset] = silence + np.arange(offset - onset) * speech // max(offset - onset, 1)
+        tail = len(energy) - offset
+        path[offset:] = silence + speech + np.arange(tail) * (len(chain.plain) - silence - speech) // max(tail, 1)
+        posterior[np.arange(len(x)), path] = 1
         statistics.add(x, collect_statistics(chain, posterior, np.zeros(len(chain.plain))))
     return replace(hmm, mixtures=reestimate_mixtures(hmm, statistics, data))
-
-
-def _guess_path(energy: NDArray[np.float32], chain: StateSequence, units: int) -> NDArray[np.intp]:
-    """Return a first guess of the state in each frame [shape=(T,)].
-
-    energy : log energy [shape=(T,)]
-    chain  : the states of the utterance, of so many units
-    Silence lasts up to the first loud frame, and from the last one; the other states divide the rest evenly.
-    """
-    above = np.nonzero(smooth_level(energy, ONSET_FRAMES) > 0)[0]
-    onset, offset = (int(above[0]), int(above[-1]) + 1) if len(above) else (0, len(energy))
-    silence = int((chain.positions == 0).sum())
-    speech = int(((chain.positions > 0) & (chain.positions < units - 1)).sum())
-    path = np.empty(len(energy), np.intp)
-    path[:onset] = np.arange(onset) * silence // max(onset, 1)
-    path[onset:offset] = silence + np.arange(offset - onset) * speech // max(offset - onset, 1)
-    tail = len(energy) - offset
-    path[offset:] = silence + speech + np.arange(tail) * (len(chain.plain) - silence - speech) // max(tail, 1)
-    return path
 
 
 def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> UnitHmm:

@@ -126,11 +126,6 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         if target == "rotation" and kind in TURNING and kind not in turns:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
-    return _merge_tracks(document, tracks, ordered), Timeline(())
-
-
-def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
-    """Return all curves of some tracks at one rate."""
     longest = max(tracks, key=lambda track: len(track.time_s))
     end_s = max(float(track.time_s[-1]) for track in tracks)
     hertz = _rate(longest.time_s)
@@ -146,11 +141,11 @@ def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[i
     columns = choose_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
     curves = dict(every[column] for column in columns)
     channels = [Channel(name, WEIGHT) for name in curves]
-    if turns:
-        angles = np.unwrap(head_angles(_turn_head(document, turns, time_s)), axis=0)
+    if ordered:
+        angles = np.unwrap(head_angles(_turn_head(document, ordered, time_s)), axis=0)
         curves |= dict(zip(ANGLES, angles.T, strict=True))
         channels += [Channel(name, RADIAN) for name in ANGLES]
-    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels))
+    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels)), Timeline(())
 
 
 def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import Single, StreamGroup, zero_emission_statistics
 from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Product, Transitions, initial_transitions, reachable
+from lipmotion.engines.coupled.chains.product import Transitions, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, estimated_grammar, uniform_path
 from lipmotion.engines.coupled.training.em_steps import (
@@ -155,7 +155,11 @@ def _reestimated_along(
             posterior = np.eye(len(densities), dtype=np.float32)[column]
             statistics.accumulate(group, utterance.observations, densities, posterior, None)
         emission_statistics.append(statistics)
-    arc_counts = _arc_counts(transitions.product, paths)
+    count = len(transitions.product.joint_states)
+    keys = transitions.product.arc_to * count + transitions.product.arc_from
+    steps = np.concatenate([path[1:] * count + path[:-1] for path in paths])
+    positions = np.minimum(np.searchsorted(keys, steps), len(keys) - 1)
+    arc_counts = np.bincount(positions[keys[positions] == steps], minlength=len(keys)).astype(float)
     statistics_of_paths = ChainStatistics(tuple(emission_statistics), arc_counts, 0.0, 1)
     chains = m_step(chains, statistics_of_paths, floors, streams=range(len(chains.streams)), transitions=False)
     transitions = transitions.reestimated(arc_counts)
@@ -194,15 +198,6 @@ def _with_borrowed_densities(
 def _best_path(chains: Chains, utterance: LatticeUtterance) -> Index:
     emissions = chains.emission_log_densities(utterance.observations, utterance.lattice)
     return chains.best_path(emissions, utterance.lattice)[0]
-
-
-def _arc_counts(product: Product, paths: Sequence[Index]) -> NDArray[np.float64]:
-    """Return how often each arc lies on the paths [shape=(E,)]; steps for which there is no arc are ignored."""
-    count = len(product.joint_states)
-    keys = product.arc_to * count + product.arc_from
-    steps = np.concatenate([path[1:] * count + path[:-1] for path in paths])
-    positions = np.minimum(np.searchsorted(keys, steps), len(keys) - 1)
-    return np.bincount(positions[keys[positions] == steps], minlength=len(keys)).astype(float)
 
 
 FRAMES_A_GAUSSIAN = 25.0
