@@ -56,7 +56,6 @@ NECK_SHARE = 0.4
 STILL: Turn = (0.0, 0.0, 0.0)
 WIDTH, HEIGHT = 1280, 720
 FRAMES_AHEAD = 2
-"""Pictures that are drawn before they are asked for."""
 
 
 class MeshPose(NamedTuple):

@@ -31,7 +31,6 @@ HIGHEST_RATE_HZ = 120.0
 LEAST_FRAMES = 4
 """Without them there is no third difference."""
 UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "eyeBlink", "eyeSquint", "eyeWide")))
-"""Curves of the upper face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +168,6 @@ def _common_times(reference: _Side, other: _Side, rate_hz: float) -> tuple[Array
 
 
 def _values(motion: Motion, names: Sequence[str]) -> Array:
-    """Return the values of some channels [shape=(T, len(names))]."""
     return np.asarray(motion.values[:, [motion.column(name) for name in names]], np.float64)
 
 

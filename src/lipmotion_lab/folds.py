@@ -40,7 +40,6 @@ from lipmotion_lab.runner import (
 
 FOLDS = 5
 _ABOUT = "about"
-"""Name of the array of a kept fold with all but its clips."""
 
 
 @dataclass(frozen=True, eq=False)

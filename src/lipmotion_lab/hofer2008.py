@@ -47,12 +47,10 @@ from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, PartKey, 
 PAPER_SCORES: dict[str, float] = {"eVis": 68.8, "pbVis": 67.7, "sVis": 67.4, "2vis": 66.5, "phone": 65.2}
 """Closure scores of Table 1, the best first."""
 REFERENCE_SET = "phone"
-"""The unit set that every other one is compared with."""
 PRESET = "hofer2008"
 PINS = {"as printed": False, "lips made to meet on p b m": True}
 """Whether motion is generated with pins in p, b and m, by the name of the block of the table."""
 _ACC, _COUNTS = "table1/acc", "table1/gaussians"
-"""Names of the arrays of a kept model that say how its number of Gaussians was chosen."""
 
 
 @dataclass(frozen=True)

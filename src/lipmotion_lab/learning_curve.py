@@ -36,7 +36,6 @@ SIZES = (20, 50, 100, 200)
 OTHERS = ("width", "outer")
 """Channels that are compared beside the opening."""
 _ROW = "row"
-"""Name of the array of a kept size: the threshold of a closed mouth, and its row."""
 
 
 @one_thread()

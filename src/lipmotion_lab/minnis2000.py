@@ -156,7 +156,6 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
 }
 """Other readings of the print, and what it leaves open."""
 _ROW, _SUMS = "row", "correlation"
-"""Names of the arrays of a kept row: its figures, and the sums over clips of its correlation."""
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 

@@ -207,9 +207,7 @@ PACKAGES = ("lipmotion", "numpy", "scipy", "numba", "av", "pocketsphinx", "hama"
 ROOT = Path(__file__).parents[3]
 """The root of a checkout of the source, where the package is in one."""
 DIGITS = 8
-"""Digits of a SHA-256 that name an engine's options."""
 CPU_INFO = Path("/proc/cpuinfo")
-"""Where Linux names the processor."""
 
 
 class Stamp:

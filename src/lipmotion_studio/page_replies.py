@@ -269,7 +269,6 @@ class RecordingReplies:
         return await self._workspace.run(number, reply)
 
     def _waiting(self, number: int) -> Response:
-        """Return the reply for a recording that is not ready."""
         document = self._studio.recording_document(number) | {"media": self._media(number)}
         if document["status"] == READY:  # since it was looked up: its state comes with the next request
             document["status"] = WORKING

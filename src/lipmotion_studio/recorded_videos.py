@@ -66,7 +66,6 @@ def sound_begins_s(video: Path, sound: Path) -> float:
 
 
 def _loudness(path: Path) -> NDArray[np.float64]:
-    """Return the loudness of a sound, ``LOUDNESS_HZ`` values a second."""
     samples, each = np.abs(read_audio(path, warn=False).samples), SPEECH_RATE_HZ // LOUDNESS_HZ
     return np.sqrt(samples[: len(samples) // each * each].reshape(-1, each).mean(axis=1, dtype=float))
 

@@ -55,7 +55,6 @@ ORDERS = ("", "doubt")
 OTHER = "other"
 """What requests call the model that the project's is compared with."""
 DIGEST_DIGITS = 8
-"""Figures of a digest that people see."""
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,6 @@ FORMAT, VERSION = "lipmotion.training", 1
 MAX_WARNINGS = 200
 """Warnings, and recordings that are not used, that the page shows."""
 MAX_LISTED = 500
-"""Videos of a project that the page lists."""
 MAX_UNFINISHED = 0.99
 """The share of the work that is shown, at most, until it is done."""
 
@@ -236,7 +235,6 @@ class Trainer:
         )
 
     def _follow(self, process: BaseProcess, pipe: Connection) -> None:
-        """Take what the process reports until it ends."""
         with pipe, suppress(EOFError, OSError):
             while True:
                 self._take(pipe.recv())

@@ -119,8 +119,6 @@ def run_training(order: TrainingOrder, report: Report) -> None:
 
 
 class _WarningHandler(logging.Handler):
-    """Reports warnings."""
-
     def __init__(self, report: Report) -> None:
         super().__init__(logging.WARNING)
         self._report = report

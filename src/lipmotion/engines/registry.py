@@ -21,7 +21,6 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
 )
 
 DEFAULT = "trajectory"
-"""The engine that is used where none is named."""
 
 
 def engine_named(name: str, configuration: Mapping[str, Any] | None = None, *, stored: bool = False) -> Engine[Any]:

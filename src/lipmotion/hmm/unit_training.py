@@ -175,7 +175,6 @@ class _Training:
             stage.em(self._hmm, self._data, self._sequences, steps, after_step, self._map)
 
     def _report(self, stage: _Stage, figure: float | None) -> None:
-        """Store and report a step."""
         self._done += 1
         sequences = np.array([" ".join(units) for units in self._sequences])
         progress = {"said": sequences, "done": np.array(self._done)}
@@ -204,7 +203,6 @@ class _Training:
         self._hmm = replace(self._hmm, mixtures=self._hmm.mixtures.split())
 
     def _add_contexts(self) -> float:
-        """Add states in context; return their number."""
         silence, pause = self._inventory.silence, self._inventory.pause
         spoken = [tuple(silence if unit == pause else unit for unit in units) for units in self._sequences]
         typical_fit = float(np.mean([self._hmm.fit(x) for x in self._data]))

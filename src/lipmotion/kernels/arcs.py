@@ -77,7 +77,6 @@ _Groups = list[tuple[Index, Index]]
 
 
 def _groups(arc_from: Index, arc_start: Index) -> _Groups:
-    """Return the states and arcs of all blocks."""
     members: dict[bytes, list[tuple[int, Index]]] = defaultdict(list)
     stops = np.append(arc_start[1:], len(arc_from))
     for state in np.flatnonzero(stops - arc_start >= LEAST_BLOCK):
@@ -121,7 +120,6 @@ def _runs(source: Index, target: Index) -> tuple[Index, Index]:
 
 
 def _blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
-    """Return ``blocks``, ``block_sources`` and ``block_arcs`` of ``ArcLayout``."""
     total = sum(len(arcs) for _, arcs in groups)
     widest = max((-(-len(targets) // PADDING_ROWS) * PADDING_ROWS for targets, _ in groups), default=PADDING_ROWS)
     blocks, sources, matrix = (

@@ -109,7 +109,6 @@ def _eliminated(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Row
 
 
 def _substituted(inverse: Rows, lower1: Rows, lower2: Rows, x: Rows) -> tuple[Array, Array]:
-    """Return the solution and the diagonal of the inverse from the factors."""
     values, variances = Rows(), Rows()
     value = next_value = variance = next_variance = 0.0
     beside = 0.0  # of the inverse, between the next row and the one after it

@@ -321,13 +321,11 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
 
 
 def _least_probability(loop: Loop) -> float:
-    """Return the least probability of a loop that is not 0."""
     parts = (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
     return min(float(part.min(where=part > 0, initial=1.0)) for part in parts)
 
 
 def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors:
-    """Return the result for a recording without a path."""
     counts = [
         LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
         for loop in (audio, visual)
@@ -427,7 +425,6 @@ def _backward(
 
 @compiled_to_rounding
 def _combine(one: Array, weight: float, other: Array, other_weight: float, into: Array) -> None:
-    """Fill in the weighted sum of two rows."""
     first, second = into.dtype.type(weight), into.dtype.type(other_weight)
     for j in range(len(into)):
         into[j] = first * one[j] + second * other[j]

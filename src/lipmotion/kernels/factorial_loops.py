@@ -220,14 +220,11 @@ _Decisions = tuple[NDArray[Any], NDArray[Any]]
 
 
 def _take_better(score: Array, decision: NDArray[Any], other: Array, number: int) -> None:
-    """Replace scores by greater ones, and their decisions by a number."""
     np.copyto(decision, number, where=other > score)
     np.maximum(score, other, out=score)
 
 
 class _FactorialSearch(NamedTuple):
-    """The search in both loops for one recording."""
-
     audio: LogTransitions
     visual: LogTransitions
     logs: FactorialLogLikelihoods

@@ -162,8 +162,6 @@ def fit_network(
 
 
 class _AdamW:
-    """Moments of the gradients of some parameters, which it changes in place."""
-
     def __init__(self, parameters: Sequence[Array]) -> None:
         self.parameters = parameters
         self.means = [np.zeros_like(array) for array in parameters]

@@ -21,7 +21,6 @@ Likelihood = Callable[[Array], Array]
 """Function of N sufficient statistics [shape=(N, K)], the number of frames first: returns the log likelihood of each
 under the density estimated from it [shape=(N,)]."""
 MIN_VARIANCE = 1e-12
-"""Smallest variance of a Gaussian."""
 TIE = 1e-10
 """Gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal."""
 

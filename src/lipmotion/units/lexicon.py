@@ -164,7 +164,6 @@ class Lexicon:
         return tuple(dict.fromkeys(forms))
 
     def _pronounce(self, word: str) -> tuple[Pronunciation, ...]:
-        """Return the pronunciations of one word."""
         if word in self.user:
             return self.user[word]
         entries = _dictionary_entries(word) or _dictionary_entries(remove_accents(word))

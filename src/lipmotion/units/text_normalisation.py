@@ -14,7 +14,6 @@ from lipmotion.units.spelling import normalise_text, plain_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
-"""A Chinese character."""
 INITIALS = re.compile("[A-Z]{2,5}s?")
 """What may be letters that are said one by one."""
 RANGE = re.compile(
@@ -77,7 +76,6 @@ def tokenise(text: str) -> tuple[str, ...]:
 
 @cache
 def _scanner() -> re.Pattern[str]:
-    """Return what finds written forms, signs, words, and numbers beside letters."""
     word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
     forms = [rf"(?:{form})(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
@@ -196,7 +194,6 @@ def split_sentences(text: str) -> list[str]:
 
 
 def _divide(text: str) -> Iterator[str]:
-    """Yield the sentences of a text as punctuation divides it."""
     start = 0
     for end in _END.finditer(text):
         before = text[start : end.start()].rsplit(" ", maxsplit=1)[-1].lstrip("\"'(“‘«")

@@ -138,7 +138,6 @@ def _number(digits: str) -> Iterator[str]:
 
 
 def _decimal(digits: str) -> Iterator[str]:
-    """Yield the readings of a decimal."""
     whole, _, part = digits.replace(",", "").partition(".")
     for first in (_cardinal(whole), "oh", "") if whole == "0" else (_cardinal(whole),) if whole else ("", "zero"):
         yield f"{first} point {_spelled(part)}"
@@ -181,13 +180,11 @@ def _hour(digits: str, later: int = 0) -> str:
 
 
 def _roman(numeral: str) -> str:
-    """Return a Roman number in digits."""
     values = [{"I": 1, "V": 5, "X": 10}[letter] for letter in numeral.upper()]
     return str(sum(-one if one < after else one for one, after in zip(values, [*values[1:], 0], strict=True)))
 
 
 def _thousands(amount: str) -> str:
-    """Return so many thousands in digits."""
     return str(round(float(amount.replace(",", "")) * 1000))
 
 

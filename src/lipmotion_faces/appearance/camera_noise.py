@@ -25,7 +25,6 @@ ROUNDING_VARIANCE = 1 / 12
 FIELD_SCALE = 2
 """Height and width of the field of noise, in heights and widths of a picture."""
 WHITE = 255
-"""The largest level of a colour."""
 LARGEST_SPREAD_PX = 3.0
 """Noise is taken to be spread over no more: what is smoother is movement."""
 MIN_CORRELATION = 0.02
@@ -151,7 +150,6 @@ NOISE_ARRAYS = {
     "noise_covariance": ArraySpec(np.float64, "3 3", -(255.0**2), 255.0**2),
     "noise_spread_px": ArraySpec(np.float64, "2", 0, LARGEST_SPREAD_PX),
 }
-"""The arrays of the noise of a camera."""
 
 
 def _neighbours(values: NDArray[np.float32], axis: int) -> Array:

@@ -25,7 +25,6 @@ MIXED_CANDIDATES, MIXTURE_SHARE = 20, 0.95
 LEAST_NEARNESS = 1e-3
 """The furthest of them is penalised as if its squared distance were smaller by this share than the largest one."""
 PICTURES_AT_ONCE = 16
-"""Pictures that are restored at a time."""
 BLOCK = 2048
 """Pictures whose distances to all candidates are in memory at a time."""
 LARGEST_DETAIL = 100

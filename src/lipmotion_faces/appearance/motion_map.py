@@ -145,4 +145,3 @@ MOTION_MAP = {
     "centres": ArraySpec(np.float32, "N E"),
     "coefficients": ArraySpec(np.float32, "R V"),
 }
-"""The arrays of a regression."""

@@ -84,7 +84,6 @@ JAW_CANDIDATES = 120
 """Recorded lower faces whose detail the jaw has."""
 JAW_OPTIONS = RefinementOptions(steadiness=0.3)
 PICTURES_PER_BLOCK = 256
-"""Pictures that are projected at a time."""
 EDGE_PX = 3
 """The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
 LIP_DISTANCES = ("opening", "width", "outer")
@@ -368,7 +367,6 @@ CRF = 6.0
 PARTS = ("mouth", "jaw", "from_motion", "noise")
 """Prefixes of the names of the arrays of parts."""
 REMEDY = "build the face again"
-"""What to do about a damaged file."""
 
 
 def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
@@ -440,7 +438,6 @@ APPEARANCE = {
     "from_mouth": ArraySpec(np.float32, "F J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
     "from_sound": ArraySpec(np.float32, "2 J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
 }
-"""The arrays of an appearance, beside those of its parts."""
 
 
 def _check_size(name: str, space: Eigenlips, size: tuple[int, int]) -> None:

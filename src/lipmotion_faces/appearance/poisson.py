@@ -168,7 +168,6 @@ LARGEST_EDGE = 2048
 CHUNK = 1 << 17
 """About the number of pixels that are interpolated at once: what fits into the cache of a processor."""
 BATCH = 64
-"""Number of pictures that are solved at once."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -169,7 +169,6 @@ def _add_margins(
 LOG = logging.getLogger("lipmotion")
 
 _STAGE = "dividing long videos"
-"""Name of the stage in reports of progress."""
 DIVIDING_SHARE = 0.2
 """Share of the whole preparation that this takes, for reports of progress."""
 VIDEO = "one video"

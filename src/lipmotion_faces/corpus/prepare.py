@@ -47,7 +47,6 @@ RECIPE = "5"
 NAMED_UTTERANCES = 5
 """Utterances that a warning names."""
 _STAGE = "preparing recordings"
-"""Name of the stage in reports of progress."""
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,6 @@ def read_supplied_phones(recording: SourceRecording, duration_s: float) -> Timel
 
 
 def _contain_speech(spans: Iterable[Span[Unit]]) -> bool:
-    """Return whether any label is not silence."""
     return any(not is_silent(span.label.phone) for span in spans)
 
 

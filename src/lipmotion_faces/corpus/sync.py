@@ -22,7 +22,6 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 REACH_S = 0.4
 """Largest offset that is considered, in seconds, in both directions."""
 OPENING = "opening"
-"""The channel that is compared with the sound."""
 REMOVED_MS = "offset_removed_ms"
 """Key in the source of an utterance: milliseconds by which its sound was moved."""
 LEAST_MOVE_S = 0.005

@@ -83,7 +83,6 @@ def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Fr
 
 Frames = Iterator[NDArray[np.uint8]]
 RENDERING = "rendering the video"
-"""Name of the stage in reports of progress."""
 LOG = logging.getLogger("lipmotion")
 FILM = Outputs()
 """How a filmed face is shown where nothing is said."""

@@ -190,7 +190,6 @@ BACKGROUND = {
     "chin_px": ArraySpec(np.float64, "T", 0, 1000),
     "cuts": ArraySpec(np.intp, "c", 1, LARGEST_NUMBER, optional=True),
 }
-"""The arrays of a background, beside those of its video."""
 TAKE = {
     "sound": ArraySpec(np.int16, "S", -FULL_SCALE - 1, FULL_SCALE),
     "sound_rate_hz": ArraySpec(np.intp, "", 8000, 48_000),
@@ -198,7 +197,6 @@ TAKE = {
     "rate_hz": ArraySpec(np.float64, "", POSITIVE, 1000),
     "seen": ArraySpec(np.bool_, "T"),
 }
-"""The arrays of some speech with motion."""
 
 
 def _background(arrays: Arrays) -> StoredBackground:

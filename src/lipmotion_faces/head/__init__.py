@@ -23,7 +23,6 @@ __all__ = ["Head"]
 SIZE = (1280, 720)
 """Width and height of pictures whose size is not given."""
 FRAMES_AHEAD = 2
-"""Pictures that are drawn before they are asked for."""
 
 
 @final

@@ -263,7 +263,6 @@ def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
 
 
 def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:
-    """Return which points lie in a closed polygon [shape=(N,)]."""
     following = np.roll(polygon, -1, axis=0)
     inside = np.zeros(len(points), bool)
     for (xa, ya), (xb, yb) in zip(polygon.tolist(), following.tolist(), strict=True):

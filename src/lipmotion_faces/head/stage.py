@@ -151,7 +151,6 @@ PARTING = ("jawOpen", "mouthClose", "mouthLowerDown", "mouthUpperUp")
 GAP_WEIGHT = 12.0
 """How much the distance between the lips counts against the places of their vertices."""
 AT_ONCE = 256
-"""Poses that are computed together."""
 COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
 

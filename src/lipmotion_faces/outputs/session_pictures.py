@@ -66,5 +66,4 @@ class SessionPictures:
 
     @cached_property
     def _prosody(self) -> Prosody:
-        """Loudness and pitch of the sound of videos."""
         return measure_prosody(read_sound(self._session.request.recording))

@@ -223,7 +223,6 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
 
 
 def _seen(performance: Performance) -> Generation:
-    """Return the motion as videos show it."""
     settings = performance.settings
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
     if performance.generation.curve_edits:

@@ -183,7 +183,6 @@ def drawn_half_width(lips: LipDesign, pose: MouthPose) -> float:
 
 
 def _round_hole(pose: MouthPose) -> float:
-    """Return half the width of the hole of protruded lips."""
     return ROUND_HOLE[0] + ROUND_HOLE[1] * pose.gap
 
 

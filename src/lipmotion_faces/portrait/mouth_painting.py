@@ -205,7 +205,6 @@ def _flat_textures(colours: Palette) -> MouthTextures:
 
 
 def _shaded_textures(colours: Palette) -> MouthTextures:
-    """Return textures with light and shade."""
     depth, x = _grid(9, 33)
     seam = np.sin(np.pi * depth) ** 0.5 * (1 - 0.6 * np.abs(x) ** 3)
     depth, x = _grid(12, 17)

@@ -302,7 +302,6 @@ def paint_head(window: Window, design: Design) -> Layer:
 
 
 def _paint_nose(layer: Layer, design: Design) -> None:
-    """Paint nose and philtrum."""
     colours, wide = design.palette, (design.nose_width, 1.0)
     layer.fill(ellipse(0, 0.61, 0.19, 0.06) * wide, colours.skin_shade, opacity=0.75, blur=0.03)
     layer.fill(ellipse(0, 0.545, 0.13, 0.075) * wide, colours.skin_light, opacity=0.7, blur=0.04)

@@ -247,7 +247,6 @@ def check_matrix(matrix: Points) -> Points:
 
 Points = NDArray[np.float64]
 LARGEST_SIDE_RATIO = 4.0
-"""Largest ratio of the sides of a picture."""
 LARGEST_FILE_BYTES, MOST_ELEMENTS, DEEPEST_NESTING = 8 << 20, 20_000, 60
 """Most bytes of a drawing, elements in it, and elements in one another."""
 MOST_COVERED_PICTURES, LINES_PER_PICTURE = 200.0, 100.0

@@ -139,8 +139,6 @@ class TrackedFrames:
 
 @dataclass(eq=False)
 class _Pictures:
-    """The frames so far: times, and whether each shows the face; points and mouth thumbnails of those that do."""
-
     times_s: list[float] = field(default_factory=list)
     seen: list[bool] = field(default_factory=list)
     points: list[Array] = field(default_factory=list)

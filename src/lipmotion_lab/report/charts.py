@@ -30,8 +30,6 @@ class Dot:
 
 @dataclass(frozen=True)
 class _Scale:
-    """Where values stand on an axis: ``low`` at ``start``, ``high`` at ``stop``."""
-
     low: float
     high: float
     start: float

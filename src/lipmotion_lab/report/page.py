@@ -290,5 +290,4 @@ def _clip(part: FinishedPart) -> list[Html]:
 
 
 def _listed(entries: Mapping[str, str]) -> Html:
-    """Return texts by name, one a line."""
     return element("dl", *(joined(element("dt", key), element("dd", text)) for key, text in entries.items()))

@@ -140,7 +140,6 @@ PARTS: dict[str, ReportPart] = {
 PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
 """The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
 KEY_DIGITS = 8
-"""Digits of a key in the name of a folder."""
 NOT_YET = "not finished; the same command goes on with it"
 FAILED, AGAIN = "failed: ", "mend that, then give the same command: it goes on with it"
 NOT_CHOSEN = "not chosen"
@@ -240,8 +239,6 @@ def _check_folder(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class _Writer:
-    """Runs experiments and writes their folders and the page."""
-
     corpus: Corpus
     folder: Path
     quick: bool

@@ -272,7 +272,6 @@ class PaperOrder:
         return ", ".join(f"{name} {value:{form}}" for name, value in known)
 
     def _best(self, values: Mapping[str, float | None]) -> list[str]:
-        """Return the names of the best value; none where none is defined."""
         known = {name: value for name, value in values.items() if value is not None}
         best = (min if self.is_error else max)(known.values(), default=None)
         return [name for name, value in known.items() if value == best]

@@ -20,13 +20,11 @@ from lipmotion_lab.xie_liu2007.systems import TrainedSystem
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
 """Recordings that are shown in one picture."""
 PLOT_FILES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
-"""File names of the pictures like Figs. 7, 10 and 11."""
 PLOT_CAPTIONS = {
     PLOT_FILES["start"]: "As Fig. 7: conversion by ph-vi-CHMM of one recording, from means along the best path by EM",
     PLOT_FILES["steps"]: "As Fig. 10: convergence of the conversion, by steps of EM",
     PLOT_FILES["clips"]: "As Fig. 11: predicted beside recorded motion, ph-vi-CHMM",
 }
-"""What the pictures show, by their file names."""
 
 
 def import_figure() -> Any:

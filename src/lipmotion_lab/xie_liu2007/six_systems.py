@@ -181,8 +181,6 @@ def xieliu2007(  # noqa: PLR0913
 
 @dataclass(frozen=True, eq=False)
 class _TrainedSystems:
-    """Systems trained on some utterances, whose names are ``used``, and the held-out recordings."""
-
     used: tuple[str, ...]
     recordings: HeldOutRecordings
     systems: Mapping[str, TrainedSystem]
@@ -297,7 +295,6 @@ def _generate(
     systems: Mapping[str, TrainedSystem],
     kept: Checkpoint = NO_CHECKPOINT,
 ) -> dict[str, list[ComparedClip]]:
-    """Return what all systems generate in one condition."""
     made = {}
     for name, system in systems.items():
         stage = f"{condition}-{name}"
@@ -363,7 +360,6 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
 
 WIDTH = 34
 NAMED_CHANNELS = 8
-"""Most channels that are named one by one."""
 HEAD = (
     f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
     "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
@@ -423,7 +419,6 @@ def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any], amse_f
 
 
 def _pair_lines(pairs: Sequence[Mapping[str, Any]], amse_form: str) -> list[str]:
-    """Return the lines of the paper's order, pair by pair."""
     if not pairs:
         return []
     lines = ["", f"  {'in the paper better than':{2 * WIDTH}}{'ACC (95 %)':27}AMSE (95 %)"]

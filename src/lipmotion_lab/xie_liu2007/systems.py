@@ -161,7 +161,6 @@ def list_changed_options(config: CoupledConfig) -> dict[str, Any]:
 
 
 REFERENCE_SYSTEM = "ph-vi-CHMM"
-"""The system that every other one is compared with."""
 PAPER_FIGURES: dict[str, tuple[float, float]] = {
     "ph-HMM": (8.043, 0.581),
     "ph-MSHMM": (8.050, 0.576),
@@ -175,7 +174,6 @@ BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
 TUNED = ", tuned"
 ABOUT = "about"
-"""Name of the array with settings and figures of a stored system."""
 MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
 
 

@@ -67,7 +67,6 @@ POSSIBLE = {
     MOS: f"a whole number from 1 to {HIGHEST_MOS}",
     RANKING: f"a whole number from 0 to {HIGHEST_RANK}",
 }
-"""The values of each kind, in words."""
 
 
 def is_possible(kind: str, value: str) -> bool:

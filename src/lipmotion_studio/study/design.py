@@ -45,7 +45,6 @@ from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, Region, Study
 
 MODEL_SUFFIX, JOB_SUFFIX = ".lipmotion", ".toml"
 SHIPPED = "shipped"
-"""The source that is the model in the package."""
 
 
 @dataclass(frozen=True)
@@ -204,8 +203,6 @@ def encode_video(source: Path, target: Path, sound: Path, region: Region, late_m
 
 
 class _Counted:
-    """Pictures, and how many have been taken."""
-
     def __init__(self, pictures: Iterable[Pictures]) -> None:
         self._pictures = pictures
         self.count = 0

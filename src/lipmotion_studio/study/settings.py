@@ -44,7 +44,6 @@ ASKED = {
     MOS: "How good is the mouth in this video?",
     RANKING: "How well do the lips match the sound? 0 is not at all, 100 is perfectly.",
 }
-"""The question of a page, for each kind."""
 CONSENT = """You will watch short videos of a person or a drawn face speaking, and judge how the mouth moves. Some of the videos are recordings of people; in others a program makes the mouth move.
 Taking part is voluntary. You may stop at any time by closing the page, without a reason.
 Stored are your judgements, how often you played each video, and how long each judgement took; under a number, without your name, address or anything about your device.

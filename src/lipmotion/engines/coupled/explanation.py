@@ -78,7 +78,6 @@ Array = NDArray[np.float64]
 MOST_STATES = 3
 """Greatest number of states of a chain that an explanation names."""
 REST = "rest"
-"""Name of what the mean comes from in silence away from speech."""
 MIN_PROBABILITY = 0.005
 """States and regressions with less probability are not named."""
 
@@ -175,7 +174,6 @@ def concatenated(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
 
 
 def _most_probable(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
-    """Return the most probable of some named states or regressions, the most probable first."""
     best = np.argsort(-probability, kind="stable")[:MOST_STATES]
     named = [NamedProbability(names[i], float(probability[i])) for i in best]
     return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))

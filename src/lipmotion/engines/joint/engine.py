@@ -165,7 +165,6 @@ class JointEngineConfig(Configuration):
 
 
 PREFIX = "joint_"
-"""Prefix of the names of the arrays of the joint model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,13 +398,11 @@ def _own_times(
 
 
 def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
-    """Return the best state sequence within the times of given units."""
     sequence, bounds = units_to_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
     return align(model.hmm, observations, sequence, bounds)
 
 
 def _density_names(hmm: JointHmm, path: StatePath) -> tuple[str, ...]:
-    """Return, for every state of a path, its name and the name of its density of motion."""
     forest = hmm.models[MOTION].forest
     return tuple(
         f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"

@@ -17,7 +17,6 @@ from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, find_similar_lips
 
 LINE = 110
-"""Width of a line of text, in characters."""
 
 
 def source_of(inventory: RecordedUnits, unit: int) -> str:

@@ -35,7 +35,6 @@ MIDDLE: Overlaps = dict.fromkeys(TABLE_1, 0.5)
 LEARNED: Overlaps = {**MIDDLE, (NORMAL, PROTECTED): 0.1}
 """The shares with the least errors of joined motion on the training list of GRID s1 (docs/results/selection.md)."""
 OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "symmetric": SYMMETRIC, "middle": MIDDLE}
-"""Tables of overlaps by name."""
 
 
 def lip_reading_class(phone: str, invisible: Collection[str]) -> str:

@@ -203,7 +203,6 @@ GUIDE = {
 
 
 def _check(inventory: RecordedUnits) -> None:
-    """Raise ValueError if the parts of an inventory contradict one another."""
     windows, first, rows = inventory.windows, inventory.first, inventory.kept.ravel()
     if len(first) != len(inventory.names) + 1 or first[0] != 0 or (np.diff(first) < 1).any():
         raise ValueError("recording_first is not rising from 0, with one number for each recording and one more")

@@ -55,7 +55,6 @@ def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
 
 
 def _segments(duration_s: float) -> Timeline[Unit]:
-    """Return segments of equal duration; their phone is not used."""
     edges = np.linspace(0, duration_s, max(round(duration_s / SEGMENT_S), 1) + 1).tolist()
     return Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
 

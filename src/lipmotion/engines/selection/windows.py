@@ -20,7 +20,6 @@ SYMBOLS = len(PHONES) + 1
 PHONE_NUMBER = {phone: number for number, phone in enumerate(PHONES)}
 SILENT = PHONE_NUMBER[SILENCE]
 VISEME_NUMBER = np.array([*(list(VISEMES).index(VISEME_OF[phone]) for phone in PHONES), len(VISEMES)])
-"""The viseme of every symbol."""
 UNKNOWN_STRESS = -1
 SHORTEST_S = 0.01
 

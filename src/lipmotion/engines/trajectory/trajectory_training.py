@@ -259,7 +259,6 @@ def fit_trajectory(
 
 
 _STAGE = "trees"
-"""Name of this stage in reports of progress."""
 
 
 def _share_of_predictor(

@@ -142,7 +142,6 @@ def _start(
 def _make_equal_models(
     utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig, streams: Sequence[str]
 ) -> JointHmm:
-    """Return models in which all units have equal densities."""
     occurring = {unit for utterance in utterances for unit in utterance.units} | {inventory.silence}
     spoken = tuple(unit for unit in inventory.names if unit in occurring)
     models = {}
@@ -182,7 +181,6 @@ def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
 
 
 def _run_em(hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int, monitor: Monitor) -> JointHmm:
-    """Return the models after some steps of embedded Baum–Welch."""
 
     def report(step: int, _: JointHmm, statistics: StreamStatistics) -> None:
         monitor(Progress(stage, step, steps, step / steps, statistics.mean_log_likelihood))

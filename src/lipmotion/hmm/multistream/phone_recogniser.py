@@ -33,9 +33,7 @@ studio -9 to -7."""
 SIMILARITY_FRAMES = 400
 """Frames, spread evenly over a recording, from which the speaker similarity score is computed."""
 _CHECKPOINT = "joint"
-"""Name of the stage in a checkpoint."""
 JOINT_PREFIX = "joint_"
-"""Prefix of the names of the arrays of the recogniser."""
 SCORE = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 
 

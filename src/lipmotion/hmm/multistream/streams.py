@@ -16,7 +16,6 @@ SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
 STREAMS = (SPEECH, *F0_STREAMS, MOTION)
 ACOUSTIC_STREAMS = (SPEECH, *F0_STREAMS)
-"""The streams that are computed from sound."""
 
 
 @dataclass(frozen=True)

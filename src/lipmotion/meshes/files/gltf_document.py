@@ -263,7 +263,6 @@ def read_gltf_document(path: Path) -> GltfDocument:
 
 
 def _split_chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
-    """Return the document and the bytes of a GLB."""
     if len(content) < 20:
         raise InputError(f"{len(content)} bytes, required a whole .glb; copy it again")
     _, version, length = struct.unpack_from("<4sII", content)

@@ -217,7 +217,6 @@ def _add_primitive(
 
 
 def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) -> None:
-    """Add the joints of body and head, as the last two nodes, and let all meshes follow them."""
     nodes, pivot = document["nodes"], turn.pivot.astype("<f4").astype(np.float64)
     first = len(nodes)
     for node in nodes:
@@ -234,7 +233,6 @@ def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) ->
 
 
 def _add_animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
-    """Return the animation of the weights of node 0, and of the rotation of the node of the head."""
     time_s, table = scene.keys()
     frames_s = scene.weights.time_s if scene.weights else np.zeros(0)
     times = buffer.add(time_s, "SCALAR", limits=True)

@@ -107,8 +107,6 @@ def decode_indices(data: bytes, count: int) -> NDArray[np.uint32]:
 
 
 class _Reader:
-    """Reads bytes in order, up to an end."""
-
     def __init__(self, data: bytes, position: int, end: int) -> None:
         self.data, self.position, self.end, self.last = data, position, end, 0
 

@@ -281,7 +281,6 @@ def _check_named(named: Mapping[int, int], vertices: int) -> None:
 
 
 def _tree(places: Places) -> Any:
-    """Return a tree of places [shape=(N, D)] that finds the nearest ones."""
     from scipy.spatial import cKDTree  # a tenth of a second, which those who only draw faces need not wait
 
     return cKDTree(places)

@@ -62,7 +62,6 @@ class Thinning:
 
 
 EVERY_KEY = Thinning()
-"""None is left out."""
 
 
 def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Array, Array]:

@@ -43,7 +43,6 @@ RULES = {
     f"robust deviations under the panel's; from {MIN_PANEL} raters on. How long the videos are is not known here",
     "answers": f"at least {MIN_ANSWERS:.0%} of the usual number of answers",
 }
-"""What is required of a rater."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +166,6 @@ SHARES = (0.55, 0.6, 0.65, 0.7, 0.75)
 """Preferences whose numbers of raters are given."""
 USUAL_POWER = 0.8
 DRAWS, SEED = 1000, 0
-"""Simulated studies of a size."""
 MAX_DEGREES = 1e6
 """Degrees of freedom from which on Student's t is normal."""
 Figures = dict[str, Any]
@@ -283,7 +281,6 @@ def analyse_study(
 
 
 def _parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:
-    """Return the figures of each question of each kind."""
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
@@ -351,7 +348,6 @@ def analysis_table(figures: Figures) -> str:
 
 
 def _rating_lines(part: Figures, everybody: Figures | None) -> list[str]:
-    """Return the means, the improvement over the baseline and the differences of all pairs."""
     before = {row["condition"]: row["mean"] for row in everybody["conditions"]} if everybody else {}
     relative = {row["condition"]: row for row in part["relative_improvement"]}
     rows = [["condition", "mean", "95 %", "deviation", f"% over {part['baseline']}", "95 %", "all raters"]]

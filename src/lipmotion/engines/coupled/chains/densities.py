@@ -110,7 +110,6 @@ class EmissionEvaluator:
 
 
 def _restricted(form: QuadraticForm, densities: Index) -> QuadraticForm:
-    """Return the quadratic form of some of its densities [shape=(G',)]."""
     if np.array_equal(densities, np.arange(form.constant.shape[1])):
         return form
     columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, densities]

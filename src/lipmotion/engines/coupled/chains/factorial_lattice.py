@@ -227,7 +227,6 @@ def _kernel_states(units: Index, states: int) -> Index:
 
 
 def _transition_index(states: tuple[Index, Index], structure: Structure) -> Index:
-    """Return the positions of the transition statistics of ``states`` among those of all states."""
     index, start = [], 0
     for own, count in zip(states, structure.state_counts, strict=True):
         index += [start + own, start + count + own]

@@ -299,6 +299,5 @@ def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Ar
 
 
 def _threaded(function: Callable[[AlignedUtterance], ResultT], data: Sequence[AlignedUtterance]) -> Iterator[ResultT]:
-    """Yield the results in the order of the data."""
     with ThreadPoolExecutor(workers()) as pool:
         yield from pool.map(function, data)
