@@ -15,8 +15,8 @@ from scipy.interpolate import PchipInterpolator
 
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BEFORE, NO_JOIN, Costs, Target
 from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
-from lipmotion.engines.selection.lip_reading import PROTECTED_PHONES
 from lipmotion.engines.selection.model import SelectionModel
+from lipmotion.engines.selection.windows import PROTECTED_PHONES
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.rest import find_digital_silence, find_runs, is_away_from_speech, list_speech_intervals
 from lipmotion.stats.curves import with_dynamics

@@ -17,8 +17,16 @@ from lipmotion.engines.selection.inventory import (
     standing_in,
     unit_index,
 )
-from lipmotion.engines.selection.lip_reading import INVISIBLE, OVERLAPS, PROTECTED_PHONES, lip_reading_class
-from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, SILENT, VISEME_NUMBER, PhoneWindows
+from lipmotion.engines.selection.windows import (
+    INVISIBLE,
+    INVISIBLE_SYMBOL,
+    OVERLAPS,
+    PROTECTED_PHONES,
+    SILENT,
+    VISEME_NUMBER,
+    PhoneWindows,
+    lip_reading_class,
+)
 from lipmotion.units import PHONES
 from lipmotion.units.phones import CLASSES
 
