@@ -1,4 +1,4 @@
-"""Writes the tables of the reference that follow from the code: verbs and options, formats, limits, bad input.
+"""Writes the tables of the reference that follow from the code: verbs, formats, limits, bad input.
 
 In a page such a table stands between ``<!-- made: NAME -->`` and ``<!-- end made -->``. Run
 ``python scripts/reference_pages.py`` after a change of the command line or of a registry.
@@ -97,20 +97,6 @@ def verb_table() -> str:
     return table(["verb", "what it does", "more"], iter(rows))
 
 
-def option_table() -> str:
-    """Return the table of the options that four verbs or more take, each once for each meaning."""
-    found: dict[tuple[str, str], dict[str, None]] = {}
-    for name, _, part in verbs(whole_parser()):
-        for action in actions(part):
-            if action.option_strings and not action.required:
-                says = re.sub(r"\s+", " ", part._get_formatter()._expand_help(action))
-                found.setdefault((shown(action), says), {})[name.split()[0]] = None
-    rows = (
-        [f"`{option}`", says, ", ".join(names)] for (option, says), names in sorted(found.items()) if len(names) > 3
-    )
-    return table(["option", "what it does", "verbs"], rows)
-
-
 def exit_codes() -> str:
     """Return the exit codes as the command line lists them."""
     return re.sub(r"\s+", " ", whole_parser().epilog or "").capitalize() + "."
@@ -156,26 +142,13 @@ def bad_input() -> str:
     return "; ".join(f"{name.lower()} {rows.count(chr(10) + '| ') - 1}" for name, _, rows in groups) + "."
 
 
-def moods() -> str:
-    """Return the action units of every mood."""
-    from lipmotion.articulation.expression import ACTION_UNITS, mood_rows
-
-    rows: dict[str, list[str]] = {}
-    for row in mood_rows():
-        ours = "*" if row.source == "ours" else ""
-        rows.setdefault(row.mood, []).append(f"{row.unit} {ACTION_UNITS[row.unit]} {row.intensity:g}{ours}")
-    return table(["mood", "action units, and how strong"], ([mood, ", ".join(units)] for mood, units in rows.items()))
-
-
 TABLES: dict[str, Callable[[], str]] = {
     "verbs": verb_table,
-    "options": option_table,
     "exit-codes": exit_codes,
     "motion-formats": motion_formats,
     "cue-formats": cue_formats,
     "character-limits": character_limits,
     "bad-input": bad_input,
-    "moods": moods,
 }
 
 
