@@ -88,11 +88,11 @@ def actions(part: argparse.ArgumentParser) -> list[argparse.Action]:
 
 
 def verb_table() -> str:
-    """Return the table of all verbs: what they must be given, what they do, the pages on them."""
-    rows = []
+    """Return the table of all verbs: what they must be given, what they do, and, once a verb, the pages on it."""
+    rows, pages = [], dict(SEE)
     for name, says, part in verbs(whole_parser()):
         needed = [shown(a) for a in actions(part) if not a.option_strings or a.required]
-        see = ", ".join(f"[{page}]({page}.md)" for page in SEE.get(name.split()[0], "").split())
+        see = ", ".join(f"[{page}]({page}.md)" for page in pages.pop(name.split()[0], "").split())
         rows.append([f"`{' '.join([name, *needed])}`", says, see])
     return table(["verb", "what it does", "more"], iter(rows))
 
