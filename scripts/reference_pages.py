@@ -115,9 +115,10 @@ def motion_formats() -> str:
     rows = []
     for name in MOTION_FORMATS.built_in:
         chosen = MOTION_FORMATS.load(name)
-        rate = f"{chosen.rate_hz:g}" if chosen.rate_hz else "the motion's"
-        rows.append([f"`.{name}`", line_on(name, chosen.write.__module__), "yes" if chosen.read else "no", rate])
-    return table(["file", "what it holds", "read back", "frames a second"], iter(rows))
+        says = line_on(name, chosen.write.__module__)
+        says += f"; {chosen.rate_hz:g} frames a second" if chosen.rate_hz else ""
+        rows.append([f"`.{name}`", says, "yes" if chosen.read else "no"])
+    return table(["file", "what it holds", "read back"], iter(rows))
 
 
 def cue_formats() -> str:
