@@ -34,10 +34,7 @@ _NAME = re.compile(r"(?:^|[^A-Za-z])([A-Za-z]{1,4})$")
 
 @dataclass(frozen=True, eq=False)
 class CutOut:
-    """The pictures of a character.
-
-    pictures : RGBA with straight alpha, by the letter of the mouth shape [each shape=(H, W, 4)], all of one size
-    """
+    """The pictures of a character by mouth shape: RGBA with straight alpha, of one size [each shape=(H, W, 4)]."""
 
     pictures: Mapping[str, Picture]
 

@@ -134,9 +134,8 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
 
 
 class MeshStage:
-    """A mesh before the camera, in light; may be used by several threads at once.
-
-    colour        : red, green and blue of the background, 0 to 255; None: a soft gradient
+    """A mesh before the camera, in light, for several threads; ``colour`` of the background, 0 to 255 (None: a
+    gradient).
     """
 
     def __init__(

@@ -44,10 +44,7 @@ _ABOUT = "about"
 
 @dataclass(frozen=True, eq=False)
 class _GeneratedFold:
-    """What a model of the other recordings generates for a part of them.
-
-    used         : how many recordings the model was trained on
-    """
+    """What a model of the other ``used`` recordings generates for a part of them."""
 
     clips: Mapping[str, Sequence[ComparedClip]]
     speakers: Sequence[str]

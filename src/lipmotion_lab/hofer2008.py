@@ -169,10 +169,7 @@ def _train_system(
     checkpoint: Checkpoint,
     monitor: Monitor,
 ) -> _System:
-    """Return a system with the number of Gaussians whose motion correlates best with that of some recordings.
-
-    Raises InputError: training ends before any of the numbers of Gaussians.
-    """
+    """Return a system with the number of Gaussians of the highest ACC. Raises InputError: training ends before any."""
     stage = f"{engine.config.units}-{engine.config.states}-{'.'.join(map(str, counts))}"
     arrays = checkpoint.load(stage)
     if arrays is None:

@@ -413,10 +413,7 @@ class ProjectFolder:
         return _revision([word, self.lexicon().user.get(word, ())])
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...], revision: int) -> None:
-        """Write a pronunciation into the project's lexicon, ahead of earlier ones.
-
-        Raises RevisionError: there is another one since. ExportError: it cannot be written.
-        """
+        """Write a pronunciation into the lexicon, ahead of earlier ones. Raises RevisionError, ExportError."""
         with self.lock:
             check_revision(f"the word {word}", self.word_revision(word), revision)
             known = self.lexicon().user
@@ -457,10 +454,7 @@ def _is_new(source: Path) -> bool:
 
 @contextmanager
 def open_folder(source: Path | None, out: Path | None = None) -> Iterator[ProjectFolder]:
-    """Open the project of ``project_path``, created if needed, with the recordings of the source.
-
-    Raises ExportError: another process works on it, or it cannot be written.  Raises InputError: it cannot be read.
-    """
+    """Open the project of ``project_path``, or create it. Raises ExportError: in use. InputError: unreadable."""
     path = project_path(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with lock_folder(path):

@@ -251,9 +251,8 @@ class OpenRecording:
         write_mp4(path, pictures, fps=DRAWN_HZ, audio=sound)
 
     def write_film(self, path: Path, start_s: float, end_s: float, person: ShownPerson) -> None:
-        """Write a stretch as a video of a filmed face: its pictures are those of the full video.
-
-        Raises InputError: as ``write_video``, or edits ask for what a filmed face cannot do.
+        """Write a stretch as a video of a filmed face. Raises InputError: as ``write_video``, or edits that it cannot
+        show.
         """
         performance = self.performance(person)
         person.check(performance.settings)

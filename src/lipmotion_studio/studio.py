@@ -118,10 +118,7 @@ class Studio:
     def list_recordings(
         self, first: int, count: int, *, order: str = "", status: str = "", mark: str = ""
     ) -> dict[str, Any]:
-        """Return the project, and so many of its recordings from one on, for the list.
-
-        status, mark : only recordings with these; empty: all
-        """
+        """Return the project, and ``count`` recordings from one on, of a status and mark if given."""
         if order not in ORDERS:
             raise InputError(f"order is {shorten(repr(order))}, required doubt, or nothing")
         with self.folder.lock:
@@ -290,10 +287,7 @@ class Studio:
         return True
 
     def mark(self, number: int, revision: int, mark: str) -> dict[str, Any]:
-        """Mark a recording as its edits are now; return its row.
-
-        Raises InputError: no such mark, or its edits are damaged. RevisionError: somebody else has changed it.
-        """
+        """Mark a recording as it is now; return its row. Raises InputError: no mark, damaged edits. RevisionError."""
         with self.folder.check_out(number, revision) as recording:
             self.folder.has_edits(recording)  # which is refused where they are damaged
             marked = replace(recording, mark=mark, marked=self.folder.summary(recording).digest)

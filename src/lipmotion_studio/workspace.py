@@ -148,9 +148,8 @@ class Workspace:
         return work
 
     async def run(self, number: int, do: Callable[[OpenRecording], ResultT]) -> ResultT:
-        """Do something with an open recording, in its thread; return the result.
-
-        Raises NotReadyError: it is still being analysed. LipMotionError: it has failed, and why; or as ``do``.
+        """Do something with an open recording, in its thread. Raises NotReadyError: in analysis. LipMotionError: it
+        failed.
         """
         work = self.open(number)
         recording, thread = work.recording, work.thread

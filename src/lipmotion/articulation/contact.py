@@ -44,9 +44,8 @@ def smooth_step(share: Curve) -> Curve:
 
 
 def opening_to_gap(opening: Curve) -> Curve:
-    """Return the distance between the inner lips for a measured opening [shape=(T,)]; 0 where they touch.
-
-    Both in eye distances. It never falls where the opening rises.
+    """Return the distance of the inner lips for an opening, eye distances [shape=(T,)]; 0 where they touch; it never
+    falls.
     """
     share = np.clip((opening - CLOSED_OPENING) / (FULL_DEFICIT_GAP - CLOSED_OPENING), 0, 1)
     gap = (opening + TRACKER_DEFICIT) * share

@@ -148,10 +148,7 @@ class SpokenMouth:
 
 
 class MouthAtRest(NamedTuple):
-    """Sizes of a mouth in its rest pose, in eye distances; None: its motion says nothing of them.
-
-    width     : distance of the lip corners, in the unit of their motion
-    """
+    """Sizes of a mouth at rest in eye distances, width as of the corners' motion; None: its motion says nothing."""
 
     width: float | None
     thickness: float | None

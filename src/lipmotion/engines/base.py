@@ -32,10 +32,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Fit(Generic[ModelT]):
-    """A trained model, and figures of its training by name (``frames``, ``leaves``, ...).
-
-    uses_prior : whether the model stands on another one, whose output it needs in speech (``Speech.prior``)
-    """
+    """A trained model, figures of its training, and whether it needs another model's output (``Speech.prior``)."""
 
     model: ModelT
     figures: Mapping[str, float]
@@ -89,10 +86,7 @@ class Animator(ABC, Generic[ModelT]):
         """
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: ARG002
-        """Return what training and generation take.
-
-        motion_s : seconds of measured motion in training; infinite: what any model of the engine may take
-        """
+        """Return what training and generation take, with so many seconds of measured motion (infinite: any)."""
         return Inputs()
 
     def recognise(self, model: ModelT, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
@@ -122,9 +116,8 @@ class Engine(Animator[ModelT]):
 
     @abstractmethod
     def from_arrays(self, arrays: Arrays) -> ModelT:
-        """Deserialise a model.
-
-        Raises ModelFormatError: an array is missing or unknown, or has a wrong shape, type or range.
+        """Deserialise a model. Raises ModelFormatError: an array is missing or unknown, or has a wrong shape, type or
+        range.
         """
 
     def hidden(self, model: ModelT, speech: Speech) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:  # noqa: ARG002
@@ -153,10 +146,7 @@ class Engine(Animator[ModelT]):
 
 @dataclass(frozen=True)
 class SourcePiece:
-    """A piece of one recording that says several phones.
-
-    phones_s      : where phones begin, in the recording, by their number in what is said
-    """
+    """A piece of one recording that says several phones; ``phones_s``: their beginnings in it, by number."""
 
     recording: str
     start_s: float

@@ -77,10 +77,7 @@ def adapt_contexts(
 
 
 def reestimate_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
-    """Return the densities re-estimated from the statistics (the M-step).
-
-    A density with less than one frame of data stays as it is.
-    """
+    """Return the densities re-estimated from the statistics (M-step); with less than one frame of data they stay."""
     mixtures = hmm.mixtures.copy()
     floor = hmm.config.variance_floor * np.concatenate(data).var(axis=0)
     for density, x, weights in statistics.by_density():
@@ -166,10 +163,7 @@ def _collect_batch(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int
 
 
 def group_by_length(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
-    """Give the numbers of utterances in batches of similar length.
-
-    Padded to its longest utterance, a batch has at most ``CELLS`` cells, unless one utterance alone has more.
-    """
+    """Give the numbers of utterances in batches of similar length, of at most ``CELLS`` cells, or of one utterance."""
     batch: list[int] = []
     max_states = 0
     for i in sorted(range(len(frames)), key=lambda i: frames[i]):

@@ -61,10 +61,7 @@ def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
 def decode_units(
     loop: UnitLoop, log_likelihoods: LogLikelihoods, beam: float | None = None
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the most probable units, and the first frame of each, with the frame count at the end.
-
-    beam : as in ``Network.best_path``; None: exact
-    """
+    """Return the most probable units, their first frames, the frame count; ``beam`` as in ``Network.best_path``."""
     return decode_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
 
 

@@ -93,10 +93,7 @@ def _groups(arc_from: Index, arc_start: Index) -> _Groups:
 
 
 def _order(states: int, groups: _Groups, source: Index, target: Index) -> Index:
-    """Return the states in their new order: the targets of each block, then the states one arc after them, and so on.
-
-    source, target : of the arcs outside blocks
-    """
+    """Return the states in their new order: the targets of each block, the states one arc after them, and so on."""
     if not groups:
         return np.arange(states)
     group, depth = np.full(states, len(groups)), np.zeros(states, np.intp)

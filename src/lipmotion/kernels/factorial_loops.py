@@ -147,9 +147,8 @@ class LogTransitions(NamedTuple):
         return before
 
     def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
-        """Return the best scores one frame on, along axis 0, and the decisions.
-
-        A decision is U for staying, U + 1 for the next state, else the unit that was left.
+        """Return the best scores a frame on, along axis 0, and decisions: U for staying, U + 1 for the next, else the
+        unit left.
         """
         units = len(self.leaving)
         after = score + self.stay[:, None]

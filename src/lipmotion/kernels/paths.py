@@ -50,10 +50,7 @@ class NetworkArrays(NamedTuple):
 
 
 class Windows(NamedTuple):
-    """The frames that each state may have: from the first one to the end, which is excluded [shape=(S,)].
-
-    Neither may decrease from state to state.
-    """
+    """The frames that each state may have, from the first to before the end [shape=(S,)]; neither may decrease."""
 
     first: Index
     end: Index

@@ -134,10 +134,7 @@ def describe_unknown_phone(phone: str, where: str = "") -> str:
 
 
 def find_similar_phone(phone: str, known: Collection[str]) -> str:
-    """Return the phone itself if it is known, else the most similar known phone.
-
-    Its similar phones (``SIMILAR_PHONES``) come first, then the similar phones of those, then its viseme, then any.
-    """
+    """Return a known phone, the same or most similar: ``SIMILAR_PHONES``, those of these, its viseme, or any."""
     queue = [phone]
     for candidate in queue:
         if candidate in known:

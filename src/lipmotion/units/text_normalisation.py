@@ -146,10 +146,7 @@ _BREAK = re.compile(r"[,;:–—、，；：]\s*|\s-+\s")
 
 
 def clean_text(text: str) -> str:
-    """Return a text without what nobody can say: control characters and lone surrogates become blanks.
-
-    An empty line ends a sentence, as a full stop does.
-    """
+    """Return a text without control characters and surrogates; an empty line ends a sentence."""
     ended = re.sub(r"(\w)[ \t]*\r?\n[ \t]*\r?\n", r"\1.\n", text)
     return " ".join(
         "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended).split()

@@ -56,10 +56,7 @@ class FaceShape:
 
 
 def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
-    """Return the shape of the part that is replaced.
-
-    chin_px        : how far the tip of the chin is below the eyes in all frames [shape=(T,)]
-    """
+    """Return the shape of the replaced part, by how far the chin is below the eyes in all frames [shape=(T,)]."""
     half = float(np.clip(JAW_SHARE * jaw_half_width * EYE_DISTANCE_PX, NARROWEST_PX, WIDEST_PX))
     highest = float(np.percentile(chin_px, 1))
     return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
@@ -153,10 +150,7 @@ between those of different people up to 0.76, and 0.83 twice in 228 pairs: GRID,
 
 
 def face_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
-    """Return what is compared of the lower faces of a recording: float32 array [shape=(N,)].
-
-    pictures : of the lower face, in px of the face [shape=(T, 128, 128, 3)], at least one; or their mean
-    """
+    """Return what is compared of the lower faces [shape=(N,)], from pictures [shape=(T, 128, 128, 3)] or their mean."""
     mean = pictures.reshape(-1, HEIGHT, WIDTH, 3).mean(axis=(0, 3), dtype=np.float64)
     part = mean[:110:3, 20:108:3].ravel()  # nose, cheeks and mouth, without neck and background
     centred = part - part.mean()

@@ -101,10 +101,7 @@ class GridFiller:
         self._scratch = np.empty((2, max((count * prod(shape) * colours for shape in halves), default=0)), np.float32)
 
     def fill(self, values: Floats) -> Floats:
-        """Return the function at all pixels [shape=(t, H, W, C)], valid in the region, until the next call.
-
-        values : at the nodes of up to ``count`` pictures [shape=(t, number of nodes, C)], finest grid first
-        """
+        """Return the function at all pixels [shape=(t, H, W, C)], until the next call, from nodes [shape=(t, K, C)]."""
         count, stop = values.shape[:2]
         for level in reversed(range(len(self._filled))):
             fine = self._filled[level][:count]

@@ -81,10 +81,7 @@ class PrepareReport:
 
 @dataclass(frozen=True)
 class _Job:
-    """One recording, the folder of its utterance, its source and the settings of the preparation.
-
-    part : the part of a long video that it is; None: it is a whole file
-    """
+    """One recording, its utterance's folder, source and settings; the part of a long video that it is, or None."""
 
     recording: SourceRecording
     folder: Path

@@ -30,10 +30,7 @@ LEAST_MOVE_S = 0.005
 
 @dataclass(frozen=True)
 class CorpusOffsets:
-    """Offsets of the sound of a corpus from the motion.
-
-    clips       : offset of every utterance, by name
-    """
+    """Offsets of the sound of a corpus from the motion: of utterances, and of collections with their members."""
 
     clips: Mapping[str, Offset]
     collections: Mapping[str, Offset]

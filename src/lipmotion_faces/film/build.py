@@ -199,10 +199,7 @@ UNUSED_AXIS = "z_"
 
 @dataclass(frozen=True, eq=False)
 class _Filmed:
-    """One take: where the face is, its pictures, and its sound.
-
-    pictures : of the lower face in these frames [shape=(n, 128, 128, 3)]
-    """
+    """One take: where the face is, pictures of used frames [shape=(n, 128, 128, 3)], and its sound."""
 
     footage: Footage
     used: NDArray[np.intp]

@@ -43,9 +43,8 @@ WHITE = 245
 
 
 def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Return the part of a frame that the inset covers, with its border: left, top, right and bottom, px.
-
-    frame, picture : heights and widths, px
+    """Return left, top, right and bottom, px, of the inset with its border, for heights and widths of frame and
+    picture.
     """
     height, width = frame
     shorter = min(height, width)
@@ -189,10 +188,7 @@ def face_codes(
     rate_hz: float,
     eigenlips: Eigenlips | None = None,
 ) -> FaceCodes:
-    """Return what the lower face is like in ``count`` frames at the rate of a video.
-
-    Raises InputError: motion without the channels that the face needs.
-    """
+    """Return the lower face in ``count`` frames at a video's rate. Raises InputError: missing channels."""
     time_s = np.arange(count) / rate_hz
     values, contact = motion.at(time_s), None
     if "opening" in motion.names and np.isfinite(motion.values).all():

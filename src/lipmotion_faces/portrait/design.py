@@ -41,10 +41,7 @@ def open_curve(path: Path) -> Points:
 
 
 def mirror_curve(path: Path) -> Points:
-    """Return the smooth closed curve through a path down the right side and its mirror image.
-
-    The path begins and ends on the axis x = 0.
-    """
+    """Return the smooth closed curve through a path down the right side, from x = 0 to x = 0, and its mirror image."""
     right = path_points(path)
     return closed_curve([(x, y) for x, y in np.vstack([right, both_sides(right)[1][-2:0:-1]]).tolist()])
 

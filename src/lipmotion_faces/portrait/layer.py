@@ -116,10 +116,7 @@ class Layer:
         blur: float = 0.0,
         within: Points | None = None,
     ) -> None:
-        """Paint the inside of an outline.
-
-        within : another outline; nothing is painted outside it
-        """
+        """Paint the inside of an outline, and of ``within`` where that is given."""
         softest = max([blur, *(shade.radius for shade in shades if isinstance(shade, Rim))])
         window = self.window.around(outline, 3 * softest)
         pixels = self.pixels[window.area_in(self.window)]

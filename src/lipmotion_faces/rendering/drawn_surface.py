@@ -96,10 +96,7 @@ class DrawnSurface:
 
 
 def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) -> DrawnSurface:
-    """Return what is drawn of a mesh.
-
-    pixels_per_unit : of the picture, for the unit of the mesh; textures are reduced so far
-    """
+    """Return what is drawn of a mesh, with textures reduced to its size, in pixels for the mesh's unit."""
     materials = [part.material for part in mesh.parts]
     part_of = np.repeat(np.arange(len(mesh.parts)), [part.stop - part.first for part in mesh.parts])
     hidden = np.array([m.texture is None and m.opacity < LEAST_OPACITY for m in materials])

@@ -93,10 +93,7 @@ def make_track(path: Path, span: VideoSpan, frames: TrackedFrames, *, crops: boo
 
 
 def measure_motion(points: Array) -> Array:
-    """Return the values of ``CHANNELS`` in tracked frames [shape=(T, len(CHANNELS))].
-
-    points : array [shape=(T, len(TRACKED_POINTS), 3)], px, x to the right, y down, z away from the camera
-    """
+    """Return ``CHANNELS`` [shape=(T, len(CHANNELS))] of points in px, y down, z away [shape=(T, N, 3)]."""
     unit = distance_px(points, EYE_CORNERS)
     distances = np.stack([distance_px(points, pair) / unit for pair in DISTANCES.values()], axis=1)
     head = remove_head_motion(points * (1, -1, -1), TRACKED_POINTS)
@@ -164,10 +161,7 @@ class _Pictures:
 
 
 def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: str = MEDIAPIPE) -> TrackedFrames:
-    """Return the pictures of a video and where one person's face is in them; the video is decoded once.
-
-    Memory: the points of every frame; no picture is kept.
-    """
+    """Return the pictures of a video, decoded once, and where one person's face is in them; no picture is kept."""
     pictures = _Pictures()
     with open_video(path, span) as video, FaceFollower(person, tracker) as follower:
         for frame in video.frames:

@@ -158,10 +158,7 @@ HOW_TO_READ = (
 
 @dataclass(frozen=True)
 class FinishedPart:
-    """An experiment whose figures are there.
-
-    motion : of one clip, as ``ClipKeeper`` keeps it; empty: none was kept
-    """
+    """An experiment whose figures are there, and the motion of one clip (``ClipKeeper``)."""
 
     name: str
     record: Mapping[str, Any]
@@ -178,10 +175,7 @@ def report_html(
     *,
     quick: bool,
 ) -> str:
-    """Return the page of a report.
-
-    left_open, failed : names of those that are not finished, or failed, with the reasons
-    """
+    """Return the page of a report; ``left_open`` and ``failed``: reasons by experiment."""
     style = resources.files(__package__).joinpath("report.css").read_text("utf-8")
     subtitle = "How the systems of three papers, and those of this project, do on a corpus."
     header = element("header", element("h1", title), element("p", subtitle, class_="quiet"))

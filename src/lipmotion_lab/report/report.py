@@ -57,10 +57,7 @@ QUICK_FOLDS = 2
 
 @dataclass(frozen=True)
 class PartRun:
-    """What an experiment is run with.
-
-    models : a folder of engines' models, which several experiments share
-    """
+    """What an experiment is run with; ``models`` are shared by several."""
 
     corpus: Corpus
     quick: bool

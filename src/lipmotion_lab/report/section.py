@@ -185,10 +185,7 @@ CHANCE = 0.05
 
 @dataclass(frozen=True)
 class PaperPair:
-    """Two systems, of which the paper has the first as the better one.
-
-    difference : here, in the figure's unit, positive as in the paper; None: not defined
-    """
+    """Two systems, the first better in print, and their difference here, positive as in print (None: undefined)."""
 
     better: str
     worse: str

@@ -58,10 +58,7 @@ TUNING = TuningOptions()
 
 @dataclass(frozen=True)
 class Trial:
-    """One setting that was tried.
-
-    acc, amse  : of the validation recordings, audio only
-    """
+    """One setting that was tried, with its ACC and AMSE on validation recordings."""
 
     options: Options
     acc: float
@@ -228,10 +225,7 @@ The paper's six are those of ``train --preset``; ``tuned``: with the settings th
 
 
 def select_systems(names: Sequence[str] | None) -> list[str]:
-    """Return the names of the systems to compare, in the table's order; always with ``REFERENCE_SYSTEM``.
-
-    Raises InputError: no such system. Raises MissingDependencyError: a named system needs a package that is missing.
-    """
+    """Return the systems to compare, in order. Raises InputError: no such system. Raises MissingDependencyError."""
     if names is None:
         return [name for name, system in COMPARED_SYSTEMS.items() if not system.when_named]
     unknown = [name for name in names if name not in COMPARED_SYSTEMS]

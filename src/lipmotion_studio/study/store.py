@@ -97,10 +97,7 @@ class StudyStore:
         self._reader.close()
 
     def add_rater(self) -> Future[tuple[int, str]]:
-        """Add a rater; the result is the rater's number and token, which cannot be guessed.
-
-        The result raises InputError: there are ``MAX_RATERS``.
-        """
+        """Add a rater; the result is number and secret token, or raises InputError: there are ``MAX_RATERS``."""
         token = token_urlsafe(24)
 
         def work(database: sqlite3.Connection) -> tuple[int, str] | InputError:
@@ -123,9 +120,8 @@ class StudyStore:
         return 0 if last is None else int(last) + 1
 
     def record(self, sheet: AnswerSheet) -> Future[bool]:
-        """Store the answers to a trial; the first ones stand, however often, and whatever, is sent later.
-
-        The result is whether they are in the database: not if the rater has been forgotten.
+        """Store the answers to a trial, the first ones only; the result: whether they are there (not of a forgotten
+        rater).
         """
         rows = [
             {"rater": sheet.rater, "trial": sheet.trial, "item": item, "value": value}

@@ -219,10 +219,7 @@ def _distance(inference: Inference, stream: int, row: int, mean: Array, variance
 
 
 def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
-    """Return, for each frame, the expected means of the visual streams and the regressions that they come from.
-
-    Empty where visual streams have no dynamics, as nothing is regressed then.
-    """
+    """Return, for each frame, expected means of visual streams and their regressions; empty without dynamics."""
     if not all(stream.dynamic for stream in model.visual):
         return [() for _ in rows]
     means, precisions = model.motion_statistics(inference)

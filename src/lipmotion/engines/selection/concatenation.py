@@ -53,9 +53,8 @@ class Piece:
 
 
 def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
-    """Return the pieces that a selection consists of, in order.
-
-    In one phone there is one overlap at most: where the search has two, the second join is of the next best kind.
+    """Return the pieces of a selection, in order; of two overlaps in one phone, the second gives way to the next best
+    join.
     """
     kinds = [ABUTTING_JOIN]
     for number in range(1, len(units)):

@@ -93,10 +93,7 @@ class Costs:
     def target(
         self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
-        """Return phones in a form that can be compared with units.
-
-        guided, predicted : predicted motion at ``POINTS`` of each phone [each shape=(U, POINTS, Q)]
-        """
+        """Return phones to compare with units, and motion predicted at ``POINTS`` [each shape=(U, POINTS, Q)]."""
         known = replaced(windows, self.stand_ins)
         contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
         if guided is None or predicted is None:

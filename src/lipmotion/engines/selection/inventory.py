@@ -85,10 +85,7 @@ class RecordedUnits:
 
     @cached_property
     def values(self) -> Array:
-        """The motion of all recordings [shape=(F, Q)].
-
-        Where silence is not stored, it is a line between its edges in the recording.
-        """
+        """The motion of all recordings [shape=(F, Q)]; silence that is not stored is a line."""
         stored = np.concatenate([np.arange(first, stop) for first, stop in self.kept.tolist()])
         rows, frames = self.motion.astype(float), np.arange(self.first[-1])
         if len(rows) == len(frames):

@@ -106,10 +106,7 @@ class Emission:
         return f"{left}-{unit}+{right} {name}: {self._names[name, leaf]}"
 
     def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
-        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames.
-
-        rows     : the density of each frame [shape=(N,)]
-        """
+        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames of densities [shape=(N,)]."""
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
         if self.regression is not None:
             add_acoustic_regression(means, self.regression, rows, self.regression.context(features, frames))

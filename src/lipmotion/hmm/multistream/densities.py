@@ -64,10 +64,7 @@ class GaussianStatistics:
         return cls(np.zeros(densities), np.zeros((densities, components, 1 + 2 * dimensions)))
 
     def add(self, densities: NDArray[np.intp], rows: Array) -> None:
-        """Accumulate, in place, statistics of single Gaussians.
-
-        rows      : [shape=(N, 2 + 2·D)], sums of standardised frames weighted by posteriors
-        """
+        """Accumulate statistics of single Gaussians: weighted sums of standardised frames [shape=(N, 2 + 2·D)]."""
         self.frames[densities] += rows[:, 0]
         self.moments[densities, 0] += rows[:, 1:]
 
@@ -147,9 +144,8 @@ class TiedDensities:
             statistics.frames[leaf] += (known if self.voiced is None else posteriors[pairs]).sum()
 
     def reestimate(self, statistics: GaussianStatistics, floor: float) -> TiedDensities:
-        """Return the densities re-estimated from sufficient statistics (the M-step).
-
-        Gaussians with less than ``MIN_FRAMES`` of data stay as they are, so the likelihood never falls.
+        """Return the densities of an M-step; Gaussians with less than ``MIN_FRAMES`` stay, so the likelihood never
+        falls.
         """
         count, first, second = np.split(statistics.moments, [1, 1 + self.mixtures.size[2]], axis=2)
         enough = count >= MIN_FRAMES

@@ -46,10 +46,7 @@ class FrameDensities:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A generated trajectory.
-
-    values, variance : [shape=(T, Q)], in units of the motion; the variance follows from the Gaussians
-    """
+    """A trajectory and its variance [shape=(T, Q)], in units of the motion, and its log likelihoods."""
 
     values: Array
     variance: Array
@@ -57,10 +54,7 @@ class Trajectory:
 
 
 def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
-    """Return the densities of motion in every frame along a path of states.
-
-    Raises InputError: the model has no motion, or motion has weight 0 in synthesis.
-    """
+    """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
     model, means, precisions = _motion_gaussians(hmm)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
     return _make_densities(model.tied.mixtures.log_weights[chosen].astype(float), means[chosen], precisions[chosen])

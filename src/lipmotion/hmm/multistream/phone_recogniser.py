@@ -39,10 +39,7 @@ SCORE = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 
 @dataclass(frozen=True, eq=False)
 class OwnPhoneRecogniser:
-    """The joint model as a recogniser of phones.
-
-    training_score : mean speaker similarity score of its training data
-    """
+    """The joint model as a recogniser of phones, and the mean speaker similarity score of its training data."""
 
     hmm: JointHmm
     training_score: float
@@ -98,9 +95,8 @@ def recogniser_to_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[An
 
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
-    """Deserialise a recogniser; None if the arrays contain none.
-
-    Raises ModelFormatError, KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """Deserialise a recogniser; None: the arrays have none. Raises ModelFormatError, KeyError, ValueError: a wrong
+    array.
     """
     own = arrays_under(arrays, JOINT_PREFIX)
     if not own:

@@ -146,9 +146,8 @@ def units_to_frames(
 def frames_to_units(
     recognised: Sequence[RecognisedUnit], duration_s: float, label_of: Callable[[str], Unit] = Unit
 ) -> Timeline[Unit]:
-    """Return recognised units in time: frame n covers (n ± ½) · 10 ms; together they last from 0 s to ``duration_s``.
-
-    label_of : gives the label of a unit's name; by default the name is the phone
+    """Return recognised units in time, from 0 s to ``duration_s``: frame n covers (n ± ½) · 10 ms; labels by
+    ``label_of``.
     """
     edges = np.clip((np.array([unit.first for unit in recognised]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
     spans = zip(edges, [*edges[1:], duration_s], recognised, strict=True)

@@ -205,9 +205,8 @@ class GltfDocument:
         return self.parts.get(name, [])
 
     def linked(self, uri: str, kind: str) -> bytes:
-        """Return what an address in the document stands for: bytes inside of it, or a file in the same folder.
-
-        Raises InputError: no such file, a file elsewhere, too large, or damaged.
+        """Return the bytes of an address, or of a file in the same folder. Raises InputError: no such file, elsewhere,
+        damaged.
         """
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
@@ -417,19 +416,15 @@ DEEPEST_NESTING = 256
 
 @dataclass(frozen=True, eq=False)
 class PlacedNode:
-    """A node of a scene.
-
-    kinds  : the node of each kind of bone that it is or hangs on; of several, the one nearest to the root
-    """
+    """A node of a scene, and the nearest node to the root of each kind of bone that it is or hangs on."""
 
     matrix: Matrix
     kinds: Mapping[str, int]
 
 
 def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
-    """Return the nodes of the scene by their numbers; without scenes, all that hang on a node that hangs on none.
-
-    Raises InputError: a node is in the scene twice, too deep, or too far away.
+    """Return the nodes of the scene, or all roots', by number. Raises InputError: one is there twice, too deep, too far
+    away.
     """
     nodes, scenes = document.items("nodes"), document.items("scenes")
     if scenes:

@@ -68,9 +68,8 @@ class _Track:
     kind: str
 
     def at(self, time_s: Array) -> Array:
-        """Return the values at the times of frames [shape=(len(time_s), S)]; constant beyond both ends.
-
-        A frame that is a key but for its rounding has the key's value: a step would else come a frame late.
+        """Return values at frames' times [shape=(len(time_s), S)]; a frame that is a key but for rounding has its
+        value.
         """
         rounding = ROUNDING_FRAMES * time_s[1] if len(time_s) > 1 else 0.0
         before = np.clip(np.searchsorted(self.time_s, time_s + rounding, "right") - 1, 0, len(self.time_s) - 1)

@@ -36,10 +36,7 @@ CLOSED_VISEME = "viseme_PP"
 
 @dataclass(frozen=True)
 class RigRow:
-    """One row of the table: a control follows ``offset + gain · source``; rows of one control are added up.
-
-    low, high : limits of the control; of several rows, those of the first count
-    """
+    """A control that follows ``offset + gain · source``; rows of one control add up, with the limits of the first."""
 
     control: str
     source: str

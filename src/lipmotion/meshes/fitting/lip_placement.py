@@ -165,10 +165,7 @@ def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
 
 
 def find_opening_shape(mesh: Mesh) -> Blendshape:
-    """Return the blendshape that opens the mouth most plainly. Raises InputError: there is none.
-
-    ARKit's ``jawOpen``, else the vowel or viseme ``aa``, else another whose name says so.
-    """
+    """Return the blendshape that opens the mouth most: ``jawOpen``, ``aa`` or by name. Raises InputError: none."""
     tests: tuple[Callable[[str], bool], ...] = (
         lambda name: arkit_name(name) == "jawOpen",
         lambda name: viseme_name(name) == "aa",

@@ -118,10 +118,7 @@ class Material:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """A named range of triangles of a mesh, all of one material.
-
-    first, stop : the triangles ``first`` to ``stop - 1``
-    """
+    """A named range of triangles, ``first`` to ``stop - 1``, of one material."""
 
     name: str
     first: int

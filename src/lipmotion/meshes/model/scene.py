@@ -170,9 +170,8 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class ShadingNormals:
-    """Normals of a mesh at rest [shape=(V, 3)], of length 1, and how each blendshape turns them.
-
-    turned : of every blendshape, the vertices [shape=(N,)] and what is added to their normals [shape=(N, 3)]
+    """Normals of a mesh at rest [shape=(V, 3)], and of each blendshape vertices [shape=(N,)] and changes [shape=(N,
+    3)].
     """
 
     rest: Array

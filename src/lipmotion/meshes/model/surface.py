@@ -41,9 +41,8 @@ class MeshSurface:
     normals: NDArray[np.float64]
 
     def distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
-        """Return the distance along edges from each source vertex to every vertex [shape=(len(sources), V)].
-
-        limit : beyond this distance, in the unit of the mesh, infinity is returned
+        """Return distances along edges from sources to every vertex [shape=(len(sources), V)]; infinite beyond
+        ``limit``.
         """
         return self.place_distances(sources, limit)[:, self.places]
 

@@ -130,10 +130,7 @@ def crossed_mean(values: Array, width: float) -> CrossedMean:
 def variance_of_mean(
     rater: Array, sentence: Array, rest: Array, free: tuple[float, float, float]
 ) -> tuple[Array, Array]:
-    """Return the variance of a mean, and its degrees of freedom, from its parts.
-
-    free : degrees of freedom of raters, of sentences, and of the rest
-    """
+    """Return the variance of a mean and its degrees of freedom, from those of raters, sentences, the rest."""
     variance = rater + sentence + rest
     doubt = np.where(rater > 0, (rater + rest) ** 2 / free[0], 0) + np.where(
         sentence > 0, (sentence + rest) ** 2 / free[1], 0

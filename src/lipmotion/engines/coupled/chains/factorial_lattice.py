@@ -62,9 +62,8 @@ class FactorialTransitions:
         return 2 * sum(self.product.structure.state_counts)
 
     def reestimated(self, counts: Array) -> FactorialTransitions:
-        """Return the transitions with the most likely probabilities (M-step); states without data keep theirs.
-
-        counts : how often each state is expected to be left and to be kept [shape=(statistic_count,)]
+        """Return the transitions of an M-step, from counts of leaving and keeping [shape=(statistic_count,)]; unseen
+        states stay.
         """
         edges = np.cumsum([0, *np.repeat(self.product.structure.state_counts, 2)])
         parts = [counts[a:b] for a, b in pairwise(edges.tolist())]

@@ -80,10 +80,7 @@ class NetworkLattice(Lattice):
 def network_lattice(
     transitions: Transitions, ties: Sequence[Index], allowed_units: NDArray[np.bool_] | None
 ) -> NetworkLattice:
-    """Return the lattice of the joint states whose units are allowed in some frame.
-
-    allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
-    """
+    """Return the lattice of joint states whose units are allowed in some frame [shape=(T, U)]; None: all."""
     product = transitions.product
     structure = product.structure
     inside = np.ones(len(product.joint_states), bool)

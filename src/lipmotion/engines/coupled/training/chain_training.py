@@ -208,10 +208,7 @@ CONVERGENCE_GAIN = 0.02
 
 @dataclass(frozen=True)
 class TrainingStep:
-    """One step of EM.
-
-    log_likelihood : mean log likelihood per frame before the step
-    """
+    """One step of EM, with the mean log likelihood per frame before it."""
 
     mixtures: tuple[int, ...]
     log_likelihood: float

@@ -97,10 +97,7 @@ def m_step(
     streams: Sequence[int],
     transitions: bool = True,
 ) -> Chains:
-    """Return the chains that maximise the expected log likelihood.
-
-    floors      : the least variance of each stream [each shape=(D_s,)]
-    """
+    """Return the chains that maximise the expected log likelihood, with variances of ``floors`` at least."""
     groups = [
         reestimated_group(group, own, [floors[s] for s in group.streams], LEAST_FRAMES, streams)
         if set(group.streams) & set(streams)
