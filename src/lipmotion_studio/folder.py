@@ -306,10 +306,8 @@ class ProjectFolder:
                 temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
-        """Add a recording, or those of a folder or a list, which stay where they are; return their numbers.
-
-        Those that the project has already are left out.
-        Raises InputError: no recordings. ExportError: as ``change``; or names that no folder can hold.
+        """Add new recordings, also of folders or lists, where they are; return their numbers. Raises InputError.
+        ExportError.
         """
         with self.lock:
             listed = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []

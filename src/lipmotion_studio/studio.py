@@ -77,11 +77,7 @@ def known_model(file: Path | None) -> KnownModel:
 
 
 class Studio:
-    """A project that is open.
-
-    used   : the model that moves its recordings; None: as the project says, or, where that is gone, the one that ships
-    against : a model with which its motion is compared; None: there is none
-    """
+    """A project that is open, the model that moves its recordings, and one that is compared with it, or None."""
 
     def __init__(
         self, folder: ProjectFolder, used: KnownModel | None = None, against: KnownModel | None = None

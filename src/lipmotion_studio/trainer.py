@@ -52,11 +52,7 @@ MAX_UNFINISHED = 0.99
 
 @dataclass(frozen=True)
 class TrainingRequest:
-    """What was asked for.
-
-    lines  : numbers of the recordings that are learned from; none: the folder of recordings is
-    options : values of ``VoiceOptions`` by name
-    """
+    """What was asked for; without recordings' numbers (``lines``) the folder of recordings is learned from."""
 
     kind: str
     name: str
@@ -142,10 +138,8 @@ class Trainer:
         return {path.stem: path for path in paths if path.is_file() and not path.name.startswith(".")}
 
     def begin(self, kind: str, name: str, numbers: Sequence[int], options: VoiceOptions) -> None:
-        """Begin to make a voice or a face.
-
-        Raises InputError: something is being made, no such kind, no name, no videos of these numbers, or no folder.
-        ExportError: the folder of the project cannot be written.
+        """Begin to make a voice or a face. Raises InputError: busy, or no such kind, name or videos. ExportError: no
+        write.
         """
         if kind not in KINDS:
             raise InputError(f"no kind {shorten(repr(kind))}; required {' or '.join(KINDS)}")

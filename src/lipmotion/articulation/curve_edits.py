@@ -77,11 +77,7 @@ def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
 
 
 def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], reach: int) -> None:
-    """Bend curves through pins, in place, within ``reach`` frames of each; all pins hold exactly.
-
-    values : [shape=(T, P)]
-    pins   : frame, column and value of each; of two in one frame and column the last holds
-    """
+    """Bend curves [shape=(T, P)] through pins (frame, column, value), within ``reach`` frames; all hold exactly."""
     for frame, column, value in pins:
         if abs(lacking := value - values[frame, column]) > 1e-9:
             first, stop = max(frame - reach, 0), min(frame + reach + 1, len(values))

@@ -61,11 +61,7 @@ class Inputs:
 
 
 class Animator(ABC, Generic[ModelT]):
-    """A method that learns motion from examples and generates motion from speech.
-
-    Baselines of experiments need no more than ``fit`` and ``generate``; an ``Engine`` also has a configuration, and its
-    models can be saved and loaded.
-    """
+    """A method that learns motion from examples and generates motion from speech, as baselines of experiments do."""
 
     @abstractmethod
     def fit(self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT) -> Fit[ModelT]:
@@ -128,10 +124,8 @@ class Engine(Animator[ModelT]):
         return None
 
     def explain(self, model: ModelT, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...] | None:  # noqa: ARG002
-        """Return an explanation of each of some frames of the motion that ``generate`` returns.
-
-        frames : numbers from 0 to T - 1
-        None: there is no more to say than the trace does (``explain_by_trace``).
+        """Return explanations of frames, 0 to T - 1, of generated motion; None: the trace says all
+        (``explain_by_trace``).
         """
         return None
 

@@ -54,10 +54,8 @@ def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
 def align_states(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> tuple[StateSequence, NDArray[np.intp]]:
-    """Return the states of a unit sequence, and the number of the state of every frame [shape=(T,)].
-
-    windows : of the units: the frames that each may have
-    Raises AlignmentError: fewer frames than states, or none within the windows.
+    """Return the states of a unit sequence, and that of every frame [shape=(T,)]. Raises AlignmentError: too few
+    frames.
     """
     chain = expand_states(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)

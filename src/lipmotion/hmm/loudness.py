@@ -65,11 +65,7 @@ def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
 def find_loud_frames(
     log_energy: NDArray[np.floating], drop: float = SOUND_DROP, smoothing: int = SMOOTHING_FRAMES
 ) -> NDArray[np.bool_]:
-    """Return which frames are louder than a level, and than the noise [shape=(T,)]; none where the level is constant.
-
-    drop       : how far the level lies beneath the loud level
-    smoothing  : frames averaged over, an odd number
-    """
+    """Return which frames are louder than the noise, and than a level ``drop`` beneath the loud one [shape=(T,)]."""
     loud, noise = measure_levels(log_energy)
     if loud - noise < LEAST_RANGE:
         return np.zeros(len(log_energy), bool)

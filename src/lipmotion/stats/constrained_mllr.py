@@ -68,11 +68,7 @@ def log_determinant(transform: Array) -> float:
 def collect_transform_statistics(
     mixtures: Mixtures, features: NDArray[np.float32], densities: NDArray[np.intp], transform: Array
 ) -> TransformStatistics:
-    """Return the statistics of frames whose densities are known, with posteriors under the transform so far.
-
-    features  : before the transform [shape=(T, D)]
-    densities : the density of every frame [shape=(T,)]
-    """
+    """Return the statistics of frames of known densities [shapes=(T, D), (T,)], under the transform so far."""
     current = transformed(features, transform)
     precision, target = (np.zeros(features.shape) for _ in range(2))
     log_likelihood = len(features) * log_determinant(transform)

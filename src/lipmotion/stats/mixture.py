@@ -29,10 +29,8 @@ MIN_WEIGHT, MAX_WEIGHT = 0.5, 1.5
 
 @dataclass(frozen=True, eq=False)
 class Mixtures:
-    """G mixture densities of M diagonal Gaussians each.
-
-    log_weights : [shape=(G, M)], -inf for an unused component
-    means, variances : [shape=(G, M, D)]
+    """G mixtures of M diagonal Gaussians: log weights [shape=(G, M)], -inf if unused, means and variances [shape=(G, M,
+    D)].
     """
 
     log_weights: NDArray[np.float32]

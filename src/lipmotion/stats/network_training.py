@@ -75,19 +75,13 @@ class SequenceNetwork(ABC):
 
     @abstractmethod
     def forward(self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None) -> tuple[Array, Any]:
-        """Return the last hidden layer of a batch [shape=(B, T, H)], and, with dropout, what ``backward`` needs.
-
-        inputs : [shape=(B, T, I)]
-        inside : the time steps before the end of each sequence [shape=(B, T)]
+        """Return the last hidden layer of a batch [shape=(B, T, H)], and what ``backward`` needs; ``inside``: before
+        each end.
         """
 
     @abstractmethod
     def backward(self, slope: Array, passed: Any) -> list[Array]:
-        """Return the gradient for every parameter but those of ``output``.
-
-        slope  : gradient for the last hidden layer [shape=(B, T, H)]
-        passed : from ``forward``
-        """
+        """Return the gradient of all parameters but ``output`` from that of the last layer [shape=(B, T, H)]."""
 
 
 class TrainingSequence(NamedTuple):

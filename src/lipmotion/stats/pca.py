@@ -26,10 +26,8 @@ CONSTANT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Pca:
-    """The affine space of principal components.
-
-    mean  : [shape=(D,)]
-    basis : [shape=(K, D)], orthonormal rows, most variance first
+    """The affine space of principal components: mean [shape=(D,)], orthonormal rows [shape=(K, D)], most variance
+    first.
     """
 
     mean: NDArray[np.float64]

@@ -26,11 +26,7 @@ TIE = 1e-10
 
 
 class Question(NamedTuple):
-    """The question whether the name at one position of a context is one of some.
-
-    position : 0 the left neighbour, 1 the unit, 2 the right neighbour
-    members  : the names for which the answer is yes
-    """
+    """Whether the name at a position (0 left, 1 the unit, 2 right) is one of ``members``."""
 
     position: int
     name: str
@@ -260,11 +256,7 @@ def _check_nodes(asked: NDArray[np.int32], no: NDArray[np.int32], questions: int
 
 @dataclass(frozen=True, eq=False)
 class RegressionStatistics:
-    """Sufficient statistics of a regression of targets r [shape=(P,)] on inputs z [shape=(F,)]; accumulated in place.
-
-    products : Σ z zᵀ [shape=(F, F)]
-    targets  : Σ z rᵀ [shape=(F, P)]
-    """
+    """Statistics of a regression, accumulated in place: Σ z zᵀ [shape=(F, F)], Σ z rᵀ [shape=(F, P)]."""
 
     products: Array
     targets: Array

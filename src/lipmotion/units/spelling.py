@@ -68,10 +68,8 @@ def remove_accents(word: str) -> str:
 
 
 def guess_pronunciation(word: str) -> tuple[str, ...]:
-    """Return a guessed pronunciation of a lower-case word, in ARPAbet.
-
-    Accents are left out: ``é`` is read as ``e``.
-    Raises InputError: a character is not a letter of the Latin alphabet.
+    """Return a guessed pronunciation in ARPAbet of a word, without its accents. Raises InputError: other letters than
+    Latin.
     """
     plain = remove_accents(word)
     foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", remove_accents(letter)))

@@ -265,10 +265,8 @@ class _Joins:
 
 
 class _Plan:
-    """A background, and what joins in it would cost.
-
-    scenes   : first frame of each part without a cut, and the one after its last
-    restless : cost of turning at each frame, or of beginning or ending there [shape=(T,)]
+    """A background, its scenes (first frame, end), and the cost of turning, beginning or ending at each frame
+    [shape=(T,)].
     """
 
     def __init__(

@@ -45,11 +45,7 @@ CHEEK_PX = 12, 10
 
 @dataclass(frozen=True)
 class FaceShape:
-    """How large the lower face of a person is, in px.
-
-    half_width_px : of the part that is replaced
-    bottom_px     : where that part ends, below the eyes
-    """
+    """How large the lower face is, in px: half the width of the replaced part, and its end below the eyes."""
 
     half_width_px: float
     bottom_px: float
@@ -108,10 +104,8 @@ def mouth_ellipse(scale: int) -> Mask:
 
 
 def cheek_light(mouths: NDArray[Any]) -> Array:
-    """Return the light on the face in mouth pictures: the mean red, green and blue of their corners [shape=(T, 3)].
-
-    mouths : [shape=(T, 56 · scale, 72 · scale, 3)], grey levels
-    Raises InputError: pictures of another size.
+    """Return the mean red, green, blue of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another
+    size.
     """
     scale = mouths.shape[1] // mouth_region.HEIGHT if mouths.ndim == 4 else 0
     required = (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale, 3)

@@ -125,11 +125,7 @@ class FootagePictures:
 
 @dataclass(frozen=True, eq=False)
 class FaceCodes:
-    """What the lower face is like in every frame.
-
-    jaw     : components of the jaw [shape=(T, 3·K)]
-    chin_px : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
-    """
+    """The lower face in every frame: eigenlips, jaw [shape=(T, 3·K)], the chin below the eyes in px [shape=(T,)]."""
 
     mouth: Floats
     jaw: Floats
@@ -249,11 +245,7 @@ class Appearance:
 
 
 def learn_appearance(footage: FootagePictures) -> Appearance:
-    """Return the appearance of a person.
-
-    Raises InputError: no pictures, or motion of another number of frames.
-    Cost: about 10 s for four minutes of footage; 100 kB a frame.
-    """
+    """Return the appearance of a person, in 10 s for four minutes. Raises InputError: no pictures, or other motion."""
     pictures, light, reference = _equalise_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
     training = choose_evenly(TRAINING_PICTURES, len(pictures))

@@ -30,11 +30,7 @@ Phones = tuple[str, ...]
 
 @dataclass(frozen=True)
 class MissingUnit:
-    """A sequence of phones that a text needs and a corpus does not have.
-
-    unit     : the phones, with ``-`` between them (``t-r``)
-    stand_in : the nearest sequence that the corpus has
-    """
+    """A sequence of phones (``t-r``) that a text needs and a corpus lacks, and the nearest that it has."""
 
     unit: str
     count: int

@@ -132,11 +132,7 @@ LEAST_SHARED_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class SeparateSound:
-    """Sound, and by how much it is late against the motion.
-
-    late_s : moment ``late_s`` of the sound is moment 0 of the motion; negative: the sound begins later
-    how    : ``clap``, ``beep``, ``the sound of both``, ``as given``
-    """
+    """Sound that is ``late_s`` against the motion, and how that is known: ``clap``, ``beep``, ``as given`` ..."""
 
     audio: Audio
     late_s: float

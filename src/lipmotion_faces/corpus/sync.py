@@ -77,11 +77,7 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
 
 
 def offsets(corpus: Corpus) -> CorpusOffsets:
-    """Return the offset of the sound of each utterance and of each collection.
-
-    Offset zero is that of the GRID corpus, on which the prediction of lip speed was trained.
-    Raises CorpusError: an utterance is damaged.
-    """
+    """Return the offsets of utterances and collections; zero is GRID's. Raises CorpusError: an utterance is damaged."""
     scores: dict[str, NDArray[np.float64]] = {}
     members: dict[str, list[str]] = {}
     for name in corpus.names():

@@ -234,10 +234,8 @@ def open_stored_background(background: StoredBackground) -> BackgroundSequence:
 
 
 def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
-    """Return a video as a background.
-
-    appearance : of the person who should be in it: somebody else is warned about; None: it may be anybody
-    Raises InputError: no video, or no face in it.
+    """Return a video as a background; others than ``appearance`` are warned about. Raises InputError: no video, no
+    face.
     """
     footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
     if appearance is not None:

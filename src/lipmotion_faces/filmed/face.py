@@ -53,11 +53,7 @@ class StoredBackground:
 
 @dataclass(frozen=True, eq=False)
 class SpokenTake:
-    """Some speech of the person, and the motion of the face in it: what other people's motion is mapped onto.
-
-    motion : tracked, at the rate of the video
-    seen   : frames in which the face was measured [shape=(T,)]
-    """
+    """Speech and motion of the person, at the video's rate, onto which other people's is mapped; seen [shape=(T,)]."""
 
     sound: Audio
     motion: Motion

@@ -102,11 +102,7 @@ class Stitcher:
     options: StitchingOptions = STITCHING
 
     def stitch(self, codes: FaceCodes, backgrounds: Iterable[Background]) -> Iterator[Picture]:
-        """Yield frames, one for each frame of motion.
-
-        backgrounds : at least as many; taken a few at a time, so memory does not grow with the length
-        Raises InputError: too few backgrounds.
-        """
+        """Yield a frame for each of motion, a few at a time. Raises InputError: too few backgrounds."""
         codes = self._average(codes)
         mouth_chosen = self._mouths.choose(codes.mouth)
         jaw_chosen = self._jaws.choose(codes.jaw)

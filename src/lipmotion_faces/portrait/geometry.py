@@ -68,11 +68,7 @@ class MouthPose(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LipOutlines:
-    """Heights of the lips' outlines over columns [shape=(C, ...)], top to bottom; all meet at the corners and beyond.
-
-    seam : half the thickness of the line where the lips meet
-    inner_half_width : half the width of the opening
-    """
+    """Heights of the lips' outlines over columns [shape=(C, ...)], and half widths of seam and opening."""
 
     half_width: float
     inner_half_width: float

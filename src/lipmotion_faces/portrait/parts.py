@@ -40,10 +40,8 @@ GAZE_STEPS = 8
 
 
 class LidPose(NamedTuple):
-    """The lids, and the furrows between them, in whole steps.
-
-    shut : 0 (open) to ``LID_POSITIONS``
-    wide, squint, slant, furrow, sneer : of a mood, 0 to ``MOOD_LIDS``; a negative slant lowers the outer half
+    """The lids and furrows in steps: shut up to ``LID_POSITIONS``, moods to ``MOOD_LIDS``; slant < 0: the outer half
+    falls.
     """
 
     shut: int
@@ -90,10 +88,8 @@ class EyePainter:
         self._cached = lru_cache(maxsize=128)(self._paint)
 
     def paint(self, shut: float, gaze_x: float, gaze_y: float, mood: UpperFace = CALM) -> Pixels:
-        """Return the eyes, premultiplied colour and cover [shape=(h, w, 4)]; not to be changed.
-
-        shut           : how far they are closed, 0..1
-        gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
+        """Return the eyes, premultiplied [shape=(h, w, 4)], not to be changed; gaze to the right and down, eye
+        distances.
         """
         step = self._window.view.scale * GAZE_STEPS
         return self._cached(lid_pose(shut, mood), round(gaze_x * step), round(gaze_y * step))

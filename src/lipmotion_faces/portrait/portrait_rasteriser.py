@@ -37,11 +37,7 @@ LARGEST_TURN = np.array([0.35, 0.35, 0.13])
 
 
 class FacePose(NamedTuple):
-    """Everything that moves, in one frame.
-
-    lids           : how far the eyes are closed, 0..1
-    gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
-    """
+    """Everything that moves in a frame; lengths in eye distances, gaze to the right and down, lids closed 0..1."""
 
     mouth: MouthPose
     lids: float = 0.0

@@ -19,11 +19,7 @@ from lipmotion_faces.tracking.packages import import_opencv
 
 @dataclass(frozen=True, eq=False)
 class VideoFrame:
-    """One picture.
-
-    time_s : its time since the start of the container, or of the span, s
-    image  : uint8 array [shape=(H, W, 3)], RGB, upright, square pixels
-    """
+    """A picture, RGB, upright, square pixels [shape=(H, W, 3)], and its time since the container's or span's start."""
 
     time_s: float
     image: NDArray[np.uint8]
@@ -214,11 +210,7 @@ LOWEST_HZ, HIGHEST_HZ = 1.0, 1000.0
 
 
 def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
-    """Return the constant frame rate of the time stamps, even if frames were dropped.
-
-    times_s         : times of the decoded frames, rising
-    stated_rates_hz : of the container; the first that fits the median interval of the times is returned
-    """
+    """Return the constant rate of time stamps, though frames were dropped: the stated one that fits, or the median."""
     if len(times_s) < 2:
         return stated_rates_hz[0] if stated_rates_hz else RATE_WHEN_UNKNOWN_HZ
     measured = 1.0 / float(np.median(np.diff(times_s)))

@@ -79,11 +79,7 @@ def image_correlation(first: Array, other: Array) -> Array:
 
 
 def find_occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Return in which frames something covers the mouth: its region is unlike the median region of the clip.
-
-    mouths : array [shape=(T, 14, 18, 3)] of ``mouth_thumbnail``
-    Returns bool array [shape=(T,)]; all False where the median picture has no texture.
-    """
+    """Return in which frames the mouth [shape=(T, 14, 18, 3)] is covered: unlike its median; none without texture."""
     median = np.median(mouths, axis=0)
     if np.square(median - median.mean(axis=(0, 1))).mean() < FLAT_LEVELS**2:
         return np.zeros(len(mouths), bool)

@@ -91,11 +91,7 @@ class BoxFinder(AbstractContextManager["BoxFinder"], Protocol):
     """Finds faces in single pictures, in any order, small ones too."""
 
     def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
-        """Return the faces in a picture, those with the highest score first.
-
-        image    : uint8 array [shape=(H, W, 3)], RGB
-        thorough : whether more time may be spent where none is found at first
-        """
+        """Return the faces in a picture [shape=(H, W, 3)], best score first; ``thorough``: search longer for any."""
 
 
 class LandmarkTracker(ABC):

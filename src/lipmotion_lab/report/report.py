@@ -69,11 +69,7 @@ class PartRun:
 
 @dataclass(frozen=True)
 class ReportPart:
-    """An experiment of a report.
-
-    share    : of the time that all take, roughly
-    draws    : whether it writes pictures, for which it needs matplotlib
-    """
+    """An experiment of a report, and its rough share of the time."""
 
     lists: tuple[str, ...]
     share: float

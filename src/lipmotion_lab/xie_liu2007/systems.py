@@ -68,11 +68,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrainedSystem:
-    """A system after training.
-
-    seconds : processor time of training
-    tried   : the settings among which its own was chosen on validation recordings
-    """
+    """A system after training, the processor time that took, and the settings its own was chosen from."""
 
     engine: Any
     model: Any

@@ -67,10 +67,8 @@ def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
 
 
 def forget_rater(folder: Path, name: str) -> int:
-    """Delete a rater and all of the rater's answers; return how many there were.
-
-    Files that were exported before are not changed.
-    Raises InputError: no study, or no such rater.
+    """Delete a rater and all answers, not of exported files; return how many. Raises InputError: no study, no such
+    rater.
     """
     read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:

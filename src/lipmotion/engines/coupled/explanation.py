@@ -85,11 +85,7 @@ MIN_PROBABILITY = 0.005
 def explain_frames(
     frames: Sequence[Explanation], model: CoupledModel, inference: Inference, rows: Sequence[int]
 ) -> list[Explanation]:
-    """Return explanations of frames, completed with the chains, the Gaussians and the regressions behind them.
-
-    rows : the number of each of these frames among the frames of ``inference``
-    If no path leads through the chains, the explanations are returned unchanged.
-    """
+    """Return explanations with chains, Gaussians and regressions; unchanged where no path leads through the chains."""
     if not np.isfinite(inference.posteriors.log_likelihood):
         return list(frames)
     streams = range(len(model.chains.streams))

@@ -116,11 +116,7 @@ class Emission:
 def add_acoustic_regression(
     means: Array, regression: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
 ) -> None:
-    """Add the regressions on the acoustic features to constant means, in place.
-
-    means : of N frames [shape=(N, 3, Q)]
-    z     : reduced acoustic features around each frame [shape=(N, F)]
-    """
+    """Add the regressions on reduced features [shape=(N, F)] to constant means [shape=(N, 3, Q)], in place."""
     used = regression.rows[rows]
     for row in np.unique(used[used >= 0]):
         frames = np.nonzero(used == row)[0]

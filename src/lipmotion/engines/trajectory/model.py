@@ -106,10 +106,8 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
 def model_from_arrays(
     arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str, *, filtered: bool
 ) -> TrajectoryModel:
-    """Deserialise a model.
-
-    filtered : there must be a modulation filter
-    Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
+    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: an array is missing or
+    wrong.
     """
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))

@@ -83,11 +83,7 @@ class PreparedUtterances:
 
 
 class StatePosteriors(NamedTuple):
-    """The posteriors of the states of one utterance.
-
-    states    : [shape=(T, S)], the posterior of each state in every frame
-    stay      : [shape=(S,)], expected number of transitions from each state to itself
-    """
+    """The posteriors of an utterance's states [shape=(T, S)], and expected transitions to themselves [shape=(S,)]."""
 
     utterance: int
     states: NDArray[np.float64]

@@ -60,11 +60,7 @@ class _StateNodes:
 
 
 def build_context_loop(hmm: JointHmm) -> ContextLoop:
-    """Return the loop of a model's units with the back-off bigram.
-
-    A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
-    Source: Hofer 2008, Eq. 5.
-    """
+    """Return the loop of a model's units with the back-off bigram (Hofer 2008, Eq. 5), as if silence were around it."""
     inventory = hmm.inventory
     units = [unit for unit in hmm.spoken if unit not in inventory.free[1:]]
     leaves, densities = _number_densities(hmm, units)

@@ -44,11 +44,7 @@ class StreamWeights:
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """One kind of data of an utterance.
-
-    values : [shape=(T, D)], any finite number where they are not known
-    known  : [shape=(T,)], whether a frame has a value; for F0, whether it is voiced
-    """
+    """One kind of data of an utterance [shape=(T, D)], and which frames have a value, or are voiced [shape=(T,)]."""
 
     values: NDArray[np.floating[Any]]
     known: NDArray[np.bool_]

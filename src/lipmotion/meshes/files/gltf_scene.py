@@ -60,11 +60,7 @@ class _Materials:
         self._materials: dict[int, Material] = {}
 
     def material(self, number: int | None) -> Material:
-        """Return a material: its base colour as sRGB, its texture, its gloss from its roughness.
-
-        number : of the document; None: the default material
-        A texture that cannot be read gives a warning and the colour ``UNKNOWN``.
-        """
+        """Return a material (None: the default one): base colour, texture (unreadable: ``UNKNOWN``), gloss."""
         if number is None:
             return Material()
         if number not in self._materials:

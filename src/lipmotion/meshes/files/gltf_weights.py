@@ -56,11 +56,7 @@ TURNING = (NECK, HEAD)
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """Curves of one channel of an animation.
-
-    time_s : of the K keys
-    keys   : values, with the tangents before and after where they are splines [shape=(K, S) or (K, 3, S)]
-    """
+    """Curves of one channel of an animation: K times, and keys [shape=(K, S); of splines (K, 3, S)]."""
 
     names: tuple[str, ...]
     time_s: Array

@@ -24,11 +24,7 @@ _DAMAGED = "its compressed data is damaged; export it again, without compression
 
 
 def decode_attributes(data: bytes, count: int, stride: int) -> Bytes:
-    """Return the elements of a stream of vertex attributes [shape=(count, stride)].
-
-    stride : bytes of an element, a multiple of 4 up to 256
-    Raises InputError: another version, or data that is too short.
-    """
+    """Return a stream of vertex attributes [shape=(count, stride)]. Raises InputError: wrong version or length."""
     if not 0 < stride <= LARGEST_BLOCK or stride % 4:
         raise InputError(f"compressed elements of {stride} bytes, required a multiple of 4 up to 256")
     _check_header(data, ATTRIBUTES, (0,))

@@ -110,10 +110,8 @@ def suggest_names(name: str, names: Iterable[str]) -> str:
 
 
 def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
-    """Return the controls of a rig over time, in the order of the table.
-
-    sources : curves by name, blendshapes of ARKit, visemes, channels of motion [each shape=(T,)]
-    Raises InputError: a row asks for a source that is not among them.
+    """Return a rig's controls over time, in order, of curves by name [each shape=(T,)]. Raises InputError: one is
+    missing.
     """
     curves: dict[str, NDArray[np.float64]] = {}
     limits: dict[str, tuple[float, float]] = {}

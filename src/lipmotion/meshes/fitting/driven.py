@@ -189,7 +189,7 @@ class DrivenCharacter:
         return list(map(DrivenPose, rows, other_rows))
 
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
-        """Return the weights of expressions for moods [each shape=(T,)], closed in p, b, m; None: none, or finer ones."""
+        """Return weights of expressions for moods [each shape=(T,)], none parting p, b, m; None: there is none."""
         moods = expression_weights(read_moods(motion)) if self._expressions else {}
         upper, lower = (self.placement.vertices[self.placement.row(point)] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
         curves = {}

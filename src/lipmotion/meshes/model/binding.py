@@ -98,10 +98,8 @@ class ControlBinding:
         return self.transformed(mesh, matrices)
 
     def transformed(self, mesh: Mesh, matrices: Array) -> Array:
-        """Return the vertices under any transformations of the control points [shape=(V, 3)].
-
-        matrices : rotation, scale and shift of each, in the frame of the mesh [shape=(C, 3, 4)]
-        Source: Hofer 2008, Eq. 12.
+        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)] (Hofer 2008,
+        Eq. 12).
         """
         vertices = mesh.vertices.copy()
         vertices[self.rows] = skin_vertices(self.matrix, matrices, mesh.vertices[self.rows])

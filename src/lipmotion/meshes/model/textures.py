@@ -44,11 +44,7 @@ class Texture:
     def range_of_opacity(
         self, low: NDArray[np.float64], high: NDArray[np.float64], reach: NDArray[np.int64]
     ) -> Extremes:
-        """Return the least and the largest opacity in boxes of the texture, 0 to 1 [shape=(N,), both].
-
-        low, high : corners of the boxes, v downwards [shape=(N, 2)]
-        Boxes that lead over an edge of the texture get 0 and 1.
-        """
+        """Return least and largest opacity in boxes, v down [shape=(N, 2)], 0 to 1; those over an edge get 0 and 1."""
         size = np.array(self.pixels.shape[1::-1])
         shift = np.floor(low)
         first = np.floor((low - shift) * size).astype(np.int64) - reach[:, None]
@@ -120,10 +116,8 @@ class TextureTable:
     first: tuple[int, ...]
 
     def level(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Return the row of ``levels`` that suits triangles: about one of its pixels to a pixel of the screen.
-
-        in_texture : areas of the triangles, as parts of the texture's [shape=(F,)]
-        on_screen  : their areas in pixels of the screen [shape=(F,)]
+        """Return the row of ``levels`` that suits triangles, by areas in the texture and on the screen [each
+        shape=(F,)].
         """
         first = self.first[texture]
         last = (*self.first, len(self.levels))[texture + 1] - 1

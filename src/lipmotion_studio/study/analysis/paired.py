@@ -145,11 +145,7 @@ ALL_EQUAL = "raters, all agree"
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Answers to paired comparisons, N of them.
-
-    shown    : which conditions were shown first and second [shape=(N, 2)]
-    rater, sentence : of each answer [shape=(N,)]
-    """
+    """Answers to N paired comparisons: conditions shown first and second [shape=(N, 2)], rater and sentence."""
 
     conditions: tuple[str, ...]
     raters: tuple[str, ...]

@@ -21,11 +21,7 @@ Figures = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class RatingTable:
-    """The judgements on one scale.
-
-    values : mean judgement of each rater of each sentence in each condition; NaN where there is none [shape=(C, R, S)]
-    scale  : lowest and highest value
-    """
+    """Mean judgements on one scale [shape=(C, R, S)], NaN where there is none, and the scale's ends."""
 
     conditions: tuple[str, ...]
     values: Array

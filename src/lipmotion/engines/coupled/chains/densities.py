@@ -18,10 +18,8 @@ LEAST_COMPONENT_FRAMES = 0.1
 
 @dataclass(frozen=True, eq=False)
 class AudioVisualObservations:
-    """The observation vectors of T frames, stream by stream; the first stream is speech, the others are visual.
-
-    streams  : values of every stream [each shape=(T, D_s)]
-    observed : in which frames each stream was observed [each shape=(T,)]; None: in all
+    """Streams of T frames [each shape=(T, D_s)], speech first, and where each was observed [each shape=(T,)] (None:
+    all).
     """
 
     streams: tuple[Single, ...]
@@ -168,10 +166,8 @@ def zero_emission_statistics(group: StreamGroup) -> EmissionStatistics:
 
 
 def component_posteriors(posterior: Single, responsibilities: Single | None) -> Single:
-    """Return γ(q, k) [shape=(T, M, G')].
-
-    posterior        : γ(q) of the densities [shape=(T, G')]
-    responsibilities : of their components [shape=(T, M, G')]; None: one component
+    """Return γ(q, k) [shape=(T, M, G')], from γ(q) [shape=(T, G')] and responsibilities [shape=(T, M, G')] (None: M is
+    1).
     """
     return posterior[:, None] if responsibilities is None else responsibilities * posterior[:, None]
 

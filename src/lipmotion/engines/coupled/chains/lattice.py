@@ -52,11 +52,7 @@ class Lattice(ABC):
 
 @dataclass(frozen=True, eq=False)
 class JointPosteriors:
-    """Posteriors of joint states.
-
-    states      : the joint states [shape=(S',)]
-    probability : their posteriors in every frame [shape=(T, S')]
-    """
+    """Joint states [shape=(S',)] and their posteriors in every frame [shape=(T, S')]."""
 
     states: Index
     probability: Single

@@ -118,11 +118,7 @@ def network_lattice(
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Chains of hidden states with their transitions and emission densities.
-
-    streams     : the names of the streams; the first is speech
-    groups      : the stream groups; speech is in the first
-    """
+    """Chains of hidden states with transitions and emission densities; the first stream and group are of speech."""
 
     streams: tuple[str, ...]
     transitions: Transitions | FactorialTransitions

@@ -21,10 +21,8 @@ MOST_ARCS = 200_000
 
 
 class JointState(NamedTuple):
-    """The state of all chains together.
-
-    units, states : the unit of each chain, and its state within the unit
-    ahead         : whether each chain has left the unit that others are still in
+    """The unit of each chain, its state within the unit, and whether it has left the unit that others are in
+    (``ahead``).
     """
 
     units: tuple[int, ...]

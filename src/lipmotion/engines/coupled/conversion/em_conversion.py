@@ -43,11 +43,7 @@ class ConversionSettings:
 
 @dataclass(frozen=True, eq=False)
 class ConversionResult:
-    """The streams that conversion found.
-
-    streams        : values of every stream, speech first [each shape=(T, D_s)]
-    log_likelihood : joint log likelihood of speech and visual streams per frame, before every step and after the last
-    """
+    """The streams of a conversion, speech first [each shape=(T, D_s)], and the log likelihood per frame by step."""
 
     streams: tuple[Array, ...]
     log_likelihood: tuple[float, ...]

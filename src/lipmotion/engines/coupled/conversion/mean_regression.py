@@ -55,10 +55,8 @@ class RegressionInputs:
     basis: Single
 
     def __call__(self, features: Single, posterior: Single) -> Single:
-        """Return the regression inputs of all frames, with a constant as the last [shape=(T, F + 1)].
-
-        features  : [shape=(T, 39)]
-        posterior : of the first chain's states [shape=(T, N)]
+        """Return the regression inputs [shape=(T, F + 1)], constant last, of features [shape=(T, 39)] and posteriors
+        [shape=(T, N)].
         """
         return self._projected(_context(self.acoustic, features, posterior @ self.posterior_basis))
 
@@ -102,10 +100,8 @@ class VisualRegression:
 
 
 def regression_weights(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
-    """Return the weight of each regression in each frame [shape=(T, count)]; rows sum to 1, small weights are 0.
-
-    posterior           : of the states of a chain [shape=(T, N)]
-    regression_of_state : the regression of each of these states [shape=(N,)]
+    """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states [shape=(T,
+    N)].
     """
     weight = posterior @ np.eye(count, dtype=np.float32)[regression_of_state]
     weight[weight < LEAST_WEIGHT] = 0

@@ -270,11 +270,7 @@ def train_to_convergence(
     *,
     speech_only: bool = False,
 ) -> EmResult[Chains, ChainStatistics]:
-    """Return the result of EM with a fixed number of components.
-
-    floors      : the least variance of each stream [each shape=(D_s,)]
-    speech_only : re-estimate the densities of speech, and keep all else
-    """
+    """Return the result of EM with a fixed number of components; ``speech_only``: only densities of speech change."""
     streams = range(1 if speech_only else len(chains.streams))
     return run_em(
         chains,

@@ -74,11 +74,7 @@ class ChainStatistics:
 
 
 def e_step(chains: Chains, utterances: Sequence[LatticeUtterance], workers: int = 1) -> ChainStatistics:
-    """Return the sufficient statistics of utterances under the chains.
-
-    workers : number of threads; the result does not depend on it
-    Raises InputError: no utterance has a path through the chains.
-    """
+    """Return the sufficient statistics of utterances, whatever the workers. Raises InputError: none has a path."""
     starts = range(0, len(utterances), BATCH)
     jobs = ((chains, utterances[start : start + BATCH]) for start in starts)
     total: ChainStatistics | None = None
