@@ -1,6 +1,6 @@
 """Writes the tables of the reference that follow from the code: verbs, formats, limits, bad input.
 
-In a page such a table stands between ``<!-- made: NAME -->`` and ``<!-- end made -->``. Run
+In a page such a table stands between ``<!--made:NAME-->`` and ``<!--end-->``. Run
 ``python scripts/reference_pages.py`` after a change of the command line or of a registry.
 ``--check`` writes nothing, and fails where something would change.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-REGION = re.compile(r"(<!-- made: ([\w-]+) -->\n).*?(<!-- end made -->)", re.DOTALL)
+REGION = re.compile(r"(<!--made:([\w-]+)-->\n).*?(<!--end-->)", re.DOTALL)
 SEE = {
     "animate": "faces controls formats transcripts meshes filmed-face",
     "batch": "batch",
@@ -109,24 +109,24 @@ def line_on(name: str, module: str) -> str:
 
 
 def motion_formats() -> str:
-    """Return the table of motion files that are built in."""
+    """Return the list of motion files that are built in, and which are only written."""
     from lipmotion.formats.base import MOTION_FORMATS
 
-    rows = []
+    lines, only_written = [], []
     for name in MOTION_FORMATS.built_in:
         chosen = MOTION_FORMATS.load(name)
         says = line_on(name, chosen.write.__module__)
         says += f"; {chosen.rate_hz:g} frames a second" if chosen.rate_hz else ""
-        rows.append([f"`.{name}`", says, "yes" if chosen.read else "no"])
-    return table(["file", "what it holds", "read back"], iter(rows))
+        lines.append(f"- `.{name}`: {says}")
+        only_written += [] if chosen.read else [f"`.{name}`"]
+    return "\n".join([*lines, "", f"Not read back: {', '.join(only_written)}."])
 
 
 def cue_formats() -> str:
-    """Return the table of cue files."""
+    """Return the list of cue files."""
     from lipmotion.formats.cues import CUE_FORMATS
 
-    rows = ([f"`.{name}`", line_on(name, form.text.__module__)] for name, form in CUE_FORMATS.items())
-    return table(["file", "what it holds"], rows)
+    return "\n".join(f"- `.{name}`: {line_on(name, form.text.__module__)}" for name, form in CUE_FORMATS.items())
 
 
 def character_limits() -> str:
