@@ -77,7 +77,8 @@ def rendered(table: Sheet, current: frozenset[str]) -> str:
         return f"{line}\n" if (line := stamp(table, current)) else ""
     cells = [table["columns"], *table["rows"]]
     head, *rows = (re.sub(r"\| +(?=\|)", "| ", f"| {' | '.join(row)} |") for row in cells)
-    return "\n".join([head, "|" + "---|" * len(table["columns"]), *rows, "", stamp(table, current), ""])
+    below = filter(None, [stamp(table, current)])
+    return "\n".join([head, "|" + "---|" * len(table["columns"]), *rows, "", *below, ""])
 
 
 def written(text: str, found: Mapping[str, Sheet], current: frozenset[str]) -> str:

@@ -1,6 +1,6 @@
-"""Writes the tables of the reference that follow from the code: verbs, formats, limits, bad input.
+"""Writes the lists of the reference that follow from the code: verbs, formats, limits, bad input.
 
-In a page such a table stands between ``<!--made:NAME-->`` and ``<!--end-->``. Run
+In a page such a list stands between ``<!--made:NAME-->`` and ``<!--end-->``. Run
 ``python scripts/reference_pages.py`` after a change of the command line or of a registry.
 ``--check`` writes nothing, and fails where something would change.
 """
@@ -45,13 +45,6 @@ SEE = {
 """The pages on each verb, without suffix."""
 
 
-def table(head: list[str], rows: Iterator[list[str]]) -> str:
-    """Return a table in Markdown; bars in cells are escaped."""
-    cells = ([cell.replace("|", "\\|") for cell in row] for row in rows)
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head), *(f"| {' | '.join(row)} |" for row in cells)]
-    return re.sub(r"\| +(?=\|)", "| ", "\n".join(lines))
-
-
 def verbs(parser: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, str, argparse.ArgumentParser]]:
     """Yield name, help and parser of every verb, and of the actions of verbs that have some."""
     for action in parser._actions:
@@ -87,14 +80,14 @@ def actions(part: argparse.ArgumentParser) -> list[argparse.Action]:
     return [action for action in part._actions if action.dest != "help" and action.help != argparse.SUPPRESS]
 
 
-def verb_table() -> str:
-    """Return the table of all verbs: what they must be given, what they do, and, once a verb, the pages on it."""
-    rows, pages = [], dict(SEE)
+def verb_list() -> str:
+    """Return the list of all verbs: what they must be given, what they do, and, once a verb, the pages on it."""
+    lines, pages = [], dict(SEE)
     for name, says, part in verbs(whole_parser()):
         needed = [shown(a) for a in actions(part) if not a.option_strings or a.required]
         see = ", ".join(f"[{page}]({page}.md)" for page in pages.pop(name.split()[0], "").split())
-        rows.append([f"`{' '.join([name, *needed])}`", says, see])
-    return table(["verb", "what it does", "more"], iter(rows))
+        lines.append(f"- `{' '.join([name, *needed])}`: {says}" + (f" ({see})" if see else ""))
+    return "\n".join(lines)
 
 
 def exit_codes() -> str:
@@ -144,7 +137,7 @@ def bad_input() -> str:
 
 
 TABLES: dict[str, Callable[[], str]] = {
-    "verbs": verb_table,
+    "verbs": verb_list,
     "exit-codes": exit_codes,
     "motion-formats": motion_formats,
     "cue-formats": cue_formats,

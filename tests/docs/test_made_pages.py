@@ -88,7 +88,7 @@ def test_tables_of_the_reference_are_those_of_the_code() -> None:
     assert [name for name in REFERENCE.TABLES if f"<!--made:{name}-->" not in made] == []
 
 
-def test_every_verb_is_in_the_table_with_pages() -> None:
-    rows = REFERENCE.verb_table().splitlines()[2:]
+def test_every_verb_is_listed_with_pages() -> None:
+    rows = REFERENCE.verb_list().splitlines()
     verbs = {name.split()[0] for name, _, _ in REFERENCE.verbs(REFERENCE.whole_parser())}
     assert {row.split("`")[1].split()[0] for row in rows} == verbs == set(REFERENCE.SEE)
