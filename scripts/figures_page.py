@@ -5,8 +5,8 @@ its stamp; ``stated``, what the text of that page says in figures beside the tab
 ``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
 ``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A page shows the model, and
 the command as long as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file;
-an engine and the digest of its default options; ``none``, where no model takes part; or words. Of several, ``in row`` or
-``in rows`` says which rows one made. A table without columns and stamp need not stand in a page.
+an engine and the digest of its default options; ``none``, where no model takes part; or words. Of several models,
+``in row`` or ``in rows`` says which rows one made. A table without columns and stamp need not stand in a page.
 
 In a page a table stands between ``<!--figures:SHEET.TABLE-->`` and ``<!--end-->``. Run
 ``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.

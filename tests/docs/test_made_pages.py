@@ -55,7 +55,9 @@ def test_sheets_are_stamped_and_shown() -> None:
         assert not sheet["stated"] or not sheet["tables"]["text"]["columns"], name
         for key, table in sheet["tables"].items():
             assert all(table[part] for part in ("commit", "date", "model")), (name, key)
-            assert name == "glance" or f"<!--figures:{name}.{key}-->" in shown or not FIGURES.rendered(table, current), (name, key)
+            assert (
+                name == "glance" or f"<!--figures:{name}.{key}-->" in shown or not FIGURES.rendered(table, current)
+            ), (name, key)
 
 
 def test_a_figure_that_no_sheet_holds_is_found() -> None:
