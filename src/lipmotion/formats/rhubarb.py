@@ -63,7 +63,7 @@ def parse_tsv(text: str) -> CueSheet:
     if mark == "," and not follow and all(f"{a}{b}".isdecimal() for a, b, _ in spans):  # decimal commas
         cues = [(place, [",".join(fields[:-1]), fields[-1]]) for place, fields in cues]
     chart = choose_chart((fields[-1] for _, fields in cues), LETTERS)
-    return _build_sheet([(place, fields[0], *fields[-2:]) for place, fields in cues], chart)
+    return _build_sheet([(place, fields[0], fields[-2], fields[-1]) for place, fields in cues], chart)
 
 
 def xml_text(sheet: CueSheet, sound_file: str) -> str:

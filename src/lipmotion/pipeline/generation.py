@@ -233,12 +233,20 @@ def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech:
 
 def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     """Return what to expect of the motion of some speech."""
-    recognition, speech, fit, advice = analysis.recognition, analysis.speech, analysis.fit, _advise(analysis)
+    recognition, speech, fit = analysis.recognition, analysis.speech, analysis.fit
+    similarity = recognition.similarity if recognition is not None else None
+    needs = (  # the most helpful first: before all else the words, where they are not sure
+        (WHOLE_TRANSCRIPT, fit is not None and fit.share < LEAST_FITTING_SHARE),
+        (TRANSCRIPT, recognition is not None and weigh_words(recognition) < SURE_CONFIDENCE),
+        (LESS_NOISE, analysis.range_db < NOISY_DB),
+        (OWN_MODEL, recognition is not None and (similarity is None or similarity < FULL_WEIGHT_SCORE)),
+    )
+    advice = tuple(what for what, is_needed in needs if is_needed)
     if analysis.is_without_speech:
         return Outlook("no speech", 0.0, None, analysis.range_db, ())
     if recognition is not None:
         words = "words" if recognition.word_s > recognition.phone_s else "phones"
-        voice = own_model_weight(recognition.similarity) if recognition.similarity is not None else None
+        voice = own_model_weight(similarity) if similarity is not None else None
         return Outlook(words, weigh_words(recognition), voice, analysis.range_db, advice)
     is_used = speech.units_known if fit is None else not fit.is_doubtful
     words = "given units" if request.units is not None else "transcript" if is_used else "own model"
@@ -251,20 +259,6 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     if known < 1:
         words, share = "mapped transcript", share * known
     return Outlook(words, share, 1.0 if words == "own model" else None, analysis.range_db, advice)
-
-
-def _advise(analysis: SpeechAnalysis) -> tuple[str, ...]:
-    """Return what would help, the most helpful first: before all else the words, where they are not sure."""
-    recognition, advice = analysis.recognition, []
-    if analysis.fit is not None and analysis.fit.share < LEAST_FITTING_SHARE:
-        advice.append(WHOLE_TRANSCRIPT)
-    if recognition is not None and weigh_words(recognition) < SURE_CONFIDENCE:
-        advice.append(TRANSCRIPT)
-    if analysis.range_db < NOISY_DB:
-        advice.append(LESS_NOISE)
-    if recognition is not None and (recognition.similarity is None or recognition.similarity < FULL_WEIGHT_SCORE):
-        advice.append(OWN_MODEL)
-    return tuple(advice)
 
 
 def generate_passages(

@@ -78,19 +78,6 @@ def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sour
 
     Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
     """
-    motion, units, frames = _pose_motion()
-    if isinstance(curves, Path):
-        found = make_rig_sources(motion, units, rows)
-        return {name: curve[frames].tolist() for name, curve in found.items()}
-    if curves.shapes is None:
-        raise InputError("the character is moved by control points, which have no weights to calibrate")
-    solved = solve_shape_weights(motion, units, curves.shapes)
-    by_name = {name: solved[name][frames].tolist() for name in solved.names}
-    return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}
-
-
-def _pose_motion() -> tuple[Motion, Timeline[Unit], list[int]]:
-    """Return a motion with its phones, and the frames of the poses."""
     edges = PAUSE_S + PHONE_S * np.arange(len(PHONES) + 1)
     spans = [Span(0.0, PAUSE_S, Unit("sil"))]
     spans += [Span(float(at), float(at + PHONE_S), Unit(phone)) for at, phone in zip(edges, PHONES, strict=False)]
@@ -101,4 +88,12 @@ def _pose_motion() -> tuple[Motion, Timeline[Unit], list[int]]:
     opening = np.interp(time_s, keys, [0, 0, *np.repeat(OPENINGS, 2), 0, 0])
     width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * mouth_template().width
     motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
-    return motion, Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
+    units, frames = Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
+    if isinstance(curves, Path):
+        found = make_rig_sources(motion, units, rows)
+        return {name: curve[frames].tolist() for name, curve in found.items()}
+    if curves.shapes is None:
+        raise InputError("the character is moved by control points, which have no weights to calibrate")
+    solved = solve_shape_weights(motion, units, curves.shapes)
+    by_name = {name: solved[name][frames].tolist() for name in solved.names}
+    return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}

@@ -224,21 +224,16 @@ def _tables() -> _Tables:
     fourier = np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * _window(time)
     inverse = np.cos(2 * np.pi / size * bins[:, None] * lags()) * np.where(bins == 0, 1, 2)[:, None] / size
     early, late = (_window(time) * _window(time + side * lags()) for side in (1, -1))
-    arrays = (_low_pass(), fourier, inverse, early, late, early.sum(axis=0))
-    return _Tables(*(array.astype(np.float32) for array in arrays))
-
-
-def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.where(np.abs(time + 0.5 - _WINDOW / 2) < _WINDOW / 2, np.sin(np.pi * (time + 0.5) / _WINDOW) ** 2, 0)
-
-
-def _low_pass() -> NDArray[np.float64]:
-    """Return a windowed-sinc band pass with no gain at 0 Hz, once for every output [shape=(HOP, 3 · _HOP)]."""
-    time = np.arange(_TAPS) - _TAPS // 2
-    low, high = (2 * hertz / SPEECH_RATE_HZ * np.sinc(2 * hertz / SPEECH_RATE_HZ * time) for hertz in _PASSED_HZ)
+    at = np.arange(_TAPS) - _TAPS // 2
+    low, high = (2 * hertz / SPEECH_RATE_HZ * np.sinc(2 * hertz / SPEECH_RATE_HZ * at) for hertz in _PASSED_HZ)
     taps = (high - low) * np.hamming(_TAPS)
     taps -= np.hamming(_TAPS) * taps.sum() / np.hamming(_TAPS).sum()
     table = np.zeros((3 * HOP, _HOP))
     for output in range(_HOP):
         table[_STEP * output : _STEP * output + _TAPS, output] = taps
-    return np.concatenate(np.split(table, 3), axis=1)
+    arrays = (np.concatenate(np.split(table, 3), axis=1), fourier, inverse, early, late, early.sum(axis=0))
+    return _Tables(*(array.astype(np.float32) for array in arrays))
+
+
+def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(np.abs(time + 0.5 - _WINDOW / 2) < _WINDOW / 2, np.sin(np.pi * (time + 0.5) / _WINDOW) ** 2, 0)

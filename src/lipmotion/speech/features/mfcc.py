@@ -63,7 +63,12 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
     while log_powers:
         cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
         static = np.concatenate([cepstra, energy[:, None]], axis=1)
-        features.append(Features(normalised(_with_deltas(static), rounding), audio.duration_s))
+        width = static.shape[1]
+        values = np.empty((len(static), 3 * width), np.float32)
+        values[:, :width] = static
+        for first in (width, 2 * width):
+            values[:, first : first + width] = regression_delta(values[:, first - width : first])
+        features.append(Features(normalised(values, rounding), audio.duration_s))
     return features
 
 
@@ -86,16 +91,6 @@ def checked_samples(audio: Audio) -> NDArray[np.float32]:
     if not peak < LARGEST_SAMPLE:
         raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
     return audio.samples.astype(np.float32, copy=False)
-
-
-def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return static features [shape=(T, D)] with their Δ and ΔΔ [shape=(T, 3·D)]."""
-    width = static.shape[1]
-    values = np.empty((len(static), 3 * width), np.float32)
-    values[:, :width] = static
-    for first in (width, 2 * width):
-        values[:, first : first + width] = regression_delta(values[:, first - width : first])
-    return values
 
 
 def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:

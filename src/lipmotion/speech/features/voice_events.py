@@ -88,7 +88,7 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
         said = units.between(at_s, at_s + sound.duration_s)
-        level_db, (voiced, pitch) = smoothed_level_db(sound), _voice(sound)
+        level_db, (voiced, pitch) = _smoothed(analysed(sound).log_energy.astype(np.float64) * DB), _voice(sound)
         laughs = tuple(_laughs(sound, level_db, voiced, said))
         phrases = [phrase for phrase in _phrases(said) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
         events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
@@ -113,11 +113,6 @@ DB = 10 / np.log(10)
 """Decibels of a natural logarithm of power."""
 
 
-def smoothed_level_db(audio: Audio) -> Curve:
-    """Return the smoothed level of every frame of a recording [shape=(T,)], decibels of any reference."""
-    return _smoothed(analysed(audio).log_energy.astype(np.float64) * DB)
-
-
 def _heard(level_db: Curve) -> Curve:
     """Return the levels within passages, over which levels are compared; all, where there is none."""
     heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]
@@ -132,7 +127,8 @@ def _voice(audio: AnalysedAudio) -> tuple[Voiced, Curve]:
 
 def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
     """Yield laughter where hardly any words are known or confirmed."""
-    words = [span for span in units if not is_silent(span.label.phone) and _is_sure(span.label)]
+    sure = (span for span in units if span.label.confidence is None or span.label.confidence >= WORD_CONFIDENCE)
+    words = [span for span in sure if not is_silent(span.label.phone)]
     for bout in laughter(audio.samples, level_db, voiced):
         start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
         said_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for span in words)
@@ -140,10 +136,6 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
             loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
             calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
             yield VoiceEvent(start_s, end_s, LAUGHTER, bout.probability, tuple(calls))
-
-
-def _is_sure(unit: Unit) -> bool:
-    return unit.confidence is None or unit.confidence >= WORD_CONFIDENCE
 
 
 def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
@@ -208,7 +200,16 @@ def _shouts(judged: Sequence[tuple[float, float, tuple[float, float, float]]]) -
 def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
     """Yield the breaths that are detected in pauses."""
     loud_db, spoken = float(np.percentile(_heard(level_db), 95)), np.flatnonzero(voiced)
-    for start_s, end_s in _silences(units):
+    ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
+    starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
+    starts_s.append(max((span.end_s for span in units), default=0.0))
+    silences = [
+        (first_s, min(first_s + PAUSE_PIECE_S, end_s))
+        for start_s, end_s in zip(ends_s, starts_s, strict=True)
+        if end_s - start_s >= BREATH_PAUSE_S
+        for first_s in np.arange(start_s, end_s, PAUSE_PIECE_S).tolist()
+    ]
+    for start_s, end_s in silences:
         pause, reach = _frames(start_s, end_s), round(QUIET_REACH_S * FRAME_RATE_HZ)
         around = slice(max(pause.start - reach, 0), min(pause.stop + reach, len(level_db)))
         for begin, end, rise_db in _noises(_bands(audio, around), voiced[around]):
@@ -223,20 +224,6 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
                 yield VoiceEvent(first / FRAME_RATE_HZ, stop / FRAME_RATE_HZ, BREATH, strength)
 
 
-def _silences(units: Timeline[Unit]) -> list[tuple[float, float]]:
-    """Return start and end, in seconds, of the stretches without phones that are long enough for a breath, cut."""
-    ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
-    starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
-    starts_s.append(max((span.end_s for span in units), default=0.0))
-    pairs = zip(ends_s, starts_s, strict=True)
-    return [
-        (first_s, min(first_s + PAUSE_PIECE_S, end_s))
-        for start_s, end_s in pairs
-        if end_s - start_s >= BREATH_PAUSE_S
-        for first_s in np.arange(start_s, end_s, PAUSE_PIECE_S).tolist()
-    ]
-
-
 def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
     """Yield first frame, the one after the last, and rise in decibels of noise that is as a breath's."""
     centres, starts = band_centres(), range(0, len(bands), BLOCK_FRAMES)
@@ -246,7 +233,11 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         for inside in [(centres >= least) & (centres < most)]
     )
     level = _smoothed(DB * np.log(bright))
-    quiet = _quiet(level)
+    reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
+    windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
+    rank = int(QUIET_SHARE * windows.shape[1])
+    blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
+    quiet = np.concatenate([np.partition(block, rank, axis=1)[:, rank].copy() for block in blocks])
     edges = np.flatnonzero(np.diff(np.r_[False, (level > quiet + BREATH_RISE_DB[0]) & ~voiced, False]))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if not BREATH_S[0] <= (stop - first) / FRAME_RATE_HZ <= BREATH_S[1]:
@@ -259,15 +250,6 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         shaped = BREATH_TILT_DB[0] <= tilt_db <= BREATH_TILT_DB[1] and low_db <= BREATH_LOW_DB
         if shaped and top_db - max(left, right) >= BREATH_EDGE_DB:
             yield first, stop, float(np.max(level[run] - quiet[run]))
-
-
-def _quiet(level: Curve) -> Curve:
-    """Return the level that ``QUIET_SHARE`` of the frames around each frame do not pass [shape=(T,)]."""
-    reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
-    windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
-    rank = int(QUIET_SHARE * windows.shape[1])
-    blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
-    return np.concatenate([np.partition(block, rank, axis=1)[:, rank].copy() for block in blocks])
 
 
 def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:

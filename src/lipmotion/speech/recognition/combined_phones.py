@@ -52,13 +52,17 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
         free=(*old.free, *(unit for unit in new if unit in NOISES or is_silent(unit))),
     )
     sources = np.array([*range(plain), *(source for *_, source in added), *range(plain, len(old.names))], np.intp)
+    english = english_bigram(table.units)
+    mixed, count = english.copy(), len(own.bigram.units)
+    mixed[:count] *= ENGLISH_SHARE
+    mixed[:count, :count] += (1 - ENGLISH_SHARE) * np.exp(own.bigram.log_probability.astype(float))
     hmm = replace(
         own,
         config=replace(own.config, bigram_weight=BIGRAM_WEIGHT, insertion=INSERTION_SCORE),
         table=table,
         mixtures=own.mixtures.select(sources),
         log_stay=own.log_stay[sources[: plain + len(added)]],
-        bigram=_bigram(own.bigram, table.units),
+        bigram=Bigram(table.units, np.log(np.maximum(mixed, 1e-9)).astype(np.float32)),
     )
     return CombinedPhones(hmm, np.array([_column(table, name) for name in table.names], np.intp))
 
@@ -67,15 +71,6 @@ def _column(table: StateTable, name: str) -> int:
     """Return the general density that goes with a density of the table, by its name."""
     unit, _, rest = name.partition(".")
     return density_column(unit, int(rest.partition("<")[0].partition(">")[0]), table.count(unit))
-
-
-def _bigram(own: Bigram, units: tuple[str, ...]) -> Bigram:
-    """Return the own bigram mixed with that of English; after phones that are not in the own corpus, English alone."""
-    english = english_bigram(units)
-    mixed, count = english.copy(), len(own.units)
-    mixed[:count] *= ENGLISH_SHARE
-    mixed[:count, :count] += (1 - ENGLISH_SHARE) * np.exp(own.log_probability.astype(float))
-    return Bigram(units, np.log(np.maximum(mixed, 1e-9)).astype(np.float32))
 
 
 def combined_log_likelihoods(

@@ -123,7 +123,12 @@ class Recogniser:
             ]
             return joined_recognition(passages, features.duration_s)
         similarity = self._similarity(audio)
-        known = self._knows_voice_and_words(similarity)
+        known = (
+            self.kind == "auto"
+            and similarity is not None
+            and similarity.score > OWN_VOICE_SCORE
+            and self.own.bigram.perplexity < SMALL_PERPLEXITY
+        )
         network = None if known else network_of(self.kind)
         if network is not None:
             found = posterior_stretches(network, audio, each)
@@ -135,7 +140,12 @@ class Recogniser:
         path = self._loop.network.best_path(log_likelihoods)
         labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
         if spoken is not None:
-            parts, recognised = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
+            aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
+            loud = find_loud_frames(audio.log_energy)
+            free = self._loop.network.emission[path]
+            parts, recognised = WordSearch(
+                hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words"
+            ).words_of(spoken)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
         return _recognition(labels, recognised, len(path), features.duration_s, similarity)
 
@@ -171,24 +181,6 @@ class Recogniser:
         except AlignmentError:
             return labels
         return [LabelledFrames(_first_frame(span.start_s), span.label.phone) for span in aligned]
-
-    def _word_search(
-        self, audio: AnalysedAudio, hmm: UnitHmm, log_likelihoods: LogLikelihoods, path: NDArray[np.intp]
-    ) -> WordSearch:
-        """Return the search for words in a recording whose phones without words have a path through ``_loop``."""
-        aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
-        loud = find_loud_frames(audio.log_energy)
-        free = self._loop.network.emission[path]
-        return WordSearch(hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words")
-
-    def _knows_voice_and_words(self, similarity: SpeakerSimilarity | None) -> bool:
-        """Return whether a voice is that of the own models, and their corpus one of few words."""
-        return (
-            self.kind == "auto"
-            and similarity is not None
-            and similarity.score > OWN_VOICE_SCORE
-            and self.own.bigram.perplexity < SMALL_PERPLEXITY
-        )
 
     def align(
         self,
@@ -376,7 +368,10 @@ def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_
     bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
     Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
     """
-    labels, bounds = _one_silence(labels, bounds)
+    first = [
+        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
+    ]
+    labels, bounds = [labels[i] for i in first], np.append(bounds[first], bounds[-1])
     edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
     edges[-1] = duration_s
     spans = []
@@ -389,13 +384,3 @@ def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_
             name = PAUSE if inside and end_s - start_s < SHORT_PAUSE_S else SILENCE
         spans.append(Span(start_s, end_s, Unit(name, word=word)))
     return Timeline(tuple(spans))
-
-
-def _one_silence(
-    labels: list[tuple[str, str]], bounds: NDArray[np.intp]
-) -> tuple[list[tuple[str, str]], NDArray[np.intp]]:
-    """Return labels and bounds in which silences that follow one another, as noise beside silence, are one."""
-    first = [
-        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
-    ]
-    return [labels[i] for i in first], np.append(bounds[first], bounds[-1])

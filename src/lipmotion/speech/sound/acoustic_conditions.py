@@ -64,7 +64,13 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     added = 0.0
     if rng.random() < ROOM_PROBABILITY:
         share = 10 ** (rng.uniform(*ROOM_DB) / 10)
-        samples, added = samples + _reverberation(samples, share, rng), share
+        from scipy.signal import fftconvolve
+
+        duration_s = rng.uniform(*ROOM_S)
+        response = rng.standard_normal(int(duration_s * SPEECH_RATE_HZ))
+        response *= 10 ** (-3 * np.arange(len(response)) / len(response))
+        response *= np.sqrt(share / np.square(response).sum())
+        samples, added = samples + fftconvolve(samples, response)[: len(samples)], share
     if rng.random() < NOISE_PROBABILITY:
         share = 10 ** (-rng.uniform(*NOISE_DB) / 10)
         noise = (
@@ -103,17 +109,6 @@ def _speech_power(audio: Audio) -> float:
         return float(np.square(audio.samples[spoken_samples(audio)], dtype=float).mean())
     except InputError:
         return 0.0
-
-
-def _reverberation(samples: Samples, share: float, rng: np.random.Generator) -> Samples:
-    """Return the reverberation of a room, with a share of the energy of the direct sound."""
-    from scipy.signal import fftconvolve
-
-    duration_s = rng.uniform(*ROOM_S)
-    response = rng.standard_normal(int(duration_s * SPEECH_RATE_HZ))
-    response *= 10 ** (-3 * np.arange(len(response)) / len(response))
-    response *= np.sqrt(share / np.square(response).sum())
-    return fftconvolve(samples, response)[: len(samples)]
 
 
 def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Samples:

@@ -6,7 +6,6 @@ import logging
 import mmap
 import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -60,42 +59,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
             loudest + 1,
         )
         sound = _decoded(path, rate_hz, loudest)
-    _check_damage(path, sound, logging.WARNING if warn else logging.DEBUG)
-    return _checked(path, Audio(sound.samples, rate_hz))
-
-
-def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
-    import av
-
-    try:
-        with open_media(path, content=_corrected_wave(path)) as container:
-            _first_track(path, container)
-            return decode_audio(container, rate_hz, channel)
-    except (av.FFmpegError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        if is_text(path):
-            told = f"is text, required a recording; give the recording first, its words with --transcript {path}"
-            raise InputError(f"{path}: {told}") from error
-        raise InputError(f"{path}: not a readable recording ({_reason(error)}); give an audio or video file") from error
-
-
-def _first_track(path: Path, container: Any) -> None:
-    if not container.streams.audio:
-        raise InputError(f"{path}: has no sound track; give a recording with sound")
-    _check_stream(path, container.streams.audio[0])
-    if len(container.streams.audio) > 1:
-        LOG.info("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
-
-
-def _check_stream(path: Path, stream: Any) -> None:
-    if stream.codec_context is None:
-        raise InputError(f"{path}: its sound is coded in an unknown way; export it as .wav or .flac")
-    check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
-
-
-def _check_damage(path: Path, sound: DecodedAudio, level: int) -> None:
-    """Log damage at a level of ``logging``. Raises InputError: too little of the sound can be decoded."""
+    level = logging.WARNING if warn else logging.DEBUG
     held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
     found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
@@ -105,6 +69,30 @@ def _check_damage(path: Path, sound: DecodedAudio, level: int) -> None:
         LOG.log(level, "%s: damaged: %s%s", path, found, holes)
     if held_s < CUT_SHORT_SHARE * sound.stated_s:
         LOG.log(level, "%s: cut short: it states %.1f s of sound and holds %.1f s", path, sound.stated_s, held_s)
+    return _checked(path, Audio(sound.samples, rate_hz))
+
+
+def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
+    import av
+
+    try:
+        with open_media(path, content=_corrected_wave(path)) as container:
+            if not container.streams.audio:
+                raise InputError(f"{path}: has no sound track; give a recording with sound")
+            stream = container.streams.audio[0]
+            if stream.codec_context is None:
+                raise InputError(f"{path}: its sound is coded in an unknown way; export it as .wav or .flac")
+            check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
+            if len(container.streams.audio) > 1:
+                LOG.info("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
+            return decode_audio(container, rate_hz, channel)
+    except (av.FFmpegError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        if is_text(path):
+            told = f"is text, required a recording; give the recording first, its words with --transcript {path}"
+            raise InputError(f"{path}: {told}") from error
+        raise InputError(f"{path}: not a readable recording ({_reason(error)}); give an audio or video file") from error
 
 
 def _checked(path: Path, audio: Audio) -> Audio:

@@ -55,7 +55,17 @@ def spoken_spans(levels: Array) -> list[tuple[float, float]]:
     levels : of ``levels_db``
     Other sounds that are as loud as speech count as speech.
     """
-    loud = levels > _thresholds_db(levels)
+    size = round(BLOCK_S / STEP_S)
+    count = max(1, round(len(levels) / size))
+    values = []
+    for block in range(count):  # each with half a block on both sides
+        middle = (block + 0.5) * len(levels) / count
+        part = levels[max(0, round(middle - size)) : round(middle + size)]
+        low, high = np.percentile(part, [QUIET_PERCENTILE, LOUD_PERCENTILE]) if part.size else (0.0, 0.0)
+        flat = high - low < LEAST_RANGE_DB
+        values.append(QUIETEST_DB - 1 if flat else low + SPEECH_SHARE * (high - low))
+    middles = (np.arange(count) + 0.5) * len(levels) / count
+    loud = levels > np.interp(np.arange(len(levels)), middles, values)
     edges = np.flatnonzero(np.diff(np.r_[False, loud, False]))
     starts_s, ends_s = edges[::2] * STEP_S, edges[1::2] * STEP_S
     joined: list[tuple[float, float]] = []
@@ -74,18 +84,3 @@ def quietest_s(levels: Array, start_s: float, end_s: float) -> float:
     if not part.size:
         return (start_s + end_s) / 2
     return (max(first, 0) + int(np.argmin(part)) + 0.5) * STEP_S
-
-
-def _thresholds_db(levels: Array) -> Array:
-    """Return the level above which each frame is speech [shape=(T,)]."""
-    size = round(BLOCK_S / STEP_S)
-    count = max(1, round(len(levels) / size))
-    values = []
-    for block in range(count):  # each with half a block on both sides
-        middle = (block + 0.5) * len(levels) / count
-        part = levels[max(0, round(middle - size)) : round(middle + size)]
-        quiet, loud = np.percentile(part, [QUIET_PERCENTILE, LOUD_PERCENTILE]) if part.size else (0.0, 0.0)
-        flat = loud - quiet < LEAST_RANGE_DB
-        values.append(QUIETEST_DB - 1 if flat else quiet + SPEECH_SHARE * (loud - quiet))
-    middles = (np.arange(count) + 0.5) * len(levels) / count
-    return np.interp(np.arange(len(levels)), middles, values)

@@ -96,18 +96,12 @@ def _others() -> tuple[SyntheticVoice, ...]:
     data = _data()
     if data is None:
         return ()
-    names = _languages(data)
-    return tuple(SyntheticVoice(name, "espeak-ng", f"espeak-{name}", name) for name in names)
-
-
-def _languages(data: Path) -> list[str]:
-    """Return the names of all languages in the data, without duplicates, in alphabetical order."""
     names = set()
     for path in (data / "lang").rglob("*"):
         if path.is_file() and path.stat().st_size <= LARGEST_VOICE_BYTES:
             lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
             names |= {line.split()[1].lower() for line in lines if line.startswith("language ") and line.split()[1:]}
-    return sorted(names)
+    return tuple(SyntheticVoice(name, "espeak-ng", f"espeak-{name}", name) for name in sorted(names))
 
 
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap
 from lipmotion.types import Audio, Span, Timeline
@@ -38,7 +37,11 @@ def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ES
     for index in range(1, len(labels)):
         before, here = _phone(labels[index - 1], phone_map), _phone(labels[index], phone_map)
         if here in CLOSING and before != SILENCE:
-            edges_s[index] = max(_closure_s(closed, edges_s[index], audio.rate_hz), edges_s[index - 1])
+            burst = round(edges_s[index] * audio.rate_hz)
+            first = max(burst - round(LONGEST_CLOSURE_S * audio.rate_hz), 0)
+            loud = np.flatnonzero(~closed[first:burst])
+            closure_s = (first + int(loud[-1]) + 1 if len(loud) else first) / audio.rate_hz
+            edges_s[index] = max(closure_s if burst > first else edges_s[index], edges_s[index - 1])
         elif here == "l" and before in VOWELS and edges_s[index + 1] - edges_s[index] < LATE_L_S:
             length_s = edges_s[index + 1] - edges_s[index - 1]
             edges_s[index] = min(edges_s[index], edges_s[index + 1] - L_SHARE * length_s)
@@ -49,14 +52,3 @@ def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ES
 def _phone(label: str, phone_map: PhoneMap) -> str:
     """Return the last phone of a label; empty for a label that is part of another phone or unknown."""
     return (phone_map.get(label) or ("",))[-1]
-
-
-def _closure_s(closed: NDArray[np.bool_], burst_s: float, rate_hz: int) -> float:
-    """Return the start of the silence before a burst, s.
-
-    closed : whether each sample is silent
-    """
-    burst = round(burst_s * rate_hz)
-    first = max(burst - round(LONGEST_CLOSURE_S * rate_hz), 0)
-    loud = np.flatnonzero(~closed[first:burst])
-    return (first + int(loud[-1]) + 1 if len(loud) else first) / rate_hz if burst > first else burst_s

@@ -35,12 +35,8 @@ def _voices() -> tuple[SyntheticVoice, ...]:
         return ()
     rows = [line.split() for line in program_output(["festival", "-b", LISTING], PACKAGE).splitlines()]
     names = [row[0] for row in rows if row[1:] == ["english", "american"]]
-    return tuple(SyntheticVoice(name, "festival", _speaker(name)) for name in names)
-
-
-def _speaker(name: str) -> str:
-    """Return the speaker of a voice: ``slt`` for ``cmu_us_slt_arctic_hts``, ``kal`` for ``kal_diphone``."""
-    return re.sub(r"^cmu_us_|_.*", "", re.sub(r"^cmu_us_", "", name))
+    speakers = (re.sub(r"_.*", "", re.sub(r"^cmu_us_", "", name)) for name in names)  # slt of cmu_us_slt_arctic_hts
+    return tuple(SyntheticVoice(name, "festival", who) for name, who in zip(names, speakers, strict=True))
 
 
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
@@ -53,20 +49,15 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
     if len(parts) != len(texts):
         raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
     for path, part in zip(paths, parts, strict=True):
-        yield SynthesisedSentence(read_audio(path), parse_segments(part), path)
+        spans = []
+        for line in part.splitlines():
+            try:
+                label, start, end = line.split()
+                spans.append(Span(float(start), float(end), label))
+            except ValueError as error:
+                raise InputError(f"festival prints {line!r}, required a phone, its start and its end") from error
+        yield SynthesisedSentence(read_audio(path), Timeline(tuple(spans)), path)
         path.unlink()
-
-
-def parse_segments(printed: str) -> Timeline[str]:
-    """Return phones in time from lines of a name, a start and an end. Raises InputError: other lines."""
-    spans = []
-    for line in printed.splitlines():
-        try:
-            label, start, end = line.split()
-            spans.append(Span(float(start), float(end), label))
-        except ValueError as error:
-            raise InputError(f"festival prints {line!r}, required a phone, its start and its end") from error
-    return Timeline(tuple(spans))
 
 
 def _quoted(text: str) -> str:

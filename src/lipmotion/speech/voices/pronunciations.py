@@ -62,7 +62,11 @@ def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunci
                 "another language"
             )
     try:
-        found = espeak_pronunciations(words, spoken.voice or language)
+        said = zip(words, pronounced_words(words, spoken.voice or language), strict=True)
+        found: dict[str, tuple[Pronunciation, ...]] = {
+            word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in read_ipa(label)[0]),)
+            for word, ipa in said
+        }
     except MissingDependencyError as error:
         raise MissingDependencyError(
             f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng "
@@ -72,12 +76,3 @@ def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunci
     if silent is not None:
         raise InputError(f"{shorten(repr(silent))} has no phone in {spoken.name}; add it to a lexicon file")
     return found
-
-
-def espeak_pronunciations(words: Sequence[str], voice: str) -> dict[str, tuple[Pronunciation, ...]]:
-    """Return the pronunciation of each word by the rules of a voice. Raises as ``pronounced_words``."""
-    said = zip(words, pronounced_words(words, voice), strict=True)
-    return {
-        word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in read_ipa(label)[0]),)
-        for word, ipa in said
-    }

@@ -123,20 +123,16 @@ def phones_without_words(
     parts = list[LabelledStretch]()
     for stretch, posteriors in found:
         if _finds_phones(posteriors):
-            values = free.stretch(*stretch) + _posterior_bonus(hmm, posteriors, stretch.end - stretch.first)
+            frames = stretch.end - stretch.first
+            row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)
+            posterior = np.zeros((frames, len(FORMS)), np.float32)
+            for column, phone in enumerate(PHONES):
+                if not is_silent(phone):
+                    posterior[:, FORMS.index(compared_form(phone))] += np.exp(posteriors.of_phones[row, column])
+            values = free.stretch(*stretch) + density_bonus(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
             path = loop.network.best_path(wrap_log_likelihoods(values))
             parts.append((stretch, free_labels(loop, path, stretch.first)))
     return parts
-
-
-def _posterior_bonus(hmm: UnitHmm, posteriors: PhonePosteriors, frames: int) -> NDArray[np.float32]:
-    """Return what is added to the log densities of a stretch [shape=(frames, G)]."""
-    row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)
-    posterior = np.zeros((frames, len(FORMS)), np.float32)
-    for column, phone in enumerate(PHONES):
-        if not is_silent(phone):
-            posterior[:, FORMS.index(compared_form(phone))] += np.exp(posteriors.of_phones[row, column])
-    return density_bonus(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
 
 
 def _finds_phones(posteriors: PhonePosteriors) -> bool:
