@@ -18,10 +18,10 @@ from lipmotion.engines import Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY, Model
-from lipmotion.pipeline.training.fingerprint import fingerprint_training
+from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.files import make_folder
 from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon

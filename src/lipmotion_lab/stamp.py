@@ -20,7 +20,7 @@ from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import ENGINES
 from lipmotion.kernels.threads import blas_kernels
-from lipmotion.pipeline.training.fingerprint import digest_corpus
+from lipmotion.pipeline.training.labels import digest_corpus
 from lipmotion_lab.runner import ExperimentSettings
 
 PACKAGES = ("lipmotion", "numpy", "scipy", "numba", "av", "pocketsphinx", "hama", "matplotlib")

@@ -21,8 +21,7 @@ from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_livin
 from lipmotion.meshes.model.bones import ANGLES as HEAD
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
-from lipmotion.pipeline.outputs.calibration import POSES, calibrate_rows, pose_sources
-from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion.pipeline.outputs.curve_sets import POSES, calibrate_rows, make_curves, pose_sources
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, thin_keys
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline

@@ -18,8 +18,7 @@ from lipmotion.speech.recognition.agreement import (
     agreement_score,
     transcript_fit,
 )
-from lipmotion.speech.recognition.general.acoustic import PHONES, general_model
-from lipmotion.speech.recognition.general.front_end import general_features
+from lipmotion.speech.recognition.general import PHONES, general_features, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentence

@@ -6,7 +6,7 @@ import pytest
 from lipmotion import Model
 from lipmotion.speech.recognition import combined_phones as module
 from lipmotion.speech.recognition.combined_phones import NOISES, combine_phones, combined_log_likelihoods
-from lipmotion.speech.recognition.general.acoustic import general_model
+from lipmotion.speech.recognition.general import general_model
 from lipmotion.units import PHONES, SILENCE
 
 

@@ -16,11 +16,11 @@ from lipmotion.hmm.log_likelihoods import wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network import network_search, posteriors
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
-from lipmotion.speech.recognition.network.hama import Hama
 from lipmotion.speech.recognition.network.network_search import phones_without_words, spoken_items
 from lipmotion.speech.recognition.network.posteriors import (
     BLANK,
     WORD_BOUNDARY,
+    Hama,
     PhonePosteriors,
     PhoneRecogniser,
     PosteriorStretch,

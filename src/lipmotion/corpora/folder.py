@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from lipmotion.corpora.separate_sounds import is_of_recorder
 from lipmotion.corpora.source_recordings import (
     AUDIO_SUFFIXES,
     LISTS,
@@ -19,6 +18,7 @@ from lipmotion.corpora.source_recordings import (
     SourceRecording,
     assign_splits,
     filter_videos,
+    is_of_recorder,
 )
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import Registry

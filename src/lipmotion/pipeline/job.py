@@ -15,9 +15,8 @@ from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
 from lipmotion.storage.json_text import read_toml
 from lipmotion.types.configuration import Configuration, option
-from lipmotion.types.delivery import Delivery
+from lipmotion.types.delivery import Delivery, Staging
 from lipmotion.types.progress import Monitor, silent_monitor, sub_monitor
-from lipmotion.types.staging import Staging
 
 if TYPE_CHECKING:
     from lipmotion.meshes.fitting.driven import DrivenCharacter

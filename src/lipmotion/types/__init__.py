@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from lipmotion.types.audio import Audio, Prosody, VoiceEvent, from_sixteen_bits, to_sixteen_bits
     from lipmotion.types.confidence import SpeechKnowledge
     from lipmotion.types.configuration import Configuration, Rule, option
-    from lipmotion.types.delivery import Delivery
+    from lipmotion.types.delivery import Delivery, Staging
     from lipmotion.types.explanation import (
         ChainPosteriors,
         ChainStates,
@@ -58,7 +58,6 @@ if TYPE_CHECKING:
         sub_monitor,
         with_progress,
     )
-    from lipmotion.types.staging import Staging
     from lipmotion.types.timeline import Span, Timeline, Unit
     from lipmotion.types.utterance import TimedTranscript, TimedWord, Track, TranscriptLine, Utterance, sort_lines
 
@@ -131,7 +130,7 @@ __all__ = [
 ]
 
 _MODULES = (
-    *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "confidence"),
+    *("configuration", "delivery", "audio", "features", "timeline", "motion", "confidence"),
     *("generation", "progress", "explanation", "utterance"),
 )
 """Where the names are looked for, in this order."""

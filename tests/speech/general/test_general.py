@@ -7,17 +7,17 @@ import pytest
 from pocketsphinx import Decoder
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.speech.recognition.general import acoustic
-from lipmotion.speech.recognition.general.acoustic import (
+from lipmotion.speech.recognition import general as acoustic
+from lipmotion.speech.recognition.general import (
     GAUSSIANS,
     PHONES,
     STATES,
     STREAMS,
     density_column,
+    english_bigram,
+    general_features,
     general_model,
 )
-from lipmotion.speech.recognition.general.front_end import general_features
-from lipmotion.speech.recognition.general.language import english_bigram
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio

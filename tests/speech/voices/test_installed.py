@@ -15,7 +15,6 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.speech.voices import espeak_events
-from lipmotion.speech.voices.flite import parse_phone_ends
 from lipmotion.speech.voices.installed import (
     SYNTHESISERS,
     all_voices,
@@ -26,6 +25,7 @@ from lipmotion.speech.voices.installed import (
     voice_named,
     voiced_sentences,
 )
+from lipmotion.speech.voices.programs import parse_phone_ends
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 

@@ -13,8 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.job import DETAILS, Job
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types.configuration import Configuration, kind_of
-from lipmotion.types.delivery import Delivery
-from lipmotion.types.staging import Staging
+from lipmotion.types.delivery import Delivery, Staging
 
 PartT = TypeVar("PartT", bound=Configuration)
 OF_ANIMATE = ("posteriors", "kinds")

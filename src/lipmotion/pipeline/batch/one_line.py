@@ -25,17 +25,19 @@ from lipmotion.motion.rest import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.batch.ledger import (
+    CUES,
     DONE,
     FAILED,
     Place,
     Record,
     are_in_place,
+    fingerprint_line,
+    input_files,
     is_in_place,
     read_receipt,
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.batch.settings import CUES, fingerprint_line, input_files
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model

@@ -11,13 +11,32 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import CorpusError, ExportError, shorten
-from lipmotion.pipeline.batch.ledger import DONE, FAILED, Ledger, Place, Record, are_same_inputs, open_ledger
+from lipmotion.pipeline.batch.ledger import (
+    DONE,
+    FAILED,
+    Ledger,
+    Place,
+    Record,
+    are_same_inputs,
+    check_job,
+    fingerprint_job,
+    fingerprint_line,
+    open_ledger,
+)
 from lipmotion.pipeline.batch.lines import MAX_NAMED_LINES, BatchLine, check_names, read_lines
-from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merge_marks, read_marks, write_marks
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finish_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, local_pool
-from lipmotion.pipeline.batch.report import write_reports
-from lipmotion.pipeline.batch.settings import check_job, fingerprint_job, fingerprint_line
+from lipmotion.pipeline.batch.report import (
+    APPROVE,
+    MARKS,
+    REDO,
+    Mark,
+    is_due,
+    merge_marks,
+    read_marks,
+    write_marks,
+    write_reports,
+)
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.workers import process_count
 from lipmotion.storage.sources import Source, check_apart

@@ -37,8 +37,8 @@ from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import as_text, sound_reference
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
+from lipmotion.types.delivery import Staging
 from lipmotion.types.motion import RADIAN
-from lipmotion.types.staging import Staging
 
 LOG = logging.getLogger("lipmotion")
 CURVES = (WEIGHT, CONTROL, RADIAN)

@@ -21,13 +21,13 @@ from lipmotion.extensions import Registry
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.request import Outputs
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
+from lipmotion.speech.features.f0 import prosody_of
 from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.features.prosody import prosody_of
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.speech.sound.decimation import decimated
+from lipmotion.speech.sound.resampling import decimated
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
-from lipmotion.types.staging import Staging
+from lipmotion.types.delivery import Staging
 
 if TYPE_CHECKING:
     from lipmotion.meshes.model.scene import Scene

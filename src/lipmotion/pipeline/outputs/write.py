@@ -18,7 +18,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, create_outputs
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
-from lipmotion.types.staging import Staging
+from lipmotion.types.delivery import Staging
 
 
 class LabelOutput(Output):

@@ -28,16 +28,16 @@ from lipmotion.pipeline.training.channels import (
     check_visual,
     train_eigenlips,
     with_common_channels,
+    with_sound_inputs,
     with_visual_channels,
 )
-from lipmotion.pipeline.training.fingerprint import fingerprint_training
 from lipmotion.pipeline.training.labels import (
+    fingerprint_training,
     label_utterances,
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
 from lipmotion.pipeline.training.other_speakers import VoiceExample
-from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
@@ -45,7 +45,7 @@ from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptati
 from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
     FRAME_RATE_HZ,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
 from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio
+from lipmotion.types import Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
 """The range of F0 that is searched."""
@@ -237,3 +237,20 @@ def _tables() -> _Tables:
 
 def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.abs(time + 0.5 - _WINDOW / 2) < _WINDOW / 2, np.sin(np.pi * (time + 0.5) / _WINDOW) ** 2, 0)
+
+
+LEAST_POWER = 1e-9
+"""Power that is added to every frame's: digital silence is at -90 dB."""
+
+
+def prosody_of(audio: Audio) -> Prosody:
+    """Return loudness and pitch of a sound at 16 kHz. Raises InputError: as ``speech.features.mfcc`` says."""
+    samples = checked_samples(audio)
+    frames = frame_count(samples)
+    hops = samples[: (frames - 1) * HOP].reshape(-1, HOP)
+    rest = samples[hops.size :].astype(np.float64)
+    energy = np.append(np.einsum("ij,ij->i", hops, hops, dtype=np.float64), rest @ rest)  # from frame to frame
+    centre = np.arange(frames) * HOP
+    length = np.minimum(centre + HOP, len(samples)) - np.maximum(centre - HOP, 0)
+    mean = (energy + np.concatenate([[0.0], energy[:-1]])) / np.maximum(length, 1)
+    return Prosody(10 * np.log10(mean + LEAST_POWER), log_f0(Audio(audio.samples, SPEECH_RATE_HZ)))

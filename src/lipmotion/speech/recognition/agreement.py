@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition.general.acoustic import STATES, density_column, general_model
+from lipmotion.speech.recognition.general import STATES, density_column, general_model
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
 from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, label_evidence
 from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.log_likelihoods import DensitySelection, LogLikelihoods
 from lipmotion.hmm.model import StateTable, UnitHmm
-from lipmotion.speech.recognition.general.acoustic import density_column, general_model
-from lipmotion.speech.recognition.general.language import english_bigram
+from lipmotion.speech.recognition.general import density_column, english_bigram, general_model
 from lipmotion.stats.bigram import Bigram
 from lipmotion.units import PHONES, SILENCE, find_similar_phone, is_silent
 

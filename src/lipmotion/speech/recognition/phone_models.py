@@ -9,7 +9,7 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import LOG_ENERGY
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Audio, Monitor, ParallelMap
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.features.spectrum import spectrum
+from lipmotion.speech.features.mfcc import WINDOW, spectrum
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.noise import spoken_samples
 from lipmotion.types import Audio, ConditionSpectrum

@@ -21,15 +21,64 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.espeak_events import PART, SILENCE
-from lipmotion.speech.voices.espeak_times import corrected_phone_times
-from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap, complete_map
+from lipmotion.speech.voices.espeak_events import PART
+from lipmotion.speech.voices.espeak_events import SILENCE as NO_SOUND
 from lipmotion.speech.voices.programs import program_output
-from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
-from lipmotion.types import Span, Timeline
+from lipmotion.speech.voices.synthesiser import (
+    ESPEAK_PHONES,
+    PhoneMap,
+    SynthesisedSentence,
+    Synthesiser,
+    SyntheticVoice,
+    complete_map,
+)
+from lipmotion.types import Audio, Span, Timeline
+from lipmotion.units import SILENCE, list_phone_classes
+
+CLOSING = list_phone_classes()["stop"] | list_phone_classes()["affricate"]
+VOWELS = list_phone_classes()["vowel"]
+CLOSURE_SHARE = 0.03
+"""Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
+LONGEST_CLOSURE_S = 0.06
+LATE_L_S, L_SHARE = 0.045, 0.45
+"""An l that is reported so shortly before its end is late; it then gets this share of the vowel and l together, as in
+the project's own alignments."""
+
+Starts = Sequence[tuple[str, float]]
+
+
+def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHONES) -> Timeline[str]:
+    """Return phones in time: each from its corrected start to that of the next, or to the end of the sound.
+
+    phone_map : the labels to phones of the inventory
+    """
+    labels = [label for label, _ in starts]
+    edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
+    closed = np.abs(audio.samples) < CLOSURE_SHARE * np.abs(audio.samples).max(initial=0)
+    for index in range(1, len(labels)):
+        before, here = _phone(labels[index - 1], phone_map), _phone(labels[index], phone_map)
+        if here in CLOSING and before != SILENCE:
+            burst = round(edges_s[index] * audio.rate_hz)
+            first = max(burst - round(LONGEST_CLOSURE_S * audio.rate_hz), 0)
+            loud = np.flatnonzero(~closed[first:burst])
+            closure_s = (first + int(loud[-1]) + 1 if len(loud) else first) / audio.rate_hz
+            edges_s[index] = max(closure_s if burst > first else edges_s[index], edges_s[index - 1])
+        elif here == "l" and before in VOWELS and edges_s[index + 1] - edges_s[index] < LATE_L_S:
+            length_s = edges_s[index + 1] - edges_s[index - 1]
+            edges_s[index] = min(edges_s[index], edges_s[index + 1] - L_SHARE * length_s)
+    spans = zip(edges_s, edges_s[1:], labels, strict=False)
+    return Timeline(tuple(Span(start_s, max(start_s, end_s), label) for start_s, end_s, label in spans))
+
+
+def _phone(label: str, phone_map: PhoneMap) -> str:
+    """Return the last phone of a label; empty for a label that is part of another phone or unknown."""
+    return (phone_map.get(label) or ("",))[-1]
+
 
 LOG = logging.getLogger("lipmotion")
 PACKAGE, WHEEL, EXTRA = "espeak-ng", "espeakng_loader", "text"
@@ -40,7 +89,7 @@ PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"
 DATA = "espeak-ng-data"
 STRESS_MARKS = "',%="
 """What version 1.52 writes before the vowel of a stressed syllable; 1.51 does not."""
-NO_IPA: PhoneMap = {SILENCE: ESPEAK_PHONES[SILENCE], PART: ESPEAK_PHONES[PART]}
+NO_IPA: PhoneMap = {NO_SOUND: ESPEAK_PHONES[NO_SOUND], PART: ESPEAK_PHONES[PART]}
 LARGEST_VOICE_BYTES = 1 << 16
 """Most bytes of a file that describes a voice."""
 Start = tuple[str, float, int]

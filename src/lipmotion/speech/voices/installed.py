@@ -13,9 +13,8 @@ from lipmotion.errors import InputError, LipMotionError, MissingDependencyError,
 from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
-from lipmotion.speech.voices.festival import FESTIVAL
-from lipmotion.speech.voices.flite import FLITE
 from lipmotion.speech.voices.inventory_phones import inventory_timeline
+from lipmotion.speech.voices.programs import FESTIVAL, FLITE
 from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
 from lipmotion.storage.files import temporary_folder
 from lipmotion.types import Audio, Timeline, Unit

@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import groupby
 
 from lipmotion.errors import InputError
-from lipmotion.speech.voices.phone_maps import PhoneMap
+from lipmotion.speech.voices.synthesiser import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, find_words, is_silent, list_phone_classes
 from lipmotion.units.phones import REDUCED_VOWELS, SHORT_PAUSE_S

@@ -1,7 +1,8 @@
-"""Acoustic models of 40 English phones and two kinds of noise, trained on many speakers."""
+"""The general models: English phone models of many voices and a bigram of pocketsphinx, and their features."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -10,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
+from lipmotion.speech.features.mfcc import FFT_SIZE, checked_samples, liftered_cosine, log_mel, triangles
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.stats.mixture import Mixtures
+from lipmotion.types import Audio
 from lipmotion.units.lexicon import find_english_data
 
 PHONES = (
@@ -144,3 +148,80 @@ def _weights(content: bytes) -> list[NDArray[np.float64]]:
     kept = steps.reshape(len(STREAMS), gaussians, states)[:, :, : len(PHONES) * STATES]
     weights = np.exp(kept.astype(float) * -WEIGHT_STEP).reshape(len(STREAMS), gaussians, len(PHONES), STATES)
     return list(weights.transpose(0, 2, 1, 3))
+
+
+FILTERS = 25
+LOWEST_HZ, HIGHEST_HZ = 130.0, 6800.0
+CEPSTRA = 13
+
+
+def general_features(audio: Audio) -> NDArray[np.float32]:
+    """Return c0–c12 less their mean, Δ over ±2 frames, and Δ of Δ [shape=(T, 39)], frames as in ``mfcc``.
+
+    Raises InputError: as ``mfcc``.
+    Source: the model's own feat.params and CMU Sphinx's ``1s_c_d_dd``. Deviations: windows of 25 instead of
+    25.6 ms, centred on their time; no noise removal.
+    """
+    cepstra = log_mel(checked_samples(audio), _filters()) @ liftered_cosine(FILTERS, 0, CEPSTRA)
+    cepstra -= cepstra.mean(axis=0, dtype=np.float64).astype(np.float32)
+    features = np.empty((len(cepstra), 3 * CEPSTRA), np.float32)
+    features[:, :CEPSTRA] = cepstra
+    padded = np.pad(cepstra, ((3, 3), (0, 0)), mode="edge")
+    del cepstra
+
+    def shifted(frames: int) -> NDArray[np.float32]:
+        return padded[3 + frames : 3 + frames + len(features)]
+
+    delta, of_delta = (features[:, start : start + CEPSTRA] for start in (CEPSTRA, 2 * CEPSTRA))
+    np.subtract(shifted(2), shifted(-2), out=delta)
+    np.subtract(shifted(3), shifted(-1), out=of_delta)
+    of_delta -= shifted(1) - shifted(-3)
+    return features
+
+
+@cache
+def _filters() -> NDArray[np.float32]:
+    """Return triangular filters of equal area, equally spaced in mel, with corners on the bins [shape=(257, 25)]."""
+    bin_hz = SPEECH_RATE_HZ / FFT_SIZE
+    mel = np.linspace(2595 * np.log10(1 + LOWEST_HZ / 700), 2595 * np.log10(1 + HIGHEST_HZ / 700), FILTERS + 2)
+    edges = (np.round(700 * (10 ** (mel / 2595) - 1) / bin_hz) * bin_hz).astype(np.float64)
+    hertz = np.arange(FFT_SIZE // 2 + 1) * bin_hz
+    return (triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)
+
+
+PROBABILITY_SHARE = {
+    "ah": 0.3, "ax": 0.7, "er": 0.4, "axr": 0.6, "ih": 0.55, "ix": 0.45,
+    "l": 0.93, "el": 0.07, "m": 0.99, "em": 0.01, "n": 0.96, "en": 0.04, "sp": 1e-4, "+nsn+": 0.05, "+spn+": 0.05,
+}  # fmt: skip
+"""The share of each of our phones in the probability of the general phone that it is a form of; all others: 1."""
+
+
+def english_bigram(units: Sequence[str]) -> NDArray[np.float64]:
+    """Return P(next | unit) among some of our phones and the noises [shape=(V, V)]; the noises count as silence.
+
+    Raises MissingDependencyError: pocketsphinx is not installed.
+    """
+    kinds = _phones()
+    spelt = ["SIL" if unit.startswith("+") else GENERAL_PHONE_NAMES.get(unit, unit.upper()) for unit in units]
+    rows = [kinds.index(name) for name in spelt]
+    pairs = _phone_bigram()[np.ix_(rows, rows)] * np.array([PROBABILITY_SHARE.get(unit, 1.0) for unit in units])
+    return pairs / pairs.sum(axis=1, keepdims=True)
+
+
+def _phones() -> list[str]:
+    return [phone for phone in PHONES if not phone.startswith("+")]
+
+
+@cache
+def _phone_bigram() -> NDArray[np.float64]:
+    """Return P(next | phone) of the phone language model that comes with pocketsphinx."""
+    try:
+        from pocketsphinx import Config, LogMath, NGramModel
+    except ImportError as error:
+        raise MissingDependencyError(
+            "the phone language model comes with pocketsphinx: pip install pocketsphinx"
+        ) from error
+    log_math = LogMath()
+    model = NGramModel(Config(), log_math, str(find_english_data() / "en-us-phone.lm.bin"))
+    names = _phones()
+    return np.array([[log_math.exp(model.prob([following, phone])) for following in names] for phone in names])
