@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
 from lipmotion.formats.base import readable_suffixes
-from lipmotion.pipeline.analysis.read_request import list_recordings
-from lipmotion.pipeline.job import Job, run
+from lipmotion.pipeline.job import Job, list_recordings, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
 from lipmotion.pipeline.outputs.write import write

@@ -20,12 +20,12 @@ from lipmotion.speech.voices.installed import (
     all_voices,
     default_voice,
     installed_voices,
+    parse_phone_ends,
     speak_sentence,
     speak_sentences,
     voice_named,
     voiced_sentences,
 )
-from lipmotion.speech.voices.programs import parse_phone_ends
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 

@@ -31,8 +31,7 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
     from lipmotion.errors import LipMotionError
-    from lipmotion.pipeline.analysis.read_request import is_for_several, list_recordings
-    from lipmotion.pipeline.job import run
+    from lipmotion.pipeline.job import is_for_several, list_recordings, run
     from lipmotion.pipeline.model import load_model
     from lipmotion.types.progress import Item, sub_monitor
 
@@ -69,8 +68,7 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
 def _plan_jobs(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownFace]:
     """Return the job of each recording, and their face; make the folders, but none where something is refused."""
     from lipmotion.errors import InputError
-    from lipmotion.pipeline.analysis.read_request import plan_outputs
-    from lipmotion.pipeline.job import check_outputs, open_face
+    from lipmotion.pipeline.job import check_outputs, open_face, plan_outputs
     from lipmotion.storage.files import create_folders
 
     alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
@@ -95,7 +93,7 @@ def place_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterato
     If the block fails, no new folders are left.
     Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``plan_outputs``.
     """
-    from lipmotion.pipeline.analysis.read_request import is_for_several, plan_outputs
+    from lipmotion.pipeline.job import is_for_several, plan_outputs
     from lipmotion.storage.files import create_folders
 
     if not any(map(is_for_several, outputs)):

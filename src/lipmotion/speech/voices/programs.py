@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -16,9 +15,6 @@ from pathlib import Path
 from typing import IO
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSentence, Synthesiser, SyntheticVoice
-from lipmotion.types import Span, Timeline
 
 START_S, EACH_S = 30.0, 5.0
 """The time limit of a program: to start, and for each sentence; both are a hundred times what it needs."""
@@ -120,100 +116,3 @@ def _written(folder: Path | None) -> int:
         for path in folder.iterdir() if folder else ():
             total += path.lstat().st_size
     return total
-
-
-FLITE_PACKAGE = "flite"
-UNUSED = frozenset({"kal", "awb_time"})
-"""kal is kal16 at 8 kHz; awb_time can only say the time of day."""
-SPEAKERS = {"kal16": "kal"}
-
-
-def _flite_voices() -> tuple[SyntheticVoice, ...]:
-    if shutil.which("flite") is None:
-        return ()
-    names = program_output(["flite", "-lv"], FLITE_PACKAGE).partition(":")[2].split()
-    return tuple(SyntheticVoice(name, "flite", SPEAKERS.get(name, name)) for name in names if name not in UNUSED)
-
-
-def _say_with_flite(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
-    path = folder / "flite.wav"
-    for text in texts:
-        command = ["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text]
-        printed = program_output(command, FLITE_PACKAGE, folder=folder)
-        yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed), path)
-
-
-def parse_phone_ends(printed: str) -> Timeline[str]:
-    """Return phones in time from what ``flite -psdur`` prints: ``pau:0.220 k:0.346``, a line an utterance.
-
-    The number is the end of the phone in its utterance; a long text is several utterances.
-    Raises InputError: it prints something else.
-    """
-    spans, start_s = [], 0.0
-    for line in printed.splitlines():
-        first_s = start_s
-        for entry in line.split():
-            label, _, end = entry.partition(":")
-            try:
-                end_s = max(first_s + float(end), start_s)
-            except ValueError as error:
-                raise InputError(f"flite prints {entry!r}, required a phone and its end, as in 'k:0.346'") from error
-            spans.append(Span(start_s, end_s, label))
-            start_s = end_s
-    return Timeline(tuple(spans))
-
-
-FLITE = Synthesiser("flite", FLITE_PACKAGE, _flite_voices, _say_with_flite, ARPABET_PHONES)
-
-
-FESTIVAL_PACKAGE = "festival festvox-us-slt-hts"
-MARK = "-- sentence"
-LISTING = """(mapcar (lambda (name)
-  (let ((about (cadr (voice.description name))))
-    (format t "%s %s %s\\n" name (cadr (assoc 'language about)) (cadr (assoc 'dialect about)))))
-  (voice.list))"""
-SPEAKING = f"""(define (say text path)
-  (let ((utterance (utt.synth (eval (list 'Utterance 'Text text)))))
-    (format t "{MARK}\\n")
-    (mapcar (lambda (segment) (format t "%s %s %s\\n" (item.name segment) (item.feat segment "segment_start")
-                                      (item.feat segment "end")))
-            (utt.relation.items utterance 'Segment))
-    (utt.save.wave utterance path 'riff)))
-"""
-
-
-def _festival_voices() -> tuple[SyntheticVoice, ...]:
-    if shutil.which("festival") is None:
-        return ()
-    rows = [line.split() for line in program_output(["festival", "-b", LISTING], FESTIVAL_PACKAGE).splitlines()]
-    names = [row[0] for row in rows if row[1:] == ["english", "american"]]
-    speakers = (re.sub(r"_.*", "", re.sub(r"^cmu_us_", "", name)) for name in names)  # slt of cmu_us_slt_arctic_hts
-    return tuple(SyntheticVoice(name, "festival", who) for name, who in zip(names, speakers, strict=True))
-
-
-def _say_with_festival(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
-    paths = [folder / f"{number}.wav" for number in range(len(texts))]
-    script = folder / "say.scm"
-    calls = [f"(say {_quoted(text)} {_quoted(str(path))})" for text, path in zip(texts, paths, strict=True)]
-    script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
-    printed = program_output(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts), folder=folder)
-    parts = printed.split(f"{MARK}\n")[1:]
-    if len(parts) != len(texts):
-        raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
-    for path, part in zip(paths, parts, strict=True):
-        spans = []
-        for line in part.splitlines():
-            try:
-                label, start, end = line.split()
-                spans.append(Span(float(start), float(end), label))
-            except ValueError as error:
-                raise InputError(f"festival prints {line!r}, required a phone, its start and its end") from error
-        yield SynthesisedSentence(read_audio(path), Timeline(tuple(spans)), path)
-        path.unlink()
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-
-FESTIVAL = Synthesiser("festival", FESTIVAL_PACKAGE, _festival_voices, _say_with_festival, ARPABET_PHONES)
