@@ -138,10 +138,7 @@ def read_c3d(path: Path) -> C3dFile:
 
 
 def _count_frames(parameters: dict[str, Values], numbered: int, held: int, spare: int) -> int:
-    """Return how many frames there are: the largest number that is stated and held.
-
-    numbered : by the header, which cannot count on from 65,535;  spare : of those held, what may fill the last block
-    """
+    """Return how many frames there are: the largest number that is stated and held."""
     start, end = _number(parameters, "TRIAL.ACTUAL_START_FIELD", 1), _number(parameters, "TRIAL.ACTUAL_END_FIELD", 0)
     counted, long = _number(parameters, "POINT.FRAMES", 0), _number(parameters, "POINT.LONG_FRAMES", 0)
     stated = sorted({int(each) for each in (numbered, counted % (1 << 31), long, end - start + 1) if each >= 1})
@@ -247,7 +244,6 @@ def write_c3d(path: Path, content: C3dFile) -> None:
 
 
 def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
-    """Return groups and parameters as bytes."""
     parts = []
     for number, (group, parameters) in enumerate(groups.items(), 1):
         parts.append(struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0))

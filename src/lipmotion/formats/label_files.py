@@ -316,7 +316,6 @@ def _choose_transcript(tiers: list[LabelTier], where: str, tier: str = "", speak
 
 
 def _name_speakers(tiers: list[LabelTier], where: str) -> None:
-    """Log a warning if tiers are of several speakers."""
     speakers = [tier.speaker for tier in tiers if tier.speaker]
     if len(speakers) > 1:
         names = ", ".join(map(shorten, speakers[:NAMED_TIERS]))

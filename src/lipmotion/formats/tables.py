@@ -288,10 +288,7 @@ def _read_single_scores(
 
 
 def _parse_timecode(text: str, line: int) -> tuple[int, float, str]:
-    """Return whole seconds since midnight, frames (fractions included), and what stands before the frames.
-
-    That is ``:``, ``;`` (drop-frame), ``.`` where not frames but parts of a second follow, or nothing.
-    """
+    """Return whole seconds since midnight, frames (fractions included), and what stands before the frames."""
     code = _TIMECODE.fullmatch(text)
     if code is None or int(code[2]) > 59 or int(code[3]) > 59:
         raise ValueError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any, ClassVar, get_type_hints
@@ -99,10 +99,7 @@ class PhoneIs(PhoneStep):
 
 
 def _move_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
-    """Return phones with another time between the phone at place ``before`` and the next one.
-
-    Raises InputError: one of both would last less than ``MIN_PHONE_S``, or there is no such border.
-    """
+    """Return phones with another time between the phone at place ``before`` and the next one."""
     spans = list(units)
     first_s, last_s = spans[before].start_s, spans[before + 1].end_s
     if not first_s + MIN_PHONE_S - 1e-9 <= time_s <= last_s - MIN_PHONE_S + 1e-9:
@@ -282,15 +279,18 @@ WordStep = WordIs | WordSaid | WordsSaid
 
 
 class CurveStep(Step):
-    """An edit of values: a pin, a gain, what is drawn or held."""
+    """An edit of values: a pin, a gain, what is drawn or held; ``kind`` is its value, with the same fields."""
+
+    kind: ClassVar[type[Any]]
 
     def __post_init__(self) -> None:
         self.edit  # noqa: B018 # checks the values
 
     @property
-    @abstractmethod
     def edit(self) -> CurveEdit | Hold:
         """The edit as a value."""
+        edit: CurveEdit | Hold = self.kind(**{each.name: getattr(self, each.name) for each in fields(self)})
+        return edit
 
 
 @dataclass(frozen=True)
@@ -298,13 +298,10 @@ class PinStep(CurveStep):
     """A channel or a curve takes a value at a time."""
 
     form: ClassVar[str] = "pin {channel} {value} at {time_s}"
+    kind: ClassVar[type[Any]] = Pin
     channel: str
     value: float
     time_s: float
-
-    @property
-    def edit(self) -> Pin:  # noqa: D102
-        return Pin(self.time_s, self.channel, self.value)
 
 
 @dataclass(frozen=True)
@@ -312,13 +309,10 @@ class GainStep(CurveStep):
     """The whole mouth moves more, or less, for a time."""
 
     form: ClassVar[str] = "gain {factor} from {start_s} to {end_s}"
+    kind: ClassVar[type[Any]] = Gain
     factor: float
     start_s: float
     end_s: float
-
-    @property
-    def edit(self) -> Gain:  # noqa: D102
-        return Gain(self.start_s, self.end_s, self.factor)
 
 
 @dataclass(frozen=True)
@@ -326,14 +320,11 @@ class CurveGainStep(CurveStep):
     """A channel or a curve moves more, or less, for a time."""
 
     form: ClassVar[str] = "gain {channel} {factor} from {start_s} to {end_s}"
+    kind: ClassVar[type[Any]] = Gain
     channel: str
     factor: float
     start_s: float
     end_s: float
-
-    @property
-    def edit(self) -> Gain:  # noqa: D102
-        return Gain(self.start_s, self.end_s, self.factor, self.channel)
 
 
 @dataclass(frozen=True)
@@ -341,14 +332,11 @@ class DrawStep(CurveStep):
     """A channel or a curve takes values at equal distances from one time to another, as they were drawn."""
 
     form: ClassVar[str] = "draw {channel} {values} from {start_s} to {end_s}"
+    kind: ClassVar[type[Any]] = DrawnCurve
     channel: str
     values: Numbers
     start_s: float
     end_s: float
-
-    @property
-    def edit(self) -> DrawnCurve:  # noqa: D102
-        return DrawnCurve(self.start_s, self.end_s, self.channel, self.values)
 
 
 @dataclass(frozen=True)
@@ -356,12 +344,9 @@ class HoldStep(CurveStep):
     """The whole mouth stays for a time as it is at the start of it."""
 
     form: ClassVar[str] = "hold from {start_s} to {end_s}"
+    kind: ClassVar[type[Any]] = Hold
     start_s: float
     end_s: float
-
-    @property
-    def edit(self) -> Hold:  # noqa: D102
-        return Hold(self.start_s, self.end_s)
 
 
 @dataclass(frozen=True)
@@ -522,11 +507,6 @@ class Edits:
     def then(self, *edits: str | Step) -> Edits:
         """Return these edits and some more, sentences or values. Raises InputError: a sentence states no edit."""
         return Edits(self.steps + tuple(edit if isinstance(edit, Step) else parse_step(edit) for edit in edits))
-
-    @classmethod
-    def of_pins(cls, pins: Iterable[Pin]) -> Edits:
-        """Return edits that are pins alone."""
-        return cls(tuple(PinStep(pin.channel, pin.value, pin.time_s) for pin in pins))
 
     @property
     def sentences(self) -> tuple[str, ...]:

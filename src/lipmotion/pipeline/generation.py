@@ -167,7 +167,6 @@ def _generate_one(
     speech: Speech,
     constraints: Constraints | None,
 ) -> Generation:
-    """Return the motion of one passage."""
     if person is None:
         return engine.generate(learned, speech, constraints)
     restful = measure_restfulness(speech.units, len(speech.features.values))

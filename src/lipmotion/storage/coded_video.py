@@ -237,7 +237,6 @@ _REMEDY = "build the file again, or download it again"
 
 
 def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: str) -> Iterator[bytes]:
-    """Yield the bytes of every frame."""
     import av
 
     if not 0 <= crf <= 51 or group < 1:
@@ -282,10 +281,7 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
 
 
 def _layout(data: Stream) -> tuple[list[int], list[int]]:
-    """Return where each frame begins, and the end; and the first frame of each group, and the number of frames.
-
-    Raises ValueError: not a stream of such frames.
-    """
+    """Return where each frame begins, and the end; and the first frame of each group, and the number of frames."""
     if data.ndim != 1 or data.dtype != np.uint8 or len(data) < 8:
         raise ValueError(f"a stream of shape {data.shape} and type {data.dtype}, required bytes")
     starts = np.flatnonzero((data[:-3] == 0) & (data[1:-2] == 0) & (data[2:-1] == 1))

@@ -50,10 +50,7 @@ def check_apart(
 
 
 def _find_clash(target: Path, source: Path, *, holds: bool) -> str:
-    """Return how an output and an input clash: ``is``, ``lies in``, ``belongs to`` or ``holds``; "" where they do not.
-
-    holds : whether the output is a folder, which may contain the input
-    """
+    """Return how an output and an input clash: ``is``, ``lies in``, ``belongs to``, ``holds``; "": they do not."""
     place = Path(os.path.realpath(target))
     if is_same(place, source):
         return "is"

@@ -44,7 +44,6 @@ class Speech:
     """Speech of one recording: the input of an engine.
 
     features    : acoustic features [T frames]
-    units       : the phones in time
     log_f0      : float32 array [shape=(T,)], natural logarithm of F0 in Hz, NaN in unvoiced frames (None: the engine
                   does not use F0)
     units_known : whether the units are given, labelled, or aligned to known words; False: they were recognised

@@ -93,7 +93,7 @@ def test_the_face_of_another_person_is_mapped_onto_once(
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
     monkeypatch.setattr(one_line, "run", lambda job, **_: requests.append(job.request))
     for model, line in ((other, lines[0]), (other, lines[1]), (toy_model, lines[0])):
-        shared = one_line._Shared(model, shown_face(filmed_face), None)
+        shared = (model, shown_face(filmed_face), None)
         monkeypatch.setattr(one_line, "_share", lambda *_, shared=shared: shared)
         one_line._write_line(LineWork(line, Job(), "", Place(str(tmp_path), "a run")))
     assert [request.onto for request in requests] == [Path("a map"), Path("a map"), None]

@@ -96,7 +96,6 @@ def _moves(each: Field[Any], still: str) -> bool:
 
 
 def _flags(each: Field[Any]) -> tuple[str, ...]:
-    """Return the names of an option on the command line."""
     usual = each.metadata.get("still", "--" + each.name.replace("_", "-"))
     flags: tuple[str, ...] = each.metadata.get("flags", (usual,))
     return flags

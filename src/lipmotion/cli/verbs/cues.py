@@ -60,10 +60,7 @@ class _DatFrameRate(argparse.Action):
 
 
 def _dialogue(path: str) -> str | None:
-    """Return the path of a dialogue, which is never taken for the words; None: the file holds none.
-
-    Raises ArgumentTypeError: no such file.
-    """
+    """Return the path of a dialogue, which is never taken for the words; None: the file holds none."""
     if not is_file(Path(path)):
         raise argparse.ArgumentTypeError(f"no such file: {shorten(path)!r}; the words themselves: --transcript TEXT")
     with Path(path).open("rb") as file:

@@ -133,7 +133,6 @@ class SpeechAnalysis:
 def analyse(model: Model, request: Request, each: ParallelMap = map) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
-    each : applies a function to many items, perhaps in several processes
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
@@ -269,7 +268,6 @@ def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> 
 
 
 def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
-    """Return the speech of a request with phones that are given, aligned or recognised."""
     kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
     if request.recogniser not in kinds:
         raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
@@ -315,7 +313,6 @@ def build_speech(
     """Return speech of features and phones in time, and what else of the recording the engine needs.
 
     kind : of the recognition; of all but ``auto``, a phone recogniser has no part in it
-    each : applies a function to many items, perhaps in several processes
     """
     inputs, audio = engine.inputs(), analysed(audio, features)
     f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
@@ -393,10 +390,7 @@ def recognise_speech(
 ) -> Speech:
     """Return the speech of a recording whose words are not known, with recognised phones in time.
 
-    learned   : the engine's model of motion
-    phones    : the recogniser
     recognise : recognises phones in time, for speakers that the engine does not recognise itself
-    each      : applies a function to many items, perhaps in several processes
     If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
     training were; else the result of ``recognise`` is used.
     """
@@ -444,7 +438,6 @@ def _follow_units(
 ) -> tuple[Timeline[Unit], TranscriptFit | None]:
     """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
 
-    kind : of the recogniser
     Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
     else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
     """

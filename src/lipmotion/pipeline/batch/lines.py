@@ -179,10 +179,7 @@ def _check_count(source: Path, count: int) -> None:
 
 
 def _read_table(source: Path, text: str) -> list[dict[str, str]] | None:
-    """Return the rows of a table with a header by the names of its columns; None: it has no header.
-
-    Raises InputError: a row without a recording, or one that is longer than the header.
-    """
+    """Return the rows of a table with a header by the names of its columns; None: it has no header."""
     try:
         table = read_table(io.StringIO(text, newline=""))
         header = [name.lower() for name in table.plain_names]

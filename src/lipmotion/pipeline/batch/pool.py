@@ -134,7 +134,6 @@ def describe_worker(out: str) -> tuple[str, bool]:
 
 
 def _pool(chosen: dict[str, Any]) -> Pool:
-    """Return the pool of a backend of joblib."""
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky.process_executor import BrokenProcessPool
 

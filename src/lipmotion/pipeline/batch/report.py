@@ -163,7 +163,6 @@ def rate_doubt(record: Record) -> float:
 
 
 def _field(value: Any) -> str:
-    """Return a value as a field of the CSV file."""
     if value is None:
         return ""
     if not isinstance(value, list | str):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import uuid
+from collections import Counter
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -128,12 +129,19 @@ def batch(
     with open_ledger(place, lines) as ledger:
         if marks is not None:
             write_marks(Path(place.out) / MARKS, chosen)
-        counter = _Counter(len(lines), monitor)
+        counts = Counter[str]()
+        monitor(Progress(STAGE, 0, len(lines), 0.0))
+
+        def count(name: str, outcome: str, reason: str = "") -> None:
+            counts[outcome] += 1
+            monitor(Item(name, outcome, reason))
+            monitor(Progress(STAGE, counts.total(), len(lines), counts.total() / len(lines)))
+
         finished = _find_finished(lines, ledger, place, of_settings, chosen)
         waiting = [LineWork(line, job, of_settings, place) for line in lines if line.name not in finished]
         for line in lines:
             if line.name in finished:
-                counter.count(line.name, "kept")
+                count(line.name, "kept")
         pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(processes)
         if waiting:
             with pool as each, closing(_finish_lines(each, waiting)) as records:
@@ -143,9 +151,9 @@ def batch(
                         record["redone"] = mark.when  # so that it is redone once
                     ledger.append(record)
                     place.receipt(record["name"]).unlink(missing_ok=True)
-                    counter.count(record["name"], record["outcome"], record.get("error", ""))
+                    count(record["name"], record["outcome"], record.get("error", ""))
         csv, html = write_reports(lines, ledger, Path(place.out), chosen)
-    return BatchSummary(counter.done, counter.kept, counter.failed, csv, html)
+    return BatchSummary(counts[DONE], counts["kept"], counts[FAILED], csv, html)
 
 
 def _choose_marks(out: Path, table: str | Path | None, lines: Sequence[BatchLine]) -> dict[str, Mark]:
@@ -217,19 +225,3 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
                         "error": f"{work.line.recording}: the process that worked on it died (out of memory?); is the "
                         "recording damaged?",
                     }
-
-
-class _Counter:
-    """Counts the outcomes of lines, and reports them."""
-
-    def __init__(self, lines: int, monitor: Monitor) -> None:
-        self._lines, self._monitor = lines, monitor
-        self.done = self.kept = self.failed = 0
-        monitor(Progress(STAGE, 0, lines, 0.0))
-
-    def count(self, name: str, outcome: str, reason: str = "") -> None:
-        """Count and report the outcome of one line."""
-        setattr(self, outcome, getattr(self, outcome) + 1)
-        finished = self.done + self.kept + self.failed
-        self._monitor(Item(name, outcome, reason))
-        self._monitor(Progress(STAGE, finished, self._lines, finished / self._lines))

@@ -119,10 +119,7 @@ def _plan_phones(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: 
 
 
 def _find_starts(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:
-    """Return when each of some phones begins in the joined sound, and when the last one ends [shape=(count + 1,)].
-
-    Of the silences at both ends, ``REST_S`` are kept.
-    """
+    """Return when each of some phones begins in the joined sound, and when the last one ends [shape=(count + 1,)]."""
     duration_s = len(joined.samples) / rate_hz
     begin_s = np.full(count + 1, np.nan)
     begin_s[0], begin_s[-1] = 0.0, duration_s

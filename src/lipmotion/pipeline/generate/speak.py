@@ -129,7 +129,6 @@ def speak(  # noqa: PLR0913
 
 
 def _with_moods(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
-    """Return a generation with the moods of tags in its text."""
     return replace(generation, moods=time_moods(tags, generation.units))
 
 

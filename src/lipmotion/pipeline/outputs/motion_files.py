@@ -243,10 +243,7 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
 
 
 def _blendshapes(motion: Motion) -> Motion | None:
-    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes.
-
-    None: it has no jawOpen.
-    """
+    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes."""
     angles = {channel.name: channel.name for channel in motion.channels if channel.unit == RADIAN}
     known = {angles.get(name) or arkit_name(name): n for n, name in reversed(list(enumerate(motion.names)))}
     columns = [(name, column) for name, column in sorted(known.items(), key=lambda each: each[1]) if name]

@@ -151,7 +151,6 @@ def with_sound_inputs(
     sound, and spectra in many acoustic conditions (``Example.condition_spectra``). The noise of babble is made of the
     recordings themselves; all is drawn from the number of the recording.
     sound : of each example, by its name
-    each  : applies a function to many items, perhaps in several processes
     """
     inputs = engine.inputs(sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ)
     recordings, count = [sound[example.name] for example in examples], len(examples)

@@ -82,7 +82,6 @@ def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return the first names, and how many more there are."""
     more = len(names) - MAX_NAMED_RECORDINGS
     return printable(", ".join(names[:MAX_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
 
@@ -102,7 +101,6 @@ def label_utterances(
 
     monitor    : called with the progress, and with the utterances without phones
     checkpoint : stores the phones of every ``UTTERANCES_PER_CHECKPOINT`` utterances
-    each       : applies a function to many items, perhaps in several processes
     """
     starts = range(0, len(utterances), UTTERANCES_PER_CHECKPOINT)
     blocks = [utterances[start : start + UTTERANCES_PER_CHECKPOINT] for start in starts]
@@ -148,7 +146,6 @@ def _to_arrays(results: Sequence[PhonesOrReason]) -> dict[str, NDArray[Any]]:
 
 
 def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[PhonesOrReason]:
-    """Deserialise the labels of a block."""
     spans = iter(
         Span(start_s, end_s, Unit(*label))
         for (start_s, end_s), label in zip(arrays["times"].tolist(), arrays["labels"].tolist(), strict=True)

@@ -127,7 +127,6 @@ def cover_greedily(
 
 
 def _numbered(units: set[UnitName], index: dict[UnitName, int]) -> NDArray[np.intp]:
-    """Return the numbers of some units, adding new ones to the index."""
     return np.array([index.setdefault(unit, len(index)) for unit in sorted(units)], np.intp)
 
 

@@ -216,7 +216,6 @@ def phones_and_examples(
 ) -> tuple[UnitHmm, list[Example], dict[str, str]]:
     """Return phone models, the examples for an engine, and the reason for every utterance that is not used.
 
-    each : applies a function to many items, perhaps in several processes
     Raises CorpusError: no utterance can be used.
     """
     learning, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)

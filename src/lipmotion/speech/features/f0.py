@@ -118,11 +118,7 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
 
 
 def _refined(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return log F0 and cost at the tops of parabolas through three correlations [shapes=(CANDIDATES, n)].
-
-    peaks   : lag of the middle one [shape=(CANDIDATES, n)]
-    is_peak : False where a frame has fewer peaks [shape=(CANDIDATES, n)]
-    """
+    """Return log F0 and cost at the tops of parabolas through three correlations [shapes=(CANDIDATES, n)]."""
     rows = np.arange(len(correlation))
     left, top, right = (correlation[rows, peaks + side] for side in (-1, 0, 1))
     bend = np.where(is_peak, 2 * top - left - right, 1)
@@ -138,10 +134,7 @@ def _lag_weight(lag: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
-    """Return the costs from every candidate, the last being unvoiced, to those of the next frame [shape=(C, C, n)].
-
-    before : log F0 of the frame before the first [shape=(CANDIDATES,)]
-    """
+    """Return the costs from every candidate, the last being unvoiced, to those of the next frame [shape=(C, C, n)]."""
     earlier = np.concatenate([before[:, None], pitch[:, :-1]], axis=1)
     steps = np.full((CANDIDATES + 1, CANDIDATES + 1, pitch.shape[1]), VOICING_CHANGE_COST)
     steps[:-1, :-1] = JUMP_COST * np.abs(pitch - earlier[:, None])

@@ -73,10 +73,7 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
 
 
 def _cepstra(log_powers: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
-    """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding.
-
-    log_powers : of the mel filters [shape=(T, 26)]
-    """
+    """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding."""
     rounding = ROUNDING_SHARE * max(float(log_powers.max()), -float(log_powers.min()))
     return log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1), rounding
 
@@ -167,7 +164,6 @@ def frame_count(samples: NDArray[np.float32]) -> int:
 
 
 def _blocks(frames: int) -> Iterator[slice]:
-    """Return slices of at most ``BLOCK`` frames that cover all frames in order."""
     return (slice(start, min(start + BLOCK, frames)) for start in range(0, frames, BLOCK))
 
 

@@ -103,10 +103,7 @@ def risen_peaks(curve: Curve, prominence: float) -> NDArray[np.intp]:
 
 
 def _fallen_to(heights: Curve, lowest: Curve) -> Curve:
-    """Return how low the curve falls before each peak, back to the one before it that is higher [shape=(P,)].
-
-    lowest : value between the peak before and this one [shape=(P,)]
-    """
+    """Return how low the curve falls before each peak, back to the one before it that is higher [shape=(P,)]."""
     found, higher = [], list[tuple[float, float]]()
     for height, least in zip(heights.tolist(), lowest.tolist(), strict=True):
         value = least
@@ -191,7 +188,6 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     """Return what is detected in a recording beside words, in the order of time; events of a kind do not overlap.
 
     audio : at 16 kHz
-    units : the phones in time
     Raises InputError: as ``speech.features.mfcc`` says.
     """
     found, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
@@ -264,7 +260,6 @@ def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
 
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
-    """Yield the phrases without a voice."""
     quiet_db, most_db = np.percentile(_heard(level_db), (10, 99))
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
@@ -308,7 +303,6 @@ def _shouts(judged: Sequence[tuple[float, float, tuple[float, float, float]]]) -
 
 
 def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
-    """Yield the breaths that are detected in pauses."""
     loud_db, spoken = float(np.percentile(_heard(level_db), 95)), np.flatnonzero(voiced)
     ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
     starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]

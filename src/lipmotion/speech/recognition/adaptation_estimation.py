@@ -93,11 +93,7 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
 
 
 def _general_improved(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
-    """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved.
-
-    features  : not transformed [shape=(T, 39)]
-    densities : the state of the general models in each frame [shape=(T,)]
-    """
+    """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved."""
     streams = []
     for number, (stream, transform) in enumerate(zip(STREAMS, transforms, strict=True)):
         mixtures = general_model().mixtures(number)

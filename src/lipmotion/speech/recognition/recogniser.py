@@ -101,8 +101,6 @@ class Recogniser:
     ) -> Recognition:
         """Return the recognised phones of a recording in time, with the words that decided them.
 
-        audio, features : as of ``recognise``
-        each            : applies a function to many items, perhaps in several processes
         english         : whether English words are searched; in other languages, phones alone
         Words are recognised in every stretch of sound and aligned by our models: by a phone recogniser where it is sure
         (``speech.recognition.network``), else by pocketsphinx. Then ``auto`` compares their likelihood with that of the
@@ -192,7 +190,6 @@ class Recogniser:
     ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
-        audio, features : as of ``recognise``
         words           : of the transcript, in lower case, and written forms (``1995``), in whose place the words stand
                           that are said
         anchors         : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
@@ -236,7 +233,6 @@ class Recogniser:
     def align_phones(self, audio: Audio, features: Features, phones: Timeline[Unit]) -> Timeline[Unit]:
         """Return known phones in time: forced alignment, with optional pauses where ``phones`` has silence.
 
-        audio, features : as of ``recognise``
         phones          : in order; their times are not used
         Raises AlignmentError: they do not fit into the recording.
         """
@@ -264,10 +260,7 @@ class Recogniser:
     def _log_likelihoods(
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
     ) -> tuple[UnitHmm, LogLikelihoods]:
-        """Return the models that are used, and the log likelihoods of a recording under them.
-
-        similarity : of the recording, if it is known
-        """
+        """Return the models that are used, and the log likelihoods of a recording under them."""
         hmm, log_likelihoods = self._unpenalised(audio, similarity, aligning)
         return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
 
@@ -329,7 +322,6 @@ def _recognition(
     duration_s: float,
     similarity: SpeakerSimilarity | None,
 ) -> Recognition:
-    """Return a recognition of so many frames."""
     named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
     units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
     return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)

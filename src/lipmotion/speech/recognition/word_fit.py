@@ -64,7 +64,6 @@ def align_recognised_words(
 ) -> AlignedWords:
     """Return words aligned with a stretch, as a transcript is.
 
-    log_likelihoods : of the stretch
     Raises AlignmentError: the words do not fit into the stretch.
     """
     modelled = [unit for unit in hmm.table.units if not is_silent(unit)]

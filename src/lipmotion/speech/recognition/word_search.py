@@ -139,10 +139,7 @@ class WordsInStretches(NamedTuple):
 
 
 def begun_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> WordsInStretches:
-    """Return the words in all stretches of sound of a recording; where ``each`` starts processes, they begin now.
-
-    each : applies a function to many items, perhaps in several processes
-    """
+    """Return the words in all stretches of sound of a recording; where ``each`` starts processes, they begin now."""
     stretches = stretches_of_sound(audio.log_energy)
     each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
     return WordsInStretches(stretches, each(words_in, (stretch_samples(audio, stretch) for stretch in stretches)))
@@ -152,7 +149,6 @@ def begun_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> WordsInStre
 class WordSearch:
     """The search for words in one recording of T frames, beside the phones that are recognised without words.
 
-    hmm       : the phone models
     loop      : the network of phones without words
     free      : log likelihoods of the recording, in the search of phones without words
     aligning  : log likelihoods for the alignment of words

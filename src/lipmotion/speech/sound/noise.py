@@ -109,7 +109,6 @@ def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
 
 
 def _power(audio: Audio, spoken: NDArray[np.bool_]) -> float:
-    """Return the mean power of some samples of a recording."""
     return float(np.square(audio.samples[spoken], dtype=float).mean())
 
 

@@ -71,10 +71,7 @@ def _cut(sound: Samples, start: int, end: int) -> NDArray[np.float64]:
 
 
 def _best_shift(tail: NDArray[np.float64], sound: Samples, start: int, reach: int) -> int:
-    """Return by how many samples later a piece begins so that its waveform is most like the end of the one before.
-
-    start : where it would begin
-    """
+    """Return by how many samples later a piece begins so that its waveform is most like the end of the one before."""
     area = _cut(sound, start - reach, start + reach + len(tail))
     products = np.correlate(area, tail, "valid")
     energies = np.convolve(np.square(area), np.ones(len(tail)), "valid")

@@ -188,10 +188,7 @@ def pronounced_words(words: Sequence[str], voice: str) -> list[str]:
 
 
 def _written_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:
-    """Return the words of a text in time: what stands between blanks. Words that are said as one (*on the*) are one.
-
-    places : of each phone, where its word, or a part of it, begins in the text
-    """
+    """Return the words of a text in time: what stands between blanks. Words that are said as one (*on the*) are one."""
     words = text.split()
     starts = [at for at in range(len(text)) if not text[at].isspace() and (at == 0 or text[at - 1].isspace())]
     numbers = [max(bisect_right(starts, place) - 1, 0) for place in places]

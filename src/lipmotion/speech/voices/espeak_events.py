@@ -103,7 +103,6 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
 
 
 def _pronounced(library: Any, word: str) -> str:
-    """Return the phones of a word in IPA."""
     library.espeak_TextToPhonemes.restype = ctypes.c_char_p
     encoded = ctypes.create_string_buffer(word.encode())
     rest, phones = ctypes.c_void_p(ctypes.addressof(encoded)), []

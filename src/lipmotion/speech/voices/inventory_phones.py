@@ -86,10 +86,7 @@ def _pronunciation(word: str, lexicon: Lexicon) -> Pronunciation:
 
 
 def _with_written_words(phones: Phones, written: Timeline[str], lexicon: Lexicon | None) -> list[Unit]:
-    """Return the units of phones that are said within written words.
-
-    A text between blanks may be several words, or a number: these share its phones (``with_words``).
-    """
+    """Return the units of phones that are said within written words."""
     starts_s = [span.start_s for span in written]
     numbers = [max(bisect_right(starts_s, (start + end) / 2) - 1, 0) for _, start, end in phones]
     units: list[Unit] = []
@@ -131,7 +128,6 @@ def matches(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
 
 
 def _cost(phone: str, other: str) -> float:
-    """Return the cost of matching two phones."""
     if phone == other:
         return 0.0
     if REDUCED_VOWELS.get(phone, phone) == REDUCED_VOWELS.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:

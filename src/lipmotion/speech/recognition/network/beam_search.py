@@ -161,7 +161,6 @@ class _BeamSearch:
         ]
 
     def _step(self, paths: _Paths, rows: Scored, row: int) -> _Paths:
-        """Return the paths after one row more."""
         tree = self.english.tree
         sounds, between, inside = rows.sounds[row], rows.between[row], rows.blank[row]
         root = paths.node == 0

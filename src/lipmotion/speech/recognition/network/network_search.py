@@ -56,7 +56,6 @@ class SpokenItem:
 class NetworkSearch:
     """The alignment of what a phone recogniser finds in one recording.
 
-    hmm      : the phone models
     aligning : log likelihoods of the recording for alignment
     loud     : frames that are too loud for silence [shape=(T,)]
     """

@@ -168,8 +168,6 @@ class PosteriorStretch(NamedTuple):
 def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
     """Return the posteriors in all stretches of sound of a recording; they are computed once.
 
-    name : of the phone recogniser
-    each : applies a function to many items, perhaps in several processes
     Raises InputError, MissingDependencyError: as ``phone_recogniser``.
     """
 
@@ -254,7 +252,6 @@ def token_posteriors(name: str, audio: Audio, each: ParallelMap = map, *, dense:
 def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
     """Return natural logarithms of the posteriors of a stretch of sound [shape=(N, K)].
 
-    name    : of the phone recogniser
     samples : 16-bit integers at 16 kHz
     """
     numbers = from_sixteen_bits(np.frombuffer(samples, "<i2"))
