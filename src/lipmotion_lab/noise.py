@@ -8,8 +8,8 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.sound.acoustic_conditions import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.speech.sound.noise import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
 from lipmotion.storage.files import check_listable
 from lipmotion.types import Audio, Monitor, silent_monitor, with_progress
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings
@@ -23,7 +23,7 @@ BABBLE = "babble"
 class NoiseConditions:
     """Noise that is added to the held-out recordings.
 
-    kinds     : of ``speech.sound.noise.NOISE_KINDS``
+    kinds     : of ``speech.sound.acoustic_conditions.NOISE_KINDS``
     ratios_db : signal-to-noise ratios
     talkers   : recordings for the babble
     """
@@ -50,8 +50,8 @@ def add_noise(
 ) -> HeldOutRecordings:
     """Return recordings with noise added, in the condition ``audio only``; every clip has its own noise.
 
-    kind, snr_db, talkers, seed : as in ``speech.sound.noise.noisy_audio``
-    Raises InputError: as ``speech.sound.noise.noisy_audio``.
+    kind, snr_db, talkers, seed : as in ``speech.sound.acoustic_conditions.noisy_audio``
+    Raises InputError: as ``speech.sound.acoustic_conditions.noisy_audio``.
     """
     utterances, recognitions = [], []
     for number, utterance in enumerate(with_progress(recordings.utterances, "adding noise", monitor)):

@@ -16,7 +16,7 @@ from lipmotion.articulation.expression import (
 from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
 from lipmotion.types import Channel, Motion, Prosody
-from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, parse_moods
+from lipmotion.types.delivery import MOODS, NEUTRAL, MoodKey, parse_moods
 from meshes.speech import motion, units
 
 SOURCES = {"EMFACS", "Ekman2003", "Harrigan1996", "Sundelin2013", "ours"}

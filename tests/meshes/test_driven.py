@@ -17,7 +17,7 @@ from lipmotion.meshes.fitting.driven import JAW_OPEN, load_character, with_jaw
 from lipmotion.meshes.model.bones import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merge_bones
 from lipmotion.meshes.model.face_shapes import life_scale
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from meshes.gltf import POSITIONS, document, glb
 from meshes.heads import SEAM, head, lip_points, shaped, write_glb
 from meshes.obj_writing import write_obj

@@ -22,10 +22,9 @@ from lipmotion.meshes.model.bones import ANGLES as HEAD
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import POSES, calibrate_rows, make_curves, pose_sources
-from lipmotion.pipeline.outputs.motion_files import fit_to_format, thin_keys
-from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.outputs.motion_files import fit_to_format, read_generation, thin_keys
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units

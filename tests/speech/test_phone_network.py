@@ -15,7 +15,14 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.hmm.log_likelihoods import wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network import network_search, posteriors
-from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
+from lipmotion.speech.recognition.network.beam_search import (
+    SOUNDS,
+    EnglishWords,
+    LanguageModel,
+    decoded_words,
+    scored,
+    word_tree,
+)
 from lipmotion.speech.recognition.network.network_search import phones_without_words, spoken_items
 from lipmotion.speech.recognition.network.posteriors import (
     BLANK,
@@ -30,7 +37,6 @@ from lipmotion.speech.recognition.network.posteriors import (
     recording_posteriors,
     token_posteriors,
 )
-from lipmotion.speech.recognition.network.word_tree import SOUNDS, EnglishWords, LanguageModel, word_tree
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch

@@ -116,8 +116,8 @@ READERS: Registry[CorpusReader] = Registry(
     "lipmotion.corpus_readers",
     {
         "grid": "lipmotion.corpora.layouts:read_grid",
-        "facegood": "lipmotion.corpora.facegood:read_facegood",
-        "vocaset": "lipmotion.corpora.vocaset:read_vocaset",
+        "facegood": "lipmotion.corpora.captured_faces:read_facegood",
+        "vocaset": "lipmotion.corpora.captured_faces:read_vocaset",
         "layouts": "lipmotion.corpora.layouts:read_layouts",
         "folder": "lipmotion.corpora.folder:read_folder",
     },

@@ -11,8 +11,7 @@ from typing import Any, ClassVar, get_type_hints
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
-from lipmotion.types.delivery import Delivery, Staging
-from lipmotion.types.moods import MoodKey, format_moods, parse_moods, sort_moods
+from lipmotion.types.delivery import Delivery, MoodKey, Staging, format_moods, parse_moods, sort_moods
 from lipmotion.types.values import describe_value, parse_number, parse_whole
 from lipmotion.units import PHONES, describe_unknown_phone, is_silent
 

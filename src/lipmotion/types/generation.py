@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shorten
 from lipmotion.types.audio import Audio, VoiceEvent
 from lipmotion.types.confidence import SpeechKnowledge
+from lipmotion.types.delivery import MoodKey
 from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
-from lipmotion.types.moods import MoodKey
 from lipmotion.types.motion import Motion, interpolate_rows
 from lipmotion.types.timeline import Span, Timeline, Unit
 

@@ -25,7 +25,7 @@ from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finish_line
-from lipmotion.pipeline.batch.pool import WorkerDied
+from lipmotion.pipeline.batch.run import WorkerDied
 from lipmotion.types import Item
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -474,6 +474,6 @@ def test_a_worker_of_a_cluster_is_killed(
 @pytest.mark.filterwarnings("ignore")
 def test_no_cluster_answers(sounds: Path, settings: Job, tmp_path: Path, monkeypatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("lipmotion.pipeline.batch.pool.CONNECT_S", 1)
+    monkeypatch.setattr("lipmotion.pipeline.batch.run.CONNECT_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         batch(sounds, tmp_path / "out", settings, cluster="tcp://127.0.0.1:9")

@@ -13,7 +13,7 @@ from lipmotion import Model
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.noise import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.voices import espeak_events
 from lipmotion.speech.voices.installed import (
     SYNTHESISERS,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.arguments.options import worker_count
 from lipmotion.cli.arguments.paths import is_pipe
 from lipmotion.cli.terminal.printing import print_lines
-from lipmotion.cli.terminal.status import outcome
+from lipmotion.cli.terminal.progress import outcome
 from lipmotion.printable import printable
 
 if TYPE_CHECKING:

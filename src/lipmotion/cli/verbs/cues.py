@@ -13,7 +13,7 @@ from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.arguments.paths import add_output, check_paths, is_pipe, read_pipe
 from lipmotion.cli.arguments.several import place_outputs
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
-from lipmotion.cli.terminal.status import LEVELS, status_lines
+from lipmotion.cli.terminal.progress import LEVELS, status_lines
 from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import is_file

@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> None:
                 job = part_of(options, Job()).of(options.sound or _find_sound(path), files)
                 import numpy as np
 
-                from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
+                from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
                 from lipmotion.speech.sound.audio_files import read_audio
                 from lipmotion.types import Audio
 

@@ -34,8 +34,8 @@ from lipmotion.speech.features.speaker_similarity import speaker_similarity
 from lipmotion.speech.features.voice_events import voice_events, without_laughter
 from lipmotion.speech.recognition.agreement import TranscriptFit, label_fit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
+from lipmotion.speech.recognition.network.beam_search import english_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
-from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     Recognition,
@@ -73,8 +73,8 @@ from lipmotion.types import (
     frames_of,
     silent_monitor,
 )
+from lipmotion.types.delivery import MoodTag
 from lipmotion.types.languages import ENGLISH
-from lipmotion.types.moods import MoodTag
 from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import require_tokens

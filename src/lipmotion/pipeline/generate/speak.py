@@ -27,7 +27,7 @@ from lipmotion.speech.voices.installed import default_voice, voice_named, voiced
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
-from lipmotion.types.moods import MoodTag
+from lipmotion.types.delivery import MoodTag
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S

@@ -24,8 +24,8 @@ from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import check_listable

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import metadata
-from itertools import groupby
+from itertools import cycle, groupby
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
@@ -41,8 +42,8 @@ from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
-from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
@@ -63,7 +64,37 @@ from lipmotion.types import (
     silent_monitor,
     sub_monitor,
 )
-from lipmotion.units import Lexicon, is_silent
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
+
+WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
+"""Warps of the frequencies, of one recording after the other."""
+FEWEST_WARPED_RECORDINGS = 60
+"""Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
+
+
+def train_phone_models(
+    spoken: Sequence[tuple[Audio, tuple[str, ...]]],
+    lexicon: Lexicon,
+    config: HmmConfig,
+    monitor: Monitor,
+    checkpoint: Checkpoint = NO_CHECKPOINT,
+    each: ParallelMap = map,
+) -> UnitHmm:
+    """Return phone models trained on recordings and their words.
+
+    spoken : recordings, each with its words, lower case
+    The frequencies of many recordings are warped as by vocal tracts of other lengths (``WARP_CYCLE``), so that the
+    models also fit other speakers.
+    Raises CorpusError: no transcript fits into its recording.
+    Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
+    """
+    turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED_RECORDINGS else (1.0,)
+    utterances = [
+        TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
+        for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
+    ]
+    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint, each)
+
 
 LOG = logging.getLogger("lipmotion")
 UTTERANCES_PER_WORKER = 32

@@ -12,14 +12,13 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.decode import UnitLoop
 from lipmotion.hmm.log_likelihoods import LogLikelihoods, penalise_silence, wrap_log_likelihoods
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
+from lipmotion.speech.recognition.network.beam_search import decoded_words, english_words, scored
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
     PhonePosteriors,
     PosteriorStretch,
 )
-from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.speech.recognition.recognised_speech import (
     LabelledStretch,
     RecognisedWord,
