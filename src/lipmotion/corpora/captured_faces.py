@@ -102,7 +102,6 @@ def read_mesh_motion(first: Path, rate_hz: float) -> Motion:
     """Return lip distances and lip points of a sequence of meshes, in the head's frame, in eye distances.
 
     first   : one of its meshes; where numbers are missing, the motion is interpolated
-    rate_hz : meshes a second
     Raises InputError: a file that is no mesh with the vertices of FLAME, in metres.
     """
     files = mesh_files(first)

@@ -50,10 +50,7 @@ def correlation(generated: Array, original: Array) -> Array:
 
 
 def select_moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
-    """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit.
-
-    units : of the channels
-    """
+    """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit."""
     values = np.concatenate(original)
     extents: Array = np.ptp(values, axis=0)
     widest = {unit: max(e for e, other in zip(extents, units, strict=True) if other == unit) for unit in set(units)}
@@ -156,7 +153,6 @@ def bootstrap_interval(
 def lip_vertex_error(generated: Clips, original: Clips) -> float:
     """Return the mean over frames of the largest distance of any lip vertex, in the unit of the places.
 
-    generated, original : places of the lip vertices
     Source: Richard et al. 2021 (MeshTalk), Fan et al. 2022 (FaceFormer, on VOCASET).
     """
     return float(np.concatenate([each.max(axis=1) for each in _distances(generated, original)]).mean())

@@ -274,7 +274,19 @@ def generate_passages(
     Raises InputError: as ``generate``, with the time of the passage.
     """
     frames, parts = len(speech.features.values), speech.parts or ()
-    rest, made = finish(generate(_silent_speech(speech), Constraints()), -NOWHERE_S), []
+    silence = Features(
+        np.zeros((REST_FRAMES, speech.features.values.shape[1]), np.float32), REST_FRAMES / FRAME_RATE_HZ
+    )
+    heard = speech.posteriors
+    silent_speech = Speech(
+        silence,
+        Timeline((Span(0.0, silence.duration_s, Unit(SILENCE)),)),
+        None if speech.log_f0 is None else np.full(REST_FRAMES, np.nan, np.float32),
+        spectrum=None if speech.spectrum is None else np.zeros((REST_FRAMES, speech.spectrum.shape[1]), np.float32),
+        posteriors=heard and replace(heard, values=np.repeat(heard.values[:1], REST_FRAMES // 2, axis=0)),
+        encoding=None if speech.encoding is None else np.zeros((REST_FRAMES, speech.encoding.shape[1]), np.float16),
+    )
+    rest, made = finish(generate(silent_speech, Constraints()), -NOWHERE_S), []
     for part in parts:
         start_s = part.first / FRAME_RATE_HZ
         inside = [pin for pin in pins if part.inside.start <= round(pin.time_s * FRAME_RATE_HZ) < part.inside.stop]
@@ -307,20 +319,6 @@ def generate_passages(
             spread.reduced[frame, spread.mixing[:, column] > 0] = 0
     units, trace = _join_units(speech, parts, made, rest.units[0].label), _join_traces(parts, made, rest, frames)
     return replace(rest, motion=motion, spread=spread, units=units, trace=trace)
-
-
-def _silent_speech(speech: Speech) -> Speech:
-    """Return ``REST_FRAMES`` of silence, with everything that some speech has."""
-    silent = Features(np.zeros((REST_FRAMES, speech.features.values.shape[1]), np.float32), REST_FRAMES / FRAME_RATE_HZ)
-    said = speech.posteriors
-    return Speech(
-        silent,
-        Timeline((Span(0.0, silent.duration_s, Unit(SILENCE)),)),
-        None if speech.log_f0 is None else np.full(REST_FRAMES, np.nan, np.float32),
-        spectrum=None if speech.spectrum is None else np.zeros((REST_FRAMES, speech.spectrum.shape[1]), np.float32),
-        posteriors=None if said is None else replace(said, values=np.repeat(said.values[:1], REST_FRAMES // 2, axis=0)),
-        encoding=None if speech.encoding is None else np.zeros((REST_FRAMES, speech.encoding.shape[1]), np.float16),
-    )
 
 
 def _join_rows(

@@ -151,7 +151,6 @@ def encode_video(
     """Return a video whose frames can be read in any order.
 
     frames  : uint8 RGB [shape=(H, W, 3)], all of one size, at least one; taken one at a time
-    rate_hz : frame rate
     crf     : quality, 0 (best) to 51
     group   : frames that are decoded together; fewer take more bytes and less time to reach one of them
     Colours are stored at half the resolution (4:2:0), as in almost every video that a camera wrote.

@@ -95,7 +95,6 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
     """Return the text of a file in UTF-8, UTF-16 or UTF-32, without a byte order mark.
 
     UTF-16 may be without its mark, where every other byte of most letters is 0.
-    kind    : what it should be, for messages
     western : what is none of these is in the code page of Windows in western Europe and America; a warning says so
     Raises InputError: no such file, not a file, larger than ``largest`` bytes, or no such text.
     """
@@ -127,10 +126,7 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:
-    """Raise ExportError unless a file can be written at ``target``; called before the work that leads to it.
-
-    source : a recording that must not be overwritten
-    """
+    """Raise ExportError unless a file can be written at ``target``; called before the work that leads to it."""
     try:
         is_folder = target.is_dir()
         _check_parent(_place(target))

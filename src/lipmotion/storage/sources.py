@@ -31,9 +31,7 @@ def check_apart(
 ) -> None:
     """Raise ExportError if writing would overwrite what the same call reads.
 
-    targets : files to be written
     folders : folders to be filled or emptied
-    force   : allow a file to replace a replaceable source
     Files are compared by device and inode, whatever their names, through links of both kinds. No output may lie in a
     folder that is read, and no input in a folder that is written.
     """

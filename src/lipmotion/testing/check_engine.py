@@ -121,7 +121,6 @@ class TrainedEngine:
 def check_engine(engine: Engine[Any]) -> None:
     """Run every check of the contract of engines on an engine; takes seconds.
 
-    engine : with the configuration to be checked
     Raises ContractError: the name of the first check that fails, and what was found.
 
     >>> from lipmotion.engines import engine_named

@@ -222,7 +222,6 @@ def align_between(
 ) -> list[Span[Unit]]:
     """Return the phones in time of words that are said from ``start_s`` to ``end_s``, by forced alignment there.
 
-    audio  : the recording of the request
     pauses : whether silence before and after the words stays; else the first and the last phone take its time
     Raises AlignmentError: the words do not fit in there.
     """

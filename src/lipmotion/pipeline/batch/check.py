@@ -166,7 +166,6 @@ def check(
     source  : as of ``batch``
     job     : as of ``batch``: the language that is required, and the names of outputs; None: English
     jobs    : number of processes; None: one a core
-    monitor : receives the progress
     Recordings of no line are those in the folder of all recordings of a list, with its sub-folders, where that lies in
     the list's own folder; else those beside the recordings. Outputs of batches do not count.
     Raises InputError: there are no lines, or too many. ExportError: two lines have the same output.

@@ -110,7 +110,6 @@ def write_reports(
 ) -> tuple[Path, Path]:
     """Write the reports of some lines into a folder, the most doubtful line first; return their paths.
 
-    marks : of lines, by their names
     Raises ExportError: they cannot be written.
     Memory: a number and a reference a line; the records are read one by one.
     """

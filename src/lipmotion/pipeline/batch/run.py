@@ -74,10 +74,7 @@ class Pool(Protocol):
 
 @contextmanager
 def local_pool(jobs: int) -> Iterator[Pool]:
-    """Give a pool of processes on this machine; with one job, this process itself.
-
-    jobs : number of processes
-    """
+    """Give a pool of processes on this machine; with one job, this process itself."""
     from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.backend.resource_tracker import ensure_running
 

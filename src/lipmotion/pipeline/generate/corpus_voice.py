@@ -47,7 +47,6 @@ def speak_from_corpus(  # noqa: PLR0913
     corpus  : the corpus that the model was trained on
     model   : of an engine that ``SelectsRecordings`` (``selection``)
     constraints, speaker, pauses, asymmetry : as of ``speak``
-    lexicon : pronunciations of words, ahead of those of the dictionary
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
     ones, with a warning.

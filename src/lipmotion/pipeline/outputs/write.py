@@ -129,7 +129,6 @@ def write_planned(
 ) -> None:
     """Write generated motion to the outputs of ``create_outputs``.
 
-    sound : the sound, where it is in no file
     model, temporary, monitor : as of ``write``. Raises as ``write``.
     """
     sounds = (output.path for output in planned if isinstance(output, SoundOutput))

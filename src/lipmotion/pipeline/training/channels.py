@@ -50,8 +50,6 @@ def train_eigenlips(
 ) -> Eigenlips:
     """Return the eigenlips of some utterances, trained on mouth pictures that are spread evenly over all seen frames.
 
-    components : principal components per colour
-    pictures   : number of mouth pictures
     Raises CorpusError: an utterance has no mouth pictures, or no utterance has a seen frame.
     """
     seen_frames = [np.flatnonzero(utterance.track.seen) for utterance in utterances]
@@ -150,7 +148,6 @@ def with_sound_inputs(
     These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, the encoding of the
     sound, and spectra in many acoustic conditions (``Example.condition_spectra``). The noise of babble is made of the
     recordings themselves; all is drawn from the number of the recording.
-    sound : of each example, by its name
     """
     inputs = engine.inputs(sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ)
     recordings, count = [sound[example.name] for example in examples], len(examples)

@@ -173,7 +173,6 @@ def fingerprint_training(
 
     Software are versions, and the phone recogniser that is installed: without one another model comes out.
 
-    names  : of the utterances of the corpus
     prior  : the model on which the new one stands, or None
     visual : kind of the channels; without eigenlips, mouth pictures are not part of the digest
     """

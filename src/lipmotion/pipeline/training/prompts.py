@@ -103,9 +103,7 @@ def cover_greedily(
     """Return the numbers of the sets to take, in order: each time the set that adds most weight for its cost.
 
     sets    : elements of each set, as indices into ``weights``
-    costs   : of each set
     weights : of each element [shape=(E,)]; set to 0 for the elements that are covered
-    count   : largest number of sets
     The gain of a set never increases, so a set that is still first after its gain was recomputed is the best of all.
     """
     queue = [

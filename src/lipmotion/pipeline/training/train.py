@@ -341,7 +341,6 @@ def _train_phone_models(
 def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
     """Return the part of the header of a model that is for users: corpus, licence, attribution, versions.
 
-    utterances : all that the training was given
     split      : name of their list, ``all``, or ``given names``
     used       : how many of them could be used
     """

@@ -107,10 +107,7 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
 
 
 def normalised(values: NDArray[np.float32], rounding: float) -> NDArray[np.float32]:
-    """Return the columns with mean 0 and standard deviation 1 [shape=(T, D)]; a constant column becomes exactly 0.
-
-    rounding : the standard deviation up to which a column is constant but for rounding
-    """
+    """Return the columns with mean 0 and standard deviation 1 [shape=(T, D)]; a constant column becomes exactly 0."""
     scaled = values - values.mean(axis=0, dtype=np.float64).astype(np.float32)
     deviation = np.sqrt(np.square(scaled).mean(axis=0, dtype=np.float64))  # single precision loses count in an hour
     moves = deviation > rounding

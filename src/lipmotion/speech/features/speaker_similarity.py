@@ -57,8 +57,5 @@ def _densities(hmm: UnitHmm) -> QuadraticForm:
 
 
 def best_warp(fits: dict[float, float]) -> float:
-    """Return the warp with the highest fit; of equal ones, that which changes the frequencies least.
-
-    fits : the mean log density per frame at each warp
-    """
+    """Return the warp with the highest fit; of equal ones, that which changes the frequencies least."""
     return max(fits, key=lambda warp: (fits[warp], -abs(warp - 1)))

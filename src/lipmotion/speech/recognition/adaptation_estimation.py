@@ -51,7 +51,6 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     """Return the adaptation of phone models to the speaker of some recordings.
 
     own        : the phone models of a corpus, not adapted
-    recordings : of one speaker
     All recordings are recognised with the own and the general models. The features of both then get the affine
     transform that makes the recognised states most probable, with the identity as prior mean. The frequencies are
     stretched first, by one factor for all recordings.
@@ -113,7 +112,6 @@ def _improved(
 ) -> Array:
     """Return a transform [shape=(D, D + 1)] that makes frames more probable under the densities of their states.
 
-    prior     : statistics that are added to those of the frames
     features  : not transformed [shape=(T, D)]
     densities : of each frame [shape=(T,)]
     transform : to begin with [shape=(D, D + 1)]

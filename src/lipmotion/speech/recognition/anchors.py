@@ -77,7 +77,6 @@ def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: flo
     If all are late or early they are corrected; lines that begin after the end of the recording are left out. Both are
     logged as warnings.
     loud       : which frames are loud [shape=(T,)]
-    duration_s : of the recording
     Raises InputError: all lines begin after the end.
     """
     late_s = lateness_s(transcript, loud)
@@ -251,7 +250,14 @@ def align_within(
     free = _free(placed, anchors, frames, search)
     if free is not None:
         return free
-    _warn_of_misfits(group_fits(placed, anchors.groups, frames), anchors)
+    last_fits = group_fits(placed, anchors.groups, frames)
+    wrong = np.flatnonzero(_beside(last_fits) < WORST_FIT)
+    if len(wrong):
+        known = anchors.start_s[(anchors.groups <= int(wrong[0])) & ~np.isnan(anchors.start_s)]
+        LOG.warning(
+            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
+            *(len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0),
+        )
     return placed, windows
 
 
@@ -284,17 +290,6 @@ def _free(
     return free, windows
 
 
-def _warn_of_misfits(fits: NDArray[np.float64], anchors: Anchors) -> None:
-    """Log a warning of the times whose words, and those beside them, fit the sound very badly."""
-    wrong = np.flatnonzero(_beside(fits) < WORST_FIT)
-    if len(wrong):
-        known = anchors.start_s[(anchors.groups <= int(wrong[0])) & ~np.isnan(anchors.start_s)]
-        LOG.warning(
-            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
-            *(len(wrong), len(fits), float(known[-1]) if len(known) else 0.0),
-        )
-
-
 def _beside(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of each value and those beside it."""
     count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
@@ -302,9 +297,6 @@ def _beside(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def least_frames(words: Sequence[Sequence[Sequence[str]]], counts: dict[str, int]) -> NDArray[np.intp]:
-    """Return the fewest frames of each word, given its pronunciations: the states of the shortest.
-
-    counts : the number of states by unit
-    """
+    """Return the fewest frames of each word, given its pronunciations: the states of the shortest."""
     of_words = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
     return np.array([of_words[id(word)] for word in words], np.intp)

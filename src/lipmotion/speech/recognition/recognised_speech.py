@@ -115,8 +115,6 @@ def recognition_of(
 ) -> Recognition:
     """Return a recognition.
 
-    units  : phones in time
-    labels : the phones in frames of which they were made
     recognised : the words that ``labels`` number
     similarity : as of ``Recognition``
     """
@@ -146,7 +144,6 @@ def joined_units(parts: Iterable[Timeline[Unit]], silence: Unit, end_s: float) -
     """Return the phones in time of a recording from those of its passages, with silence before, between and after them.
 
     parts : of each passage, with times of the recording (``placed_units``)
-    end_s : of the recording
     """
     joined: list[Span[Unit]] = []
     for part in [*parts, Timeline((Span(end_s, end_s, silence),))]:
@@ -204,9 +201,7 @@ def labels_of_words(
 ) -> Iterator[LabelledStretch]:
     """Yield the labels of each run of words that are believed, with the frames that they take.
 
-    aligned    : with the stretch
     believed   : of every word [shape=(W,)]
-    first_word : the number of the first word among those that were recognised
     Silence and pauses belong to a run if both words beside them do, or if all words are believed.
     """
     spoken, everything = aligned.of_word >= 0, bool(believed.all())
@@ -216,28 +211,16 @@ def labels_of_words(
     for taken, group in groupby(range(len(takes)), key=lambda place: bool(takes[place])):
         places = list(group)
         if taken:
-            frames = Stretch(
-                stretch.first + int(aligned.bounds[places[0]]), stretch.first + int(aligned.bounds[places[-1] + 1])
-            )
-            yield (
-                frames,
-                [
-                    LabelledFrames(
-                        stretch.first + int(aligned.bounds[place]),
-                        aligned.phones[place],
-                        first_word + int(aligned.of_word[place]) if spoken[place] else -1,
-                    )
-                    for place in places
-                ],
-            )
+            firsts = [stretch.first + int(first) for first in aligned.bounds[places[0] : places[-1] + 2]]
+            words = [first_word + int(aligned.of_word[place]) if spoken[place] else -1 for place in places]
+            phones = (aligned.phones[place] for place in places)
+            yield Stretch(firsts[0], firsts[-1]), list(map(LabelledFrames, firsts[:-1], phones, words))
 
 
 def spliced(base: Sequence[LabelledFrames], parts: Sequence[LabelledStretch], frames: int) -> list[LabelledFrames]:
     """Return labels in which some stretches are replaced.
 
-    base   : of all frames, in order
     parts  : stretches in order, without overlap, and their labels
-    frames : T
     What is left of a phone of ``base`` beside a part is dropped if it is a sliver; the label before it goes on.
     """
     result: list[LabelledFrames] = []

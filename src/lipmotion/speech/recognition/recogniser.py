@@ -356,7 +356,6 @@ def _first_frame(start_s: float) -> int:
 def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
     """Return phones in time, each with its word.
 
-    labels : phones and words
     bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
     Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
     """

@@ -210,7 +210,6 @@ def score_words(fit: float, posterior: float) -> float:
     """Return the probability that a word is right, 0 to 1: by logistic regression (docs/decisions/recognition.md).
 
     fit       : of the word (``AlignedWords.fits``), in nats
-    posterior : among the words of the search
     """
     score = FIT_WEIGHT * min(max(fit, LEAST_FIT), MOST_FIT) + POSTERIOR_WEIGHT * posterior + CONSTANT
     return float(1 / (1 + np.exp(-score)))

@@ -28,7 +28,6 @@ def noisy_audio(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio]
     kind    : one of ``NOISE_KINDS``
     snr_db  : as ``add_noise`` measures it
     talkers : recordings of the babble's talkers, other people than the one in ``audio``; white noise does not use them
-    seed    : the same arguments give the same samples
     Raises InputError: another kind, a talker that is the recording itself, or as ``add_noise`` and ``babble_noise``.
     """
     if kind not in NOISE_KINDS:
@@ -143,7 +142,6 @@ def condition_spectra(
     """Return the spectrum of a recording as it is, and in ``count`` - 1 random conditions.
 
     voices : other recordings, whose voices, at other speeds, make the babble
-    seed   : the same arguments give the same spectra
     Raises InputError: as ``spectrum``.
     """
     result = [ConditionSpectrum(spectrum(audio).astype(np.float16), 1.0, 0.0)]

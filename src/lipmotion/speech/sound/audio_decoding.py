@@ -56,7 +56,6 @@ class DecodedAudio:
 def decode_audio(container: Any, rate_hz: int, channel: int | None = None) -> DecodedAudio:
     """Return the decoded first sound track of an open container.
 
-    rate_hz : sampling rate to convert to
     channel : number of the channel to take; None: the mean of all channels
     Time 0 is the container's start; in a file without moving pictures, the first sample.
     Digital silence, and that which fills holes, is left out until the end: memory that nobody writes to costs nothing.
@@ -70,7 +69,6 @@ def decode_audio(container: Any, rate_hz: int, channel: int | None = None) -> De
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
     """Raise InputError for a sampling rate or a number of channels that no recorder has.
 
-    name : of the file, for the message
     A wrong header could fill the memory: at a rate of 1 Hz, 16,000 samples are made out of one.
     """
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:

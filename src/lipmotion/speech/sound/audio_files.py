@@ -37,7 +37,6 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     """Return the first sound track of a file, the mean of its channels.
 
     path    : audio or video file, anything FFmpeg decodes
-    rate_hz : rate to resample to
     warn    : log warnings; False where the same file was read before, so that none is said twice
     Time 0 is the start of the container, so sound and picture of a video agree: a track that starts later
     is preceded by silence, one that starts earlier is cut. In a file without video it is the first sample.

@@ -37,9 +37,7 @@ class JoinedPieces(NamedTuple):
 def overlapped(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]], rate_hz: int) -> JoinedPieces:
     """Return pieces of sounds, one after the other, which overlap where their waveforms are most alike.
 
-    sounds   : the recording of each piece
     pieces_s : start and end of each piece in its recording, in seconds
-    rate_hz  : sampling rate of all recordings
     """
     half, reach = round(OVERLAP_S * rate_hz / 2), round(REACH_S * rate_hz)
     result = np.zeros(0)

@@ -53,10 +53,7 @@ Starts = Sequence[tuple[str, float]]
 
 
 def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHONES) -> Timeline[str]:
-    """Return phones in time: each from its corrected start to that of the next, or to the end of the sound.
-
-    phone_map : the labels to phones of the inventory
-    """
+    """Return phones in time: each from its corrected start to that of the next, or to the end of the sound."""
     labels = [label for label, _ in starts]
     edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
     closed = np.abs(audio.samples) < CLOSURE_SHARE * np.abs(audio.samples).max(initial=0)

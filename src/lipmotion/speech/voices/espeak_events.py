@@ -112,13 +112,6 @@ def _pronounced(library: Any, word: str) -> str:
     return " ".join(phones)
 
 
-def _about(library: Any) -> dict[str, str]:
-    library.espeak_Info.restype = ctypes.c_char_p
-    data = ctypes.c_char_p()
-    version = library.espeak_Info(ctypes.byref(data))
-    return {"version": version.decode(), "data": os.path.realpath((data.value or b"").decode())}
-
-
 def main() -> None:
     """Carry out the task on the standard input."""
     task = json.load(sys.stdin)
@@ -132,7 +125,10 @@ def main() -> None:
     if rate_hz <= 0:
         sys.exit("espeak-ng finds no data; apt install espeak-ng-data")
     if "voice" not in task:
-        json.dump(_about(library), sys.stdout)
+        library.espeak_Info.restype = ctypes.c_char_p
+        found = ctypes.c_char_p()
+        version = library.espeak_Info(ctypes.byref(found))
+        json.dump({"version": version.decode(), "data": os.path.realpath((found.value or b"").decode())}, sys.stdout)
         return
     voice = task["voice"].encode()
     if library.espeak_SetVoiceByName(voice) and library.espeak_SetVoiceByProperties(

@@ -256,20 +256,6 @@ def voiced_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
 ) -> Generator[VoicedSentence, None, None]:
     """Yield several sentences in a voice, as ``speak_sentences``, each with the sound at the synthesiser's own rate."""
-    synthesiser = _synthesiser(voice)
-    words = [split_words(text) for text in texts]
-    known = (lexicon or Lexicon()) if voice.is_english else None
-    with temporary_folder() as folder:
-        plain = [" ".join(text.split()) for text in texts]
-        sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())
-        for said, its_words in zip(sentences, words, strict=True):
-            phone_map = said.phone_map or synthesiser.phone_map
-            written = its_words if said.words is None else said.words
-            units = inventory_timeline(said.phones, phone_map, written, known, said.audio.duration_s)
-            yield VoicedSentence(said.audio, units, said.sound)
-
-
-def _synthesiser(voice: SyntheticVoice) -> Synthesiser:
     synthesiser = SYNTHESISERS.get(voice.synthesiser)
     if synthesiser is None:
         raise InputError(f"unknown synthesiser {voice.synthesiser!r}; required one of: {', '.join(SYNTHESISERS)}")
@@ -280,7 +266,16 @@ def _synthesiser(voice: SyntheticVoice) -> Synthesiser:
         )
     if voice.name not in names and not _is_other(voice.name, synthesiser):
         raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
-    return synthesiser
+    words = [split_words(text) for text in texts]
+    known = (lexicon or Lexicon()) if voice.is_english else None
+    with temporary_folder() as folder:
+        plain = [" ".join(text.split()) for text in texts]
+        sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())
+        for said, its_words in zip(sentences, words, strict=True):
+            phone_map = said.phone_map or synthesiser.phone_map
+            written = its_words if said.words is None else said.words
+            units = inventory_timeline(said.phones, phone_map, written, known, said.audio.duration_s)
+            yield VoicedSentence(said.audio, units, said.sound)
 
 
 def _is_other(name: str, synthesiser: Synthesiser) -> bool:

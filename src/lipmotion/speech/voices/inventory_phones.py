@@ -34,14 +34,24 @@ def inventory_timeline(
 ) -> Timeline[Unit]:
     """Return the phones of a synthesised sentence in time, as forced alignment would label them.
 
-    labels     : of the synthesiser, in time
     phone_map  : labels to phones (``phone_maps``)
     words      : of the sentence; or what is written of it between blanks, in time, where the synthesiser tells
     lexicon    : pronunciations of the words (None: the sentence is not English, its words stay as they are written)
     duration_s : of the sound; what no label covers is silence
     Raises InputError: a label that is not in the map, or no phone at all.
     """
-    phones = _joined(_covered(_translated(labels, phone_map), duration_s))
+    said: list[tuple[str, float, float]] = []
+    for span in labels:
+        if span.label not in phone_map:
+            raise InputError(
+                f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(phone_map)}"
+            )
+        names = phone_map[span.label]
+        if not names and said:
+            said[-1] = (*said[-1][:2], span.end_s)
+        each_s = span.duration_s / max(len(names), 1)
+        said += [(phone, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, phone in enumerate(names)]
+    phones = _joined(_covered([(phone, start, end) for phone, start, end in said if end > start], duration_s))
     spoken = [phone for phone in phones if not is_silent(phone[0])]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")
@@ -133,22 +143,6 @@ def _cost(phone: str, other: str) -> float:
     if REDUCED_VOWELS.get(phone, phone) == REDUCED_VOWELS.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:
         return OWN_FORM_COST
     return OWN_KIND_COST if (phone in VOWELS) == (other in VOWELS) else OTHER_KIND_COST
-
-
-def _translated(labels: Timeline[str], phone_map: PhoneMap) -> list[tuple[str, float, float]]:
-    """Return the phones of the labels, with start and end, s. Raises InputError: a label that is not in the map."""
-    phones: list[tuple[str, float, float]] = []
-    for span in labels:
-        if span.label not in phone_map:
-            raise InputError(
-                f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(phone_map)}"
-            )
-        names = phone_map[span.label]
-        if not names and phones:
-            phones[-1] = (*phones[-1][:2], span.end_s)
-        each_s = span.duration_s / max(len(names), 1)
-        phones += [(name, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, name in enumerate(names)]
-    return [(name, start, end) for name, start, end in phones if end > start]
 
 
 def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:

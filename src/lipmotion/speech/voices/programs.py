@@ -34,10 +34,7 @@ def program_output(
 ) -> str:
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.
 
-    package   : the Debian package with it
     sentences : how many it synthesises, which sets its limits
-    given     : its standard input
-    folder    : where it writes
     Raises MissingDependencyError: there is no such program. Raises InputError: it fails, takes too long, or prints or
     writes too much.
     """

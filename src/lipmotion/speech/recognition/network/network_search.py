@@ -114,7 +114,6 @@ def phones_without_words(
     """Return the stretches in which something is said, with their phones: in any language, and where nobody is sure.
 
     loop : the network of phones without words
-    free : log likelihoods of the recording
     Every phone model becomes more probable by the posterior of its phone around each frame: where the phone recogniser
     leaves phones out, as it does in languages that it hardly knows, the models alone decide.
     """
