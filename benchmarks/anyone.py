@@ -25,7 +25,7 @@ from scipy.signal import butter, fftconvolve, sosfilt
 from scipy.stats import spearmanr
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.corpora.layouts import spell_name
+from lipmotion.corpora.folder import spell_name
 from lipmotion.motion.articulation import read_articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, load_model
-from lipmotion.corpora.layouts import spell_name
+from lipmotion.corpora.folder import spell_name
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import (
     DOUBTFUL_SCORE,

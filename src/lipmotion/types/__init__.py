@@ -7,7 +7,21 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from lipmotion.types.audio import Audio, Prosody, VoiceEvent, from_sixteen_bits, to_sixteen_bits
+    from lipmotion.types.audio import (
+        ENERGY_FEATURE,
+        FRAME_RATE_HZ,
+        SPECTRUM_BANDS,
+        Audio,
+        Features,
+        JoinedRows,
+        Prosody,
+        TokenPosteriors,
+        VoiceEvent,
+        frame_of,
+        frames_of,
+        from_sixteen_bits,
+        to_sixteen_bits,
+    )
     from lipmotion.types.confidence import SpeechKnowledge
     from lipmotion.types.configuration import Configuration, Rule, option
     from lipmotion.types.delivery import Delivery, Staging
@@ -19,16 +33,6 @@ if TYPE_CHECKING:
         Explanation,
         NamedProbability,
         RegressedMean,
-    )
-    from lipmotion.types.features import (
-        ENERGY_FEATURE,
-        FRAME_RATE_HZ,
-        SPECTRUM_BANDS,
-        Features,
-        JoinedRows,
-        TokenPosteriors,
-        frame_of,
-        frames_of,
     )
     from lipmotion.types.generation import (
         ConditionSpectrum,
@@ -74,7 +78,7 @@ __all__ = [
 ]  # fmt: skip
 
 _MODULES = (
-    *("configuration", "delivery", "audio", "features", "timeline", "motion", "confidence"),
+    *("configuration", "delivery", "audio", "timeline", "motion", "confidence"),
     *("generation", "progress", "explanation", "utterance"),
 )
 """Where the names are looked for, in this order."""

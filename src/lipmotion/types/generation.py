@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.types.audio import Audio, VoiceEvent
+from lipmotion.types.audio import FRAME_RATE_HZ, Audio, Features, TokenPosteriors, VoiceEvent
 from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.delivery import MoodKey
-from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
 from lipmotion.types.motion import Motion, interpolate_rows
 from lipmotion.types.timeline import Span, Timeline, Unit
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lipmotion import Corpus
-from lipmotion.corpora.entry import read_entry
-from lipmotion.measures.offset import best_offset
+from lipmotion.corpora.store import read_entry
+from lipmotion.measures.curves import best_offset
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.entry import quantise
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, quantise
 from lipmotion.errors import InputError
 from lipmotion.formats.subtitles import is_subtitles, subtitle_words
 from lipmotion.kernels.threads import one_thread

@@ -19,13 +19,15 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.combined_phones import NOISES
 from lipmotion.speech.recognition.recognised_speech import (
+    AlignedWords,
     LabelledFrames,
     LabelledStretch,
     RecognisedWord,
+    align_recognised_words,
     labels_of_words,
+    phone_bonus,
     spliced,
 )
-from lipmotion.speech.recognition.word_fit import AlignedWords, align_recognised_words, phone_bonus
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
 from lipmotion.types import ParallelMap

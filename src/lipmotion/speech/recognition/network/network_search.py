@@ -20,11 +20,14 @@ from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
 )
 from lipmotion.speech.recognition.recognised_speech import (
+    FORMS,
     LabelledStretch,
     RecognisedWord,
+    align_recognised_words,
+    compared_form,
+    density_bonus,
     labels_of_words,
 )
-from lipmotion.speech.recognition.word_fit import FORMS, align_recognised_words, compared_form, density_bonus
 from lipmotion.speech.recognition.word_search import free_labels
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.units import PHONES, Lexicon, Pronunciation, is_silent
