@@ -154,43 +154,6 @@ def read_entry(folder: Path) -> dict[str, Any]:
     return entry
 
 
-def read_utterance(folder: Path) -> Utterance:
-    """Return one utterance; its features and mouth pictures stay on disk until they are used.
-
-    Raises CorpusError: missing or damaged.
-    """
-    entry = read_entry(folder)
-    try:
-        channels = tuple(Channel(**channel) for channel in entry["channels"])
-        arrays = {name: _load(folder, name) for name in UTTERANCE_ARRAYS if name != "crops" or entry["crops"]}
-        sizes = check_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
-        audio = Audio(from_sixteen_bits(arrays["audio"]), entry["audio_rate_hz"])
-        expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
-        if sizes["T"] != expected:
-            raise ValueError(f"{sizes['T']} frames of features, required {expected} for {audio.duration_s:.2f} s")
-        motion = Motion(arrays["motion"].astype(np.float64), entry["rate_hz"], channels)
-        check_curves(motion)
-        for name, checksum in entry.get("checksums", {}).items():
-            if name in arrays and _checksum(arrays[name]) != checksum:
-                raise ValueError(f"{name} holds other bytes than were written")
-        phones = entry.get("phones")
-        if phones is not None:
-            phones = [Span(_COUNT(start_s), _COUNT(end_s), Unit(_TEXT(phone))) for start_s, end_s, phone in phones]
-        return Utterance(
-            name=entry["name"],
-            audio=audio,
-            features=Features(arrays["features"], audio.duration_s),
-            track=Track(motion, np.array(arrays["seen"]), arrays.get("crops"), tuple(entry.get("notes", ()))),
-            words=None if entry["words"] is None else tuple(entry["words"]),
-            split=entry["split"],
-            source=entry["source"],
-            speaker=entry.get("speaker", ""),
-            phones=None if phones is None else Timeline(tuple(phones)),
-        )
-    except (OSError, EOFError, ValueError, KeyError, TypeError, OverflowError) as error:
-        raise _damaged(folder, error) from error
-
-
 def _checksum(array: NDArray[Any]) -> int:
     return zlib.crc32(array.tobytes())
 
@@ -414,7 +377,37 @@ class Corpus:
         if name not in self._index:
             some = ", ".join(self.names()[:5])
             raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)} ({some}, ...)")
-        return read_utterance(self.folder(name))
+        folder = self.folder(name)
+        entry = read_entry(folder)
+        try:
+            channels = tuple(Channel(**channel) for channel in entry["channels"])
+            arrays = {name: _load(folder, name) for name in UTTERANCE_ARRAYS if name != "crops" or entry["crops"]}
+            sizes = check_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
+            audio = Audio(from_sixteen_bits(arrays["audio"]), entry["audio_rate_hz"])
+            expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
+            if sizes["T"] != expected:
+                raise ValueError(f"{sizes['T']} frames of features, required {expected} for {audio.duration_s:.2f} s")
+            motion = Motion(arrays["motion"].astype(np.float64), entry["rate_hz"], channels)
+            check_curves(motion)
+            for array, checksum in entry.get("checksums", {}).items():
+                if array in arrays and _checksum(arrays[array]) != checksum:
+                    raise ValueError(f"{array} holds other bytes than were written")
+            phones = entry.get("phones")
+            if phones is not None:
+                phones = [Span(_COUNT(start_s), _COUNT(end_s), Unit(_TEXT(phone))) for start_s, end_s, phone in phones]
+            return Utterance(
+                name=entry["name"],
+                audio=audio,
+                features=Features(arrays["features"], audio.duration_s),
+                track=Track(motion, np.array(arrays["seen"]), arrays.get("crops"), tuple(entry.get("notes", ()))),
+                words=None if entry["words"] is None else tuple(entry["words"]),
+                split=entry["split"],
+                source=entry["source"],
+                speaker=entry.get("speaker", ""),
+                phones=None if phones is None else Timeline(tuple(phones)),
+            )
+        except (OSError, EOFError, ValueError, KeyError, TypeError, OverflowError) as error:
+            raise _damaged(folder, error) from error
 
     def add(self, utterance: Utterance, settings: dict[str, str] | None = None) -> None:
         """Write one utterance, replace one of the same name, and add it to the manifest.

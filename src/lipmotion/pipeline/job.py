@@ -108,8 +108,7 @@ def run(  # noqa: PLR0913
     """
     from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.edit_files import edit_file
-    from lipmotion.pipeline.generate.explain import chain_posteriors
-    from lipmotion.pipeline.generate.posteriors import check_picture, write_posteriors
+    from lipmotion.pipeline.generate.explain import chain_posteriors, check_picture, write_posteriors
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.curve_sets import curve_names
 

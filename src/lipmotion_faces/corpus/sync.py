@@ -13,8 +13,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.curves import Offset, best_offset, pooled_offset, shift_scores
 from lipmotion.motion.space import resample_to_model
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.lip_speed import measured_opening_speed, predicted_opening_speed
 from lipmotion.speech.features.mfcc import WINDOW
+from lipmotion.speech.sound.sound_offset import measured_opening_speed, predicted_opening_speed
 from lipmotion.storage.files import lock_folder
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 

@@ -68,9 +68,11 @@ def words_in(samples: bytes) -> tuple[FoundWord, ...]:
         found = _segments(decoder)
         decoder.end_utt()
         lattice = _segments(decoder)
-    return tuple(
-        FoundWord(one.word, max((two.posterior for two in lattice if _same(one, two)), default=0.0)) for one in found
-    )
+    words = []
+    for one in found:
+        same = (two for two in lattice if one.word == two.word and max(one.first, two.first) <= min(one.last, two.last))
+        words.append(FoundWord(one.word, max((two.posterior for two in same), default=0.0)))
+    return tuple(words)
 
 
 class _Segment(NamedTuple):
@@ -88,10 +90,6 @@ def _segments(decoder: Any) -> list[_Segment]:
         for entry in entries
         if not is_filler(entry.word)
     ]
-
-
-def _same(one: _Segment, two: _Segment) -> bool:
-    return one.word == two.word and max(one.first, two.first) <= min(one.last, two.last)
 
 
 def is_filler(word: str) -> bool:

@@ -91,7 +91,8 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
         if is_text(path):
             told = f"is text, required a recording; give the recording first, its words with --transcript {path}"
             raise InputError(f"{path}: {told}") from error
-        raise InputError(f"{path}: not a readable recording ({_reason(error)}); give an audio or video file") from error
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: not a readable recording ({reason}); give an audio or video file") from error
 
 
 def _checked(path: Path, audio: Audio) -> Audio:
@@ -100,10 +101,6 @@ def _checked(path: Path, audio: Audio) -> Audio:
     if not np.isfinite([audio.samples.min(), audio.samples.max()]).all():  # which needs no further array
         raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); export the recording again")
     return audio
-
-
-def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error)
 
 
 class _Wave(mmap.mmap):
