@@ -19,7 +19,6 @@ from lipmotion.printable import printable
 if TYPE_CHECKING:
     from lipmotion.cli.terminal.progress import Report
     from lipmotion.pipeline.job import Job
-    from lipmotion.pipeline.outputs.output import ShownFace
     from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
 
@@ -112,15 +111,27 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
     Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
-    from lipmotion.errors import LipMotionError
-    from lipmotion.pipeline.job import is_for_several, list_recordings, run
+    from lipmotion.errors import InputError, LipMotionError
+    from lipmotion.pipeline.job import check_outputs, is_for_several, list_recordings, open_face, plan_outputs, run
     from lipmotion.pipeline.model import load_model
+    from lipmotion.storage.files import create_folders
     from lipmotion.types.progress import Item, sub_monitor
 
     if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
     _check_named(given)
-    jobs, face = _plan_jobs(job, list_recordings(given))
+    recordings = list_recordings(given)
+    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
+    alone["posteriors"] = job.outputs.posteriors
+    for name, value in alone.items():
+        if value is not None and len(recordings) > 1:
+            raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
+    planned = plan_outputs(recordings, job.outputs.files, job.outputs.kinds)
+    face = open_face(job.outputs)
+    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
+    with create_folders({Path(file).parent for files in planned for file in files}):
+        for one, recording in zip(jobs, recordings, strict=True):
+            check_outputs(one, face, recording)
     model = load_model(job.request.model)
     written: list[str] = []
     failures: list[tuple[int, str, Exception]] = []
@@ -145,26 +156,6 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
     _, speech, worst = max(failures, key=lambda failure: failure[0])
     kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
     raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst
-
-
-def _plan_jobs(job: Job, recordings: Sequence[Path]) -> tuple[list[Job], ShownFace]:
-    """Return the job of each recording, and their face; make the folders, but none where something is refused."""
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.job import check_outputs, open_face, plan_outputs
-    from lipmotion.storage.files import create_folders
-
-    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
-    alone["posteriors"] = job.outputs.posteriors
-    for name, value in alone.items():
-        if value is not None and len(recordings) > 1:
-            raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
-    planned = plan_outputs(recordings, job.outputs.files, job.outputs.kinds)
-    face = open_face(job.outputs)
-    jobs = [job.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
-    with create_folders({Path(file).parent for files in planned for file in files}):
-        for each, recording in zip(jobs, recordings, strict=True):
-            check_outputs(each, face, recording)
-    return jobs, face
 
 
 @contextmanager

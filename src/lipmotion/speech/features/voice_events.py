@@ -194,7 +194,9 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
         said = units.between(at_s, at_s + sound.duration_s)
-        level_db, (voiced, pitch) = _smoothed(analysed(sound).log_energy.astype(np.float64) * DB), _voice(sound)
+        level_db = _smoothed(analysed(sound).log_energy.astype(np.float64) * DB)
+        pitch = log_f0(sound).astype(np.float64) * 12 / np.log(2)  # semitones
+        voiced = np.isfinite(pitch)
         laughs = tuple(_laughs(sound, level_db, voiced, said))
         phrases = [phrase for phrase in _phrases(said) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
         events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
@@ -223,12 +225,6 @@ def _heard(level_db: Curve) -> Curve:
     """Return the levels within passages, over which levels are compared; all, where there is none."""
     heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]
     return heard if len(heard) else level_db
-
-
-def _voice(audio: AnalysedAudio) -> tuple[Voiced, Curve]:
-    """Return whether each frame is voiced, and its pitch in semitones, NaN where it is not [each shape=(T,)]."""
-    pitch = log_f0(audio).astype(np.float64) * 12 / np.log(2)
-    return np.isfinite(pitch), pitch
 
 
 def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:

@@ -63,13 +63,11 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
         log_stay=own.log_stay[sources[: plain + len(added)]],
         bigram=Bigram(table.units, np.log(np.maximum(mixed, 1e-9)).astype(np.float32)),
     )
-    return CombinedPhones(hmm, np.array([_column(table, name) for name in table.names], np.intp))
-
-
-def _column(table: StateTable, name: str) -> int:
-    """Return the general density that goes with a density of the table, by its name."""
-    unit, _, rest = name.partition(".")
-    return density_column(unit, int(rest.partition("<")[0].partition(">")[0]), table.count(unit))
+    columns = []
+    for unit, _, rest in (name.partition(".") for name in table.names):
+        state = int(rest.partition("<")[0].partition(">")[0])
+        columns.append(density_column(unit, state, table.count(unit)))
+    return CombinedPhones(hmm, np.array(columns, np.intp))
 
 
 def combined_log_likelihoods(

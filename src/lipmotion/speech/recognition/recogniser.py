@@ -120,7 +120,8 @@ class Recogniser:
                 for passage in audio.passages
             ]
             return joined_recognition(passages, features.duration_s)
-        similarity = self._similarity(audio)
+        is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
+        similarity = speaker_similarity(self.own, audio) if is_judged else None
         known = (
             self.kind == "auto"
             and similarity is not None
@@ -261,27 +262,17 @@ class Recogniser:
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
     ) -> tuple[UnitHmm, LogLikelihoods]:
         """Return the models that are used, and the log likelihoods of a recording under them."""
-        hmm, log_likelihoods = self._unpenalised(audio, similarity, aligning)
-        return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
-
-    def _unpenalised(
-        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, aligning: bool
-    ) -> tuple[UnitHmm, LogLikelihoods]:
         if self.kind == "own":
-            warp, _ = self._own_transform(audio, similarity)
-            return self.own, compute_log_likelihoods(self.own, self._own_features(audio, warp))
-        general_alone = self.kind == "general" or (aligning and self._has_few_gaussians)
-        warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
-        # own models without weight are not evaluated: any features will do, and those of a long recording are large
-        own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
-        general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
-        return self.combined.hmm, combined_log_likelihoods(self.combined, own, weight, general)
-
-    def _similarity(self, audio: AnalysedAudio) -> SpeakerSimilarity | None:
-        """Return the speaker similarity of a recording; None where nothing depends on it."""
-        if self.adaptation is not None or self.kind == "general":
-            return None
-        return speaker_similarity(self.own, audio)
+            hmm, warp = self.own, self._own_transform(audio, similarity)[0]
+            log_likelihoods = compute_log_likelihoods(hmm, self._own_features(audio, warp))
+        else:
+            hmm, general_alone = self.combined.hmm, self.kind == "general" or (aligning and self._has_few_gaussians)
+            warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
+            # own models without weight are not evaluated: any features will do, and those of a long one are large
+            own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
+            general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
+            log_likelihoods = combined_log_likelihoods(self.combined, own, weight, general)
+        return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
 
     def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:
         """Return the warp of the frequencies for the own models, and the weight of these models, 0 to 1."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,7 +150,10 @@ def condition_spectra(
         rng = np.random.default_rng([*seed, number])
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if rng.random() < WARP_PROBABILITY else 1.0
         tempo = float(np.exp(rng.uniform(-LARGEST_TEMPO, LARGEST_TEMPO))) if rng.random() < TEMPO_PROBABILITY else 1.0
-        varied, distortion = in_condition(_sped(audio, tempo), voices, rng)
+        sped = audio  # played ``tempo`` times as fast: tempo, pitch and formants change together
+        if tempo != 1.0 and len(samples := _resampled(audio.samples, tempo)) >= WINDOW:
+            sped = Audio(samples.astype(np.float32), audio.rate_hz)
+        varied, distortion = in_condition(sped, voices, rng)
         result.append(ConditionSpectrum(spectrum(varied, warp).astype(np.float16), tempo, distortion))
     return result
 
@@ -160,7 +164,9 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     Rooms are exponentially decaying noise, filters are smooth random curves or the band of a telephone. In one of five
     cases nothing is changed; nor is a recording without sound.
     """
-    samples, level = audio.samples.astype(float), _speech_power(audio)
+    samples, level = audio.samples.astype(float), 0.0
+    with suppress(InputError):  # a recording without sound
+        level = float(np.square(audio.samples[spoken_samples(audio)], dtype=float).mean())
     if level <= 0 or rng.random() < CLEAN_PROBABILITY:
         return audio, 0.0
     added = 0.0
@@ -190,27 +196,9 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     return Audio(samples.astype(np.float32), audio.rate_hz), float(np.clip(distortion, 0, 1))
 
 
-def _sped(audio: Audio, tempo: float) -> Audio:
-    """Return a recording played ``tempo`` times as fast: tempo, pitch and formants change together."""
-    if tempo == 1.0:
-        return audio
-    samples = _resampled(audio.samples, tempo)
-    if len(samples) < WINDOW:
-        return audio
-    return Audio(samples.astype(np.float32), audio.rate_hz)
-
-
 def _resampled(samples: NDArray[np.floating], factor: float) -> Samples:
     count = max(int(len(samples) / factor), 1)
     return np.interp(np.arange(count) * factor, np.arange(len(samples)), samples)
-
-
-def _speech_power(audio: Audio) -> float:
-    """Return the mean power over speech; 0 for a recording without sound."""
-    try:
-        return float(np.square(audio.samples[spoken_samples(audio)], dtype=float).mean())
-    except InputError:
-        return 0.0
 
 
 def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Samples:

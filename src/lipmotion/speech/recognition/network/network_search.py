@@ -105,9 +105,14 @@ def spoken_items(posteriors: PhonePosteriors) -> list[SpokenItem]:
     for word in decoded_words(english_words(), scored(posteriors)):
         found = posteriors.phones_between(word.first, word.end)
         variants = Lexicon().pronunciations(word.text) if word.text else (tuple(found),)
-        if variants[0]:
-            confidence = _confidence(posteriors, word.first, word.end, found, variants) if word.text else 0.0
-            items.append(SpokenItem(word.text, variants, confidence))
+        if not variants[0]:
+            continue
+        confidence = 0.0
+        if word.text:
+            sure = posteriors.mean_posterior(word.first, word.end)
+            agreement = max(1 - count_phone_edits(each, found) / max(len(each), len(found)) for each in variants)
+            confidence = float(1 / (1 + np.exp(-(AGREEMENT_WEIGHT * agreement + POSTERIOR_WEIGHT * sure + CONSTANT))))
+        items.append(SpokenItem(word.text, variants, confidence))
     return items
 
 
@@ -137,13 +142,3 @@ def phones_without_words(
 
 def _finds_phones(posteriors: PhonePosteriors) -> bool:
     return any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
-
-
-def _confidence(
-    posteriors: PhonePosteriors, first: int, end: int, found: list[str], variants: tuple[Pronunciation, ...]
-) -> float:
-    """Return the probability that a word is right, 0 to 1."""
-    sure = posteriors.mean_posterior(first, end)
-    agreement = max(1 - count_phone_edits(variant, found) / max(len(variant), len(found)) for variant in variants)
-    score = AGREEMENT_WEIGHT * agreement + POSTERIOR_WEIGHT * sure + CONSTANT
-    return float(1 / (1 + np.exp(-score)))
