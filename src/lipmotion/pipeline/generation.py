@@ -29,7 +29,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB, joined_units, placed_units
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
-from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE
+from lipmotion.speech.voices.espeak import MAPPED_CONFIDENCE
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChannelValue,

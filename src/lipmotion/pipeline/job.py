@@ -218,8 +218,7 @@ def write_outputs(
     speech, model, temporary : as of ``write``
     """
     from lipmotion.pipeline.outputs.motion_files import with_articulation
-    from lipmotion.pipeline.outputs.output import create_outputs
-    from lipmotion.pipeline.outputs.write import write_planned
+    from lipmotion.pipeline.outputs.output import create_outputs, write_planned
     from lipmotion.types import Audio
 
     if job.outputs.articulation:

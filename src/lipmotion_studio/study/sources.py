@@ -17,7 +17,7 @@ from lipmotion.formats.base import readable_suffixes
 from lipmotion.pipeline.job import Job, list_recordings, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
-from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.outputs.output import write
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion.storage.media import has_video, open_media

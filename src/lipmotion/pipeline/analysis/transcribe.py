@@ -36,7 +36,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
     WordEvidence,
     transcript_evidence,
 )
-from lipmotion.speech.voices.pronunciations import LanguageLexicon
+from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.phones import count_phone_edits

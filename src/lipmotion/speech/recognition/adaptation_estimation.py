@@ -15,8 +15,7 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.features.speaker_similarity import WARPS, SpeakerSimilarity, best_warp
 from lipmotion.speech.recognition.adaptation import Adaptation, identity_adaptation
-from lipmotion.speech.recognition.combined_phones import NOISES
-from lipmotion.speech.recognition.general import STREAMS, general_model
+from lipmotion.speech.recognition.general import NOISES, STREAMS, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser, own_model_weight
 from lipmotion.stats.constrained_mllr import (
     AffineStatistics,

@@ -14,7 +14,7 @@ from lipmotion.hmm.align import align_states, choose_pronunciations
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
-from lipmotion.speech.recognition.combined_phones import NOISES
+from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent

@@ -26,8 +26,7 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, speaker_similarity
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
-from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
-from lipmotion.speech.recognition.network.network_search import NetworkSearch, phones_without_words
+from lipmotion.speech.recognition.general import CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
     installed_phone_recogniser,
@@ -43,7 +42,13 @@ from lipmotion.speech.recognition.recognised_speech import (
     recognition_of,
     spliced,
 )
-from lipmotion.speech.recognition.word_search import WordSearch, begun_decoding, free_labels
+from lipmotion.speech.recognition.word_search import (
+    NetworkSearch,
+    WordSearch,
+    begun_decoding,
+    free_labels,
+    phones_without_words,
+)
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
