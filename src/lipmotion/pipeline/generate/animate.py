@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.edits import Edits, PinStep
+from lipmotion.pipeline.edits import CurveStep, Edits
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import Session
@@ -69,4 +69,4 @@ def animate(  # noqa: PLR0913
         session = file.session(request, model=model, workers=workers, monitor=monitor, background=background)
         edits = file.edits
     pins = constraints.pins if constraints else ()
-    return session.generate((edits or Edits()).then(*(PinStep(pin.channel, pin.value, pin.time_s) for pin in pins)))
+    return session.generate((edits or Edits()).then(*map(CurveStep, pins)))
