@@ -175,10 +175,10 @@ def is_live_link_file(path: Path) -> bool:
 
 def speech_curves(motion: Motion) -> Motion:
     """Return the curves that speech moves, without those of eyes, brows and head. Raises InputError: there are none."""
-    columns = [column for column, name in enumerate(motion.names) if name in SPEECH_CURVES]
-    if not columns:
+    names = [name for name in motion.names if name in SPEECH_CURVES]
+    if not names:
         raise InputError("none of its curves is one of mouth or jaw, required jawOpen, mouthClose, ...")
-    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+    return motion.selected(names)
 
 
 def read_curve_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:

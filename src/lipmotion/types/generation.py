@@ -433,9 +433,8 @@ class Generation:
     def selected(self, names: Sequence[str]) -> Generation:
         """Return the generation with some channels only, in the given order. Raises InputError: no such channel."""
         columns = [self.motion.column(name) for name in names]
-        channels = tuple(self.motion.channels[column] for column in columns)
-        motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
-        return replace(self, motion=motion, spread=self._change_channels(lambda rows: rows[:, columns]))
+        spread = self._change_channels(lambda rows: rows[:, columns])
+        return replace(self, motion=self.motion.selected(names), spread=spread)
 
     def with_motion(self, motion: Motion) -> Generation:
         """Return the generation with other motion; channels after its own have the variance 0."""

@@ -308,10 +308,13 @@ def build_speech(
     kind : of the recognition; of all but ``auto``, a phone recogniser has no part in it
     """
     inputs, audio = engine.inputs(), analysed(audio, features)
+
+    def rows(of: Callable[[AnalysedAudio], Any]) -> Any:
+        return of(audio) if audio.is_passage else audio.joined_rows(of)
+
     f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
-    spectrum: Any = None
-    if inputs.conditions:
-        spectrum = audio.spectrum if audio.is_passage else audio.joined_rows(lambda sound: sound.spectrum)
+    spectrum = rows(lambda sound: sound.spectrum) if inputs.conditions else None
+    encoding = rows(lambda sound: sound.encoding) if inputs.encoding else None
     network = network_of(kind) if inputs.posteriors else None
     posteriors = token_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
     parts = None
@@ -320,9 +323,6 @@ def build_speech(
             SpeechPart(first, own, build_speech(engine, sound, sound.mfcc(), Timeline(()), kind, each))
             for first, own, sound in audio.passages
         )
-    encoding: Any = None
-    if inputs.encoding:
-        encoding = audio.encoding if audio.is_passage else audio.joined_rows(lambda sound: sound.encoding)
     speech = Speech(
         features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts
     )

@@ -230,12 +230,12 @@ def check_rate(path: Path, rate_hz: float | None) -> None:
 def _make_curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
     """Return a set of curves, with those that the motion has already."""
     motion, units, is_arkit = generation.motion, generation.units, name in (ARKIT, WHOLE_FACE)
-    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == name == FAP]
+    faps = [channel.name for channel in motion.channels if channel.unit == name == FAP]
     shapes = _blendshapes(motion) if is_arkit else None
-    if shapes is None and not columns:
+    if shapes is None and not faps:
         return make_curves(motion, units, name, staging=staging, prosody=prosody)
     if shapes is None:
-        return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+        return motion.selected(faps)
     moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
     shown = join_channels(shapes, generation.selected(moods).motion) if moods else shapes
     mouth = make_curves(shown, units, ARKIT)  # the same weights, but where lips close that would not, and more of them
@@ -247,9 +247,7 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
     if name != WHOLE_FACE:
         return face
     living = compute_living_curves(with_mouth(motion), units, staging, prosody)
-    columns = [column for column, name in enumerate(living.names) if name not in face.names]
-    channels = tuple(living.channels[column] for column in columns)
-    return join_channels(face, Motion(living.values[:, columns], motion.rate_hz, channels))
+    return join_channels(face, living.selected([name for name in living.names if name not in face.names]))
 
 
 def _blendshapes(motion: Motion) -> Motion | None:

@@ -176,11 +176,17 @@ def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @cache
-def _filters(warp: float) -> NDArray[np.float32]:
-    """Return triangular filters, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
+def _filters(
+    warp: float, count: int = FILTERS, lowest_hz: float = 0.0, highest_hz: float = SPEECH_RATE_HZ / 2
+) -> NDArray[np.float32]:
+    """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, count)]."""
     bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
-    edges = np.linspace(0, mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
-    return triangles(bins, edges).astype(np.float32)
+    return triangles(bins, _edges(count, lowest_hz, highest_hz)).astype(np.float32)
+
+
+def _edges(count: int, lowest_hz: float, highest_hz: float) -> NDArray[np.float64]:
+    """Return where bands begin, are most sensitive, and end, in mel [shape=(count + 2,)]."""
+    return np.linspace(mel(np.array(lowest_hz)), mel(np.array(highest_hz)), count + 2)
 
 
 def triangles(bins: NDArray[np.floating[Any]], edges: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
@@ -212,7 +218,8 @@ def liftered_cosine(filters: int, first: int, end: int) -> NDArray[np.float32]:
     return (basis * (1 + LIFTER / 2 * np.sin(np.pi * order / LIFTER))).astype(np.float32)
 
 
-LOWEST_HZ, HIGHEST_HZ = 60.0, 7600.0
+BANDS = SPECTRUM_BANDS, 60.0, 7600.0
+"""The bands of spectra: their number, lowest and highest frequency in Hz."""
 DYNAMIC_RANGE_DB = 60.0
 """Powers are floored this far below the loudest of the recording: what is under the noise of most rooms is the same."""
 LEAST_DEVIATION = 1e-3
@@ -236,23 +243,11 @@ def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
 
 def log_bands(samples: NDArray[np.float32], warp: float = 1.0) -> NDArray[np.float32]:
     """Return the natural log power in ``SPECTRUM_BANDS`` mel bands, not normalised [shape=(T, 40)]; as ``spectrum``."""
-    return log_mel(samples, _band_filters(warp))
+    return log_mel(samples, _filters(warp, *BANDS))
 
 
 @cache
 def band_centres() -> NDArray[np.float64]:
     """Return the frequencies in Hz at which the bands of ``log_bands`` are most sensitive [shape=(40,)]."""
     hertz = np.arange(SPEECH_RATE_HZ / 2 + 1)
-    return np.interp(_edges()[1:-1], mel(hertz), hertz)
-
-
-def _edges() -> NDArray[np.float64]:
-    """Return where the bands begin, are most sensitive, and end, in mel [shape=(42,)]."""
-    return np.linspace(mel(np.array(LOWEST_HZ)), mel(np.array(HIGHEST_HZ)), SPECTRUM_BANDS + 2)
-
-
-@cache
-def _band_filters(warp: float) -> NDArray[np.float32]:
-    """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, 40)]."""
-    bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
-    return triangles(bins, _edges()).astype(np.float32)
+    return np.interp(_edges(*BANDS)[1:-1], mel(hertz), hertz)

@@ -43,10 +43,10 @@ from lipmotion.speech.recognition.recognised_speech import (
     spliced,
 )
 from lipmotion.speech.recognition.word_search import (
-    NetworkSearch,
     WordSearch,
     begun_decoding,
     free_labels,
+    network_words,
     phones_without_words,
 )
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
@@ -166,7 +166,7 @@ class Recogniser:
         loud = find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
-            parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
+            parts, recognised = network_words(hmm, log_likelihoods, loud, found)
         else:
             parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found), []
         labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))

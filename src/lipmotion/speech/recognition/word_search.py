@@ -199,10 +199,8 @@ class WordSearch:
         if not words:
             return [], []
         values = self.aligning.stretch(*stretch)
-        likelihoods = penalise_silence(self.hmm, wrap_log_likelihoods(values), self.loud[slice(*stretch)])
-        try:
-            aligned = align_recognised_words(self.hmm, likelihoods, words, DICTIONARY)
-        except AlignmentError:  # there is not room for them all
+        aligned = _align(self.hmm, values, self.loud[slice(*stretch)], words, DICTIONARY)
+        if aligned is None:
             return [], [LEAST_FIT] * len(words)
         fits, fit = aligned.fits(values, self.path[slice(*stretch)])
         believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
@@ -256,47 +254,39 @@ class SpokenItem:
     confidence: float
 
 
-@dataclass(frozen=True, eq=False)
-class NetworkSearch:
-    """The alignment of what a phone recogniser finds in one recording.
+def network_words(
+    hmm: UnitHmm, aligning: LogLikelihoods, loud: NDArray[np.bool_], found: Sequence[PosteriorStretch]
+) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
+    """Return the stretches in which a phone recogniser finds something, with their phones, and the words.
 
     aligning : log likelihoods of the recording for alignment
     loud     : frames that are too loud for silence [shape=(T,)]
+    Raises MissingDependencyError: the language model of the words is not installed.
     """
-
-    hmm: UnitHmm
-    aligning: LogLikelihoods
-    loud: NDArray[np.bool_]
-
-    def labels(self, found: Sequence[PosteriorStretch]) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
-        """Return the stretches in which something is said, with their phones, and the words.
-
-        Raises MissingDependencyError: the language model of the words is not installed.
-        """
-        parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
-        for stretch, posteriors in found:
-            items = spoken_items(posteriors)
-            if items:
-                parts += self._aligned(stretch, items, len(recognised))
-                recognised += [RecognisedWord(item.text, item.confidence) for item in items]
-        return parts, recognised
-
-    def _aligned(self, stretch: Stretch, items: list[SpokenItem], first_word: int) -> list[LabelledStretch]:
-        """Return the frames of a stretch with its phones; words are numbered from ``first_word`` on."""
-        values = wrap_log_likelihoods(self.aligning.stretch(*stretch))
-        likelihoods = penalise_silence(self.hmm, values, self.loud[slice(*stretch)])
+    parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
+    for stretch, posteriors in found:
+        items = spoken_items(posteriors)
+        lexicon = Lexicon({str(number): item.variants for number, item in enumerate(items)})
         names = [str(number) for number in range(len(items))]
-        lexicon = Lexicon({name: item.variants for name, item in zip(names, items, strict=True)})
-        try:
-            aligned = align_recognised_words(self.hmm, likelihoods, names, lexicon)
-        except AlignmentError:  # there is not room for them all
-            return []
-        parts = labels_of_words(aligned, stretch, np.ones(len(items), bool), first_word)
-        wordless = {first_word + number for number, item in enumerate(items) if not item.text}
-        return [
-            (frames, [label._replace(word=-1) if label.word in wordless else label for label in labels])
-            for frames, labels in parts
-        ]
+        aligned = _align(hmm, aligning.stretch(*stretch), loud[slice(*stretch)], names, lexicon) if items else None
+        if aligned is not None:
+            wordless = {len(recognised) + number for number, item in enumerate(items) if not item.text}
+            parts += [
+                (frames, [label._replace(word=-1) if label.word in wordless else label for label in labels])
+                for frames, labels in labels_of_words(aligned, stretch, np.ones(len(items), bool), len(recognised))
+            ]
+        recognised += [RecognisedWord(item.text, item.confidence) for item in items]
+    return parts, recognised
+
+
+def _align(
+    hmm: UnitHmm, values: NDArray[np.float32], loud: NDArray[np.bool_], words: Sequence[str], lexicon: Lexicon
+) -> AlignedWords | None:
+    """Return words as they are aligned with the log likelihoods of a stretch; None: there is not room for them all."""
+    try:
+        return align_recognised_words(hmm, penalise_silence(hmm, wrap_log_likelihoods(values), loud), words, lexicon)
+    except AlignmentError:
+        return None
 
 
 def spoken_items(posteriors: PhonePosteriors) -> list[SpokenItem]:

@@ -166,7 +166,7 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     """
     samples, level = audio.samples.astype(float), 0.0
     with suppress(InputError):  # a recording without sound
-        level = float(np.square(audio.samples[spoken_samples(audio)], dtype=float).mean())
+        level = _power(audio, spoken_samples(audio))
     if level <= 0 or rng.random() < CLEAN_PROBABILITY:
         return audio, 0.0
     added = 0.0

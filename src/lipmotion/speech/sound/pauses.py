@@ -30,11 +30,17 @@ def levels_db(audio: Audio) -> Array:
     """Return the smoothed level of every 10 ms [shape=(floor(duration / 0.01),)], dB of full scale."""
     from scipy.ndimage import uniform_filter1d
 
-    size = round(STEP_S * audio.rate_hz)
-    frames = audio.samples[: len(audio.samples) // size * size].reshape(-1, size)
-    power = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
-    levels: Array = 10 * np.log10(np.maximum(power, 10 ** (QUIETEST_DB / 10)))
+    levels: Array = 10 * np.log10(
+        np.maximum(mean_powers(audio.samples, round(STEP_S * audio.rate_hz)), 10 ** (QUIETEST_DB / 10))
+    )
     return uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
+
+
+def mean_powers(samples: NDArray[np.float32], size: int) -> Array:
+    """Return the mean square of every ``size`` samples [shape=(N // size,)]."""
+    frames = samples[: len(samples) // size * size].reshape(-1, size)
+    powers: Array = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
+    return powers
 
 
 def levels_db_at(audio: Audio, times_s: Array) -> Array:

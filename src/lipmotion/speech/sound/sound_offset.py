@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.speech.features.mfcc import regression_delta
+from lipmotion.speech.sound.pauses import STEP_S, mean_powers
 from lipmotion.types import Audio, Features
 
 CLAP, BEEP = "clap", "beep"
@@ -65,10 +66,8 @@ def sound_marks(audio: Audio) -> tuple[SoundMark, ...]:
 def _claps(audio: Audio) -> list[SoundMark]:
     from scipy.ndimage import maximum_filter1d
 
-    size = round(CLAP_STEP_S * audio.rate_hz)
     sharp = np.diff(audio.samples, prepend=audio.samples[:1])  # claps are brighter than speech
-    sharp = sharp[: len(sharp) // size * size].reshape(-1, size)
-    power = np.einsum("ts,ts->t", sharp, sharp, dtype=np.float64) / size
+    power = mean_powers(sharp, round(CLAP_STEP_S * audio.rate_hz))
     before, rise = round(BEFORE_S / CLAP_STEP_S), round(RISE_S / CLAP_STEP_S)
     early, late = (round(time_s / CLAP_STEP_S) for time_s in DECAY_S)
     if len(power) < before + late + 1:
@@ -135,8 +134,6 @@ def _strongest(frames: NDArray[np.intp], strength: Array, apart: float) -> list[
 Array = NDArray[np.float64]
 
 ALIKE = "the sound of both"
-STEP_S = 0.01
-"""Distance of the levels that are compared."""
 LEAST_OVERLAP_SHARE = 0.5
 """Share of the shorter recording that the other one must cover, where levels are compared."""
 SAME_S = 0.03
@@ -246,11 +243,9 @@ class _Likeness:
 
 def _levels(audio: Audio) -> Array:
     """Return the level of every 10 ms, without what is quieter than the quiet tenth [shape=(N,)]."""
-    size = round(STEP_S * audio.rate_hz)
-    frames = audio.samples[: len(audio.samples) // size * size].reshape(-1, size)
-    if not len(frames):
+    power = mean_powers(audio.samples, round(STEP_S * audio.rate_hz))
+    if not len(power):
         raise InputError(f"{audio.duration_s * 1000:.0f} ms of sound, required more than {STEP_S * 1000:.0f}")
-    power = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
     levels = np.log10(power + 1e-10)
     levels = np.maximum(levels, np.percentile(levels, 10))
     return levels - levels.mean()
