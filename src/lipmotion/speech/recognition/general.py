@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.hmm.log_likelihoods import DensitySelection, LogLikelihoods
 from lipmotion.hmm.model import StateTable, UnitHmm
+from lipmotion.hmm.network import DensitySelection, LogLikelihoods
 from lipmotion.speech.features.mfcc import FFT_SIZE, checked_samples, liftered_cosine, log_mel, triangles
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.stats.bigram import Bigram

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.align import align_states, choose_pronunciations
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
+from lipmotion.hmm.network import LogLikelihoods
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.sound.voice_activity import Stretch
