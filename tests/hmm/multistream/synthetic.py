@@ -19,7 +19,7 @@ from lipmotion.hmm.multistream.streams import (
     MOTION,
     SPEECH,
     STREAMS,
-    Stream,
+    ObservedStream,
     StreamObservations,
     stream_observations,
 )
@@ -48,7 +48,7 @@ def observed(draw: np.random.Generator, frames: int, streams=STREAMS) -> StreamO
     found = {}
     for name in streams:
         known = draw.random(frames) < (1.0 if name == SPEECH else 0.7)
-        found[name] = Stream(draw.normal(0, 1.5, (frames, DIMENSIONS[name])) * known[:, None], known)
+        found[name] = ObservedStream(draw.normal(0, 1.5, (frames, DIMENSIONS[name])) * known[:, None], known)
     return StreamObservations(found)
 
 

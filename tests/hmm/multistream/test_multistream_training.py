@@ -20,7 +20,7 @@ from lipmotion.hmm.multistream.multistream_training import (
     train_joint,
 )
 from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, Stream, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.types import Progress
 from oracles import chains
 from oracles import joint as slow
@@ -129,7 +129,7 @@ def test_a_stream_counts_as_much_as_its_weight(usual):
             frames = min(utterance.observed.frames, other.observed.frames)
             mixed = {name: of.observed.streams[name] for name, of in
                      [("speech", utterance), *((stream, other) for stream in F0_STREAMS)]}  # fmt: skip
-            cut = {name: Stream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()}
+            cut = {name: ObservedStream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()}
             said = [s.unit for s in recogniser.recognise(StreamObservations(cut))]
             count += sum(a == b for a, b in zip(said, utterance.units, strict=False))
         right.append(count)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.streams import Stream, StreamObservations, StreamWeights, stream_observations
+from lipmotion.hmm.multistream.streams import ObservedStream, StreamObservations, StreamWeights, stream_observations
 
 NAN = float("nan")
 
@@ -37,7 +37,7 @@ def test_what_does_not_fit_is_refused():
         with pytest.raises(InputError):
             stream_observations(np.zeros((5, 3)), **given)
     with pytest.raises(InputError, match="required speech"):
-        StreamObservations({"motion": Stream(np.zeros((3, 3)), np.ones(3, bool))})
+        StreamObservations({"motion": ObservedStream(np.zeros((3, 3)), np.ones(3, bool))})
     for weight in (-0.1, NAN, float("inf")):
         with pytest.raises(InputError, match="f0_slope"):
             StreamWeights(f0_slope=weight)

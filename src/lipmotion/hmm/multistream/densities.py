@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.multistream.streams import Stream
+from lipmotion.hmm.multistream.streams import ObservedStream
 from lipmotion.stats.mixture import LOG_2PI, Mixtures, QuadraticForm
 
 MIN_FRAMES = 2.0
@@ -33,7 +33,7 @@ class StreamScale:
     mean: Array
     deviation: Array
 
-    def standardise(self, stream: Stream) -> Floats:
+    def standardise(self, stream: ObservedStream) -> Floats:
         """Return the frames of a stream in the form that its densities take [shape=(T, 2 + 2·D)]."""
         values = (stream.values - self.mean) / self.deviation
         known = stream.known[:, None]
@@ -192,7 +192,7 @@ def make_standard_normals(densities: int, dimensions: int, has_spaces: bool, voi
     return TiedDensities(mixtures, np.full(densities, share) if has_spaces else None)
 
 
-def fit_scale(streams: list[Stream]) -> tuple[StreamScale, float]:
+def fit_scale(streams: list[ObservedStream]) -> tuple[StreamScale, float]:
     """Return the scale of a stream over all utterances, and the share of its frames that have a value."""
     known = np.concatenate([stream.values[stream.known] for stream in streams]).astype(float)
     dimensions = known.shape[1]

@@ -43,7 +43,7 @@ class StreamWeights:
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
+class ObservedStream:
     """One kind of data of an utterance [shape=(T, D)], and which frames have a value, or are voiced [shape=(T,)]."""
 
     values: NDArray[np.floating[Any]]
@@ -57,7 +57,7 @@ class StreamObservations:
     Raises InputError: no speech, an unknown stream, streams of different lengths, or known values that are not finite.
     """
 
-    streams: Mapping[str, Stream]
+    streams: Mapping[str, ObservedStream]
 
     def __post_init__(self) -> None:
         if SPEECH not in self.streams or not set(self.streams) <= set(STREAMS):
@@ -96,7 +96,7 @@ def stream_observations(
     that of the frames, or a measured value that is not finite.
     """
     speech = np.asarray(speech)
-    streams = {SPEECH: Stream(speech, np.ones(len(speech), bool))}
+    streams = {SPEECH: ObservedStream(speech, np.ones(len(speech), bool))}
     if log_f0 is not None:
         pitch: NDArray[np.float64] = np.asarray(log_f0, np.float64)
         if pitch.ndim != 1 or np.isinf(pitch).any():
@@ -107,7 +107,7 @@ def stream_observations(
         dynamics = with_dynamics(np.where(voiced, pitch, 0.0)[:, None])
         masks = (voiced, *[mark_known_dynamics(voiced)] * 2)
         for window, (name, mask) in enumerate(zip(F0_STREAMS, masks, strict=True)):
-            streams[name] = Stream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
+            streams[name] = ObservedStream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
     if motion is not None:
         values: NDArray[np.float64] = np.asarray(motion, np.float64)
         seen = np.ones(len(values), bool) if measured is None else np.asarray(measured)
@@ -119,5 +119,5 @@ def stream_observations(
             )
         known = mark_known_dynamics(np.asarray(seen, bool))
         dynamics = with_dynamics(np.where(seen[:, None], values, 0.0)).reshape(len(values), -1)
-        streams[MOTION] = Stream(np.where(known[:, None], dynamics, 0.0), known)
+        streams[MOTION] = ObservedStream(np.where(known[:, None], dynamics, 0.0), known)
     return StreamObservations(streams)
