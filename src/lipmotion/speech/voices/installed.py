@@ -229,21 +229,12 @@ def nothing_installed() -> MissingDependencyError:
     )
 
 
-def speak_sentence(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> tuple[Audio, Timeline[Unit]]:
-    """Return a sentence in a voice: the sound at 16 kHz, and its phones in time, from 0 s to its end.
-
-    lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
-    Raises the errors of ``speak_sentences``.
-    """
-    with closing(speak_sentences([text], voice, lexicon)) as sentences:
-        return next(sentences)
-
-
 def speak_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
 ) -> Generator[tuple[Audio, Timeline[Unit]], None, None]:
-    """Yield several sentences in a voice, as of ``speak_sentence``; where possible, one run of the program makes all.
+    """Yield sentences in a voice, each with its phones in time, from 0 s to its end; one run makes all where it can.
 
+    lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
     Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
     """
