@@ -27,7 +27,7 @@ from lipmotion.meshes.model.mesh import (
     bone_kind,
     merge_bones,
 )
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from meshes.gltf import POSITIONS, document, glb
 from meshes.heads import SEAM, head, lip_points, shaped, write_glb
 from meshes.obj_writing import write_obj

@@ -12,7 +12,7 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion_faces.base import stage_liveliness
 from lipmotion_faces.head.pose import head_poses

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.features.spectrum import spectrum
+from lipmotion.speech.features.mfcc import spectrum
 from lipmotion.speech.sound.acoustic_conditions import condition_spectra, in_condition
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import SPECTRUM_BANDS, Audio

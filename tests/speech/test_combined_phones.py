@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from lipmotion import Model
-from lipmotion.speech.recognition import combined_phones as module
-from lipmotion.speech.recognition.combined_phones import NOISES, combine_phones, combined_log_likelihoods
-from lipmotion.speech.recognition.general.acoustic import general_model
+from lipmotion.speech.recognition import general as module
+from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
 from lipmotion.units import PHONES, SILENCE
 
 

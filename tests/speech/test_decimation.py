@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.signal import resample_poly
 
-from lipmotion.speech.sound import decimation
-from lipmotion.speech.sound.decimation import decimated
+from lipmotion.speech.sound import resampling
+from lipmotion.speech.sound.resampling import decimated
 
 
 def test_it_is_what_scipy_computes():
@@ -25,5 +25,5 @@ def test_a_sound_at_the_same_rate_stays():
 def test_blocks_make_no_difference(length: int, monkeypatch: pytest.MonkeyPatch) -> None:
     sound = np.random.default_rng(7).normal(0, 0.1, length).astype(np.float32)
     whole = decimated(sound, 3)
-    monkeypatch.setattr(decimation, "BLOCK", 50)
+    monkeypatch.setattr(resampling, "KEPT_BLOCK", 50)
     assert decimated(sound, 3) == pytest.approx(whole, abs=1e-7)

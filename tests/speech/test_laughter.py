@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from lipmotion.speech.features.laughter import risen_peaks
+from lipmotion.speech.features.voice_events import risen_peaks
 
 
 @pytest.mark.parametrize("prominence", [0.1, 1.0, 3.0])

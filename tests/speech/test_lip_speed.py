@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.speech.features.lip_speed import (
+from lipmotion.speech.sound.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     measured_opening_speed,

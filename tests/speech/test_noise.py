@@ -9,7 +9,14 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.noise import NOISE_KINDS, add_noise, babble_noise, noisy_audio, spoken_samples, white_noise
+from lipmotion.speech.sound.acoustic_conditions import (
+    NOISE_KINDS,
+    add_noise,
+    babble_noise,
+    noisy_audio,
+    spoken_samples,
+    white_noise,
+)
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Audio
 from oracles.noise import ratio_db

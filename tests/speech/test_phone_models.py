@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.speech.recognition.phone_models import train_phone_models
+from lipmotion.pipeline.training.train import train_phone_models
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PAUSE, SILENCE, Lexicon

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.speech.features.prosody import prosody_of
+from lipmotion.speech.features.f0 import prosody_of
 from lipmotion.types import Audio
 
 

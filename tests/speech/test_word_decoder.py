@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.speech.recognition import word_decoder
-from lipmotion.speech.recognition.word_decoder import is_filler, words_in
+from lipmotion.speech.recognition import word_search
+from lipmotion.speech.recognition.word_search import is_filler, words_in
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
 from lipmotion.types import Audio
@@ -54,10 +54,10 @@ def test_fillers() -> None:
 
 
 def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(word_decoder, "find_english_data", lambda: tmp_path)
-    word_decoder._decoder.cache_clear()
+    monkeypatch.setattr(word_search, "find_english_data", lambda: tmp_path)
+    word_search._decoder.cache_clear()
     try:
         with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):
             words_in(b"")
     finally:
-        word_decoder._decoder.cache_clear()
+        word_search._decoder.cache_clear()

@@ -11,8 +11,7 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.recognition.word_decoder import FoundWord
-from lipmotion.speech.recognition.word_search import score_words
+from lipmotion.speech.recognition.word_search import FoundWord, score_words
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.storage.archive import array_in, check_archive
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint, array_in, check_archive
 
 
 def test_an_array_comes_back() -> None:

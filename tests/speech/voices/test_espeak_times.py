@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lipmotion.speech.voices.espeak_times import corrected_phone_times
+from lipmotion.speech.voices.espeak import corrected_phone_times
 from lipmotion.types import Audio
 
 RATE_HZ = 16_000

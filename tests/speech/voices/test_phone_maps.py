@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lipmotion.speech.voices.phone_maps import complete_map
+from lipmotion.speech.voices.synthesiser import complete_map
 
 
 def test_unknown_letters_are_reported_once() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.voices import espeak
-from lipmotion.speech.voices.pronunciations import LanguageLexicon
+from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types.languages import ENGLISH, LANGUAGES
 from lipmotion.units import PHONES
 
