@@ -22,9 +22,9 @@ LANGUAGES = {"sh": "sh", "py": "python", "python": "python"}
 COMMAND = re.compile(r"(?:lipmotion|python|make|pip|ffmpeg|dask|export) ")
 
 
-def settings() -> ModuleType:
-    """Return the settings of the site, which do not need Sphinx."""
-    spec = importlib.util.spec_from_file_location("site_settings", ROOT / "docs" / "conf.py")
+def module_at(path: str) -> ModuleType:
+    """Return a module of the repository that is in no package; the settings of the site do not need Sphinx."""
+    spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -32,7 +32,7 @@ def settings() -> ModuleType:
     return module
 
 
-SETTINGS = settings()
+SETTINGS = module_at("docs/conf.py")
 
 
 def pages() -> list[str]:

@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
-from pathlib import Path
-from types import ModuleType
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from docs.site_pages import ROOT, module_at
+
 RESULTS = ROOT / "docs" / "results"
 PAGE = RESULTS / "mouth.md"
 TABLE = {"commit": "abc1234", "date": "2026-11-23", "model": "shipped 00000000", "command": "make bench"}
 TABLES = {"gap": {**TABLE, "columns": ["", "now"], "rows": [["opening", "0.256"]]}}
 SHEET = {"page": "results/mouth.md", "tables": TABLES, "stated": ["the aim was 3.5 %"]}
-
-
-def script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-FIGURES, REFERENCE = script("figures_page"), script("reference_pages")
+FIGURES, REFERENCE = module_at("scripts/figures_page.py"), module_at("scripts/reference_pages.py")
 
 
 def test_pages_show_what_their_sheets_hold() -> None:

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,18 +10,6 @@ from lipmotion_lab import baselines as network
 from lipmotion_lab.baselines import BlstmBaseline, FrameRegressionModel
 
 pytest.importorskip("torch", reason="the extra 'network' is not installed")
-
-
-@pytest.fixture(scope="module")
-def examples() -> list[Example]:
-    """Sentences whose last frames are not valid, and have wrong values."""
-    made = []
-    for one in sentences(12):
-        valid = one.valid.copy()
-        valid[-8:] = False
-        one.motion.values[-8:] = 9
-        made.append(replace(one, valid=valid))
-    return made
 
 
 @pytest.fixture(scope="module")
