@@ -35,6 +35,7 @@ from lipmotion.live.network import (
     WEIGHTS,
     BandMeans,
     SoundFeatures,
+    silent_step,
 )
 from lipmotion.meshes.fitting.shape_weights import viseme_curves
 from lipmotion.meshes.model.shape_names import VISEMES_15
