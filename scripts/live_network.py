@@ -15,14 +15,28 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion import Corpus, Request, animate, load_model
-from lipmotion.live.network import LAGS, OUTPUTS, SHAPE, SILENT_STEP, STEP_FRAMES, STEP_S, WEIGHTS, SoundFeatures
+from lipmotion.live.network import (
+    LAGS,
+    OUTPUTS,
+    RANGE,
+    SHAPE,
+    SPEECH_RANGE,
+    STEP_FRAMES,
+    STEP_S,
+    WEIGHTS,
+    BandMeans,
+    SoundFeatures,
+    silent_step,
+)
 from lipmotion.meshes.fitting.shape_weights import viseme_curves
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS, measure_articulators
@@ -33,14 +47,14 @@ from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.acoustic_conditions import in_condition
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
-from lipmotion.types import Audio, Motion, Timeline, Unit
+from lipmotion.types import SPECTRUM_BANDS, Audio, Motion, Timeline, Track, Unit
 
 OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
 VOICES = [
     *(["flite", "-voice", name, "-o", "{file}", "-t", "{text}"] for name in ("kal", "awb", "rms", "slt", "kal16")),
     *(
         ["espeak-ng", "-v", name, "-w", "{file}", "{text}"]
-        for name in ("en-us", "en-gb", "en-us+f2", "en-gb+m3", "en-us+f4", "en-gb-scotland+m7")
+        for name in ("en-us", "en-gb", "en-us+f2", "en-gb+m3", "en-us+f4", "en-gb-scotland+m7", "en-us+f5", "en-us+m1")
     ),
     *(
         ["text2wave", "-eval", f"(voice_{name})", "-o", "{file}", "{page}"]
@@ -48,12 +62,13 @@ VOICES = [
     ),
 ]
 SOUNDS = (".flac", ".wav", ".opus", ".mp3")
-SILENCE_S, LONGEST_S = 0.8, 20.0
+SILENCE_S, LEAST_S, LONGEST_S = 0.8, 1.2, 20.0
 """Silence after every recording, in which the mouth comes to rest; and how much of a long one is used."""
 GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 4
 """What is heard: as loud as is drawn, as it is, by other vocal tracts, and half of the time in a condition."""
 VISEME_SCALE = 3.0
 """What is said is learned with deviations about as large as those of the motion."""
+MICROPHONE_DB, MICROPHONE_KNOTS = 4.0, 6
 LARGEST_GAIN, CURVE_CLIPS = 1.6, 40
 PIECE_STEPS, HELD_OUT = 250, 20
 """Steps of a piece for training; and one in so many recordings measures the errors instead."""
@@ -70,7 +85,9 @@ def main() -> None:
     parser.add_argument("voices", type=Path)
     parser.add_argument("text", type=Path)
     parser.add_argument("--split", default="train")
+    parser.add_argument("--prompts", type=Path, help="folder of recorded sentences, G.722 (asterisk-core-sounds-en)")
     parser.add_argument("--minutes", type=float, default=20.0, help="of synthetic speech")
+    parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--steps", type=int, default=2400, help="of the optimiser")
     parser.add_argument("--keep", type=Path, help="a file that keeps what was prepared")
     parser.add_argument("--output", type=Path, default=OUTPUT)
@@ -82,8 +99,9 @@ def main() -> None:
         if options.keep is not None:
             options.keep.write_bytes(pickle.dumps(lessons))
     print(f"{len(lessons)} recordings, {sum(len(targets) for targets, _ in lessons) * STEP_S / 60:.1f} minutes")
+    typical = measure_bands(lessons)
     sequences = [
-        [shift(rows, targets) for rows in versions]
+        [shift(hear(levels, typical, (number, version)), targets, typical) for version, levels in enumerate(versions)]
         for number, (targets, versions) in enumerate(lessons)
         if number % HELD_OUT
     ]
@@ -107,7 +125,7 @@ def main() -> None:
     rounded = SHAPE.from_arrays(arrays, len(LAGS) * OUTPUTS)
     count, predicted, wanted = len(ARTICULATORS), [], []
     for number, (targets, versions) in enumerate(lessons[::HELD_OUT]):
-        sequence = shift(versions[number % VERSIONS], targets)
+        sequence = shift(hear(versions[number % VERSIONS], typical, ()), targets, typical)
         for rows, kept in ((rounded(sequence.inputs), predicted), (sequence.targets / output_scale(), wanted)):
             kept.append(rows[: len(targets)].reshape(-1, len(LAGS), OUTPUTS)[:, :, :count])
     people = np.concatenate([np.diff(targets[:, :count], 2, axis=0) for targets, _ in lessons])
@@ -115,6 +133,7 @@ def main() -> None:
     arrays["variances"] = np.square(guesses - truth).mean(axis=0)
     arrays["acceleration"] = np.square(people).mean(axis=0)
     arrays["gains"] = np.clip(truth.std(axis=0) / guesses.std(axis=0), 1, LARGEST_GAIN)
+    arrays["typical"] = typical.astype(float)
     arrays["curves"] = fit_curves(load_model(), Corpus.open(options.corpus))
     correlations = [
         [float(np.corrcoef(guesses[:, lag, n], truth[:, lag, n])[0, 1]) for n in range(count)]
@@ -145,10 +164,29 @@ def output_scale() -> Array:
     return np.tile([*np.ones(len(ARTICULATORS)), *np.full(len(VISEMES_15), VISEME_SCALE)], len(LAGS)).astype(np.float32)
 
 
-def shift(inputs: Array, targets: Array) -> TrainingSequence:
+def measure_bands(lessons: list[Lesson]) -> Array:
+    """Return the mean of every band in speech, relative to the level [shape=(40,)]."""
+    rows = np.concatenate([versions[0] for _, versions in lessons]).astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
+    mean: Array = rows[rows[:, -1] > -SPEECH_RANGE, :-1].mean(axis=0)
+    return mean
+
+
+def hear(levels: Array, typical: Array, seed: tuple[int, ...]) -> Array:
+    """Return the features of every step [shape=(N, 82)], through a microphone that is drawn; seed (): a flat one."""
+    rows = levels.astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
+    if seed:
+        rng = np.random.default_rng(seed)
+        knots = rng.normal(0, MICROPHONE_DB / 10 * np.log(10), MICROPHONE_KNOTS)
+        tone = np.interp(np.linspace(0, 1, SPECTRUM_BANDS), np.linspace(0, 1, MICROPHONE_KNOTS), knots)
+        rows = np.maximum(rows + np.append(tone, 0).astype(np.float32), -RANGE)
+    bands = BandMeans(typical)
+    return np.stack([bands.push(row) for row in rows]).reshape(len(levels), -1)
+
+
+def shift(inputs: Array, targets: Array, typical: Array) -> TrainingSequence:
     """Return inputs, after the silence that the network begins with, with the targets of all lags, each as late."""
     reach, steps = sum(SHAPE.dilations), len(inputs)
-    heard = np.concatenate([np.tile(SILENT_STEP, (reach, 1)), inputs])
+    heard = np.concatenate([np.tile(silent_step(typical), (reach, 1)), inputs])
     wanted = np.clip(np.arange(len(heard))[:, None] - np.array(LAGS), 0, steps - 1)
     rows = targets[wanted].reshape(len(heard), -1) * output_scale()
     return TrainingSequence(heard, rows, np.arange(len(heard)) < steps)
@@ -164,19 +202,34 @@ def cut(whole: TrainingSequence, start: int) -> TrainingSequence:
 
 def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     """Yield the lessons of all recordings."""
-    model, corpus = load_model(), Corpus.open(options.corpus)
-    sounds = {path.stem: read_audio(path) for path in sorted(options.voices.iterdir()) if path.suffix in SOUNDS}
-    babble = list(sounds.values())
-    for number, name in enumerate(corpus.names(options.split)[::2]):
+    corpus = Corpus.open(options.corpus)
+    sounds = [read_audio(path) for path in sorted(options.voices.iterdir()) if path.suffix in SOUNDS]
+    jobs: list[tuple[Audio, Track | None, str | None]] = []
+    for name in corpus.names(options.split)[::2]:
         utterance = corpus.utterance(name)
-        result = animate(Request(utterance.audio, transcript=" ".join(utterance.words or ())), model=model)
-        motion, _ = resample_track(utterance.track, len(result.motion.values))
-        values = motion.values - motion.values.mean(axis=0) + result.motion.values.mean(axis=0)  # the pose is not heard
-        yield make_lesson(model, utterance.audio, replace(motion, values=values), result.units, babble, number)
-    spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in babble]
-    for number, audio in enumerate([*spoken, *synthesise(options.text, options.minutes)], 10_000):
-        result = animate(Request(audio), model=model)
-        yield make_lesson(model, audio, result.motion, result.units, babble, number)
+        jobs.append((utterance.audio, utterance.track, " ".join(utterance.words or ())))
+    prompts = [read_audio(path) for path in sorted(options.prompts.glob("*.g722"))[::2]] if options.prompts else []
+    spoken = [audio for audio in (*sounds, *prompts) if audio.duration_s > LEAST_S]
+    spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
+    jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
+    with ProcessPoolExecutor(options.workers) as pool:
+        yield from pool.map(partial(teach, babble=sounds), jobs, range(len(jobs)), chunksize=8)
+
+
+def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list[Audio]) -> Lesson:
+    """Return the lesson of a recording: of its measured motion, where there is a track, else of what ``animate`` makes.
+
+    job : the recording, its track, its words
+    """
+    audio, tracked, words = job
+    model = load_model()
+    result = animate(Request(audio, transcript=words), model=model)
+    motion = result.motion
+    if tracked is not None:
+        measured, _ = resample_track(tracked, len(motion.values))
+        values = measured.values - measured.values.mean(axis=0) + motion.values.mean(axis=0)  # the pose is not heard
+        motion = replace(measured, values=values)
+    return make_lesson(model, audio, motion, result.units, babble, number)
 
 
 def synthesise(folder: Path, minutes: float) -> Iterator[Audio]:
@@ -219,7 +272,9 @@ def make_lesson(
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if number else 1.0
         gain = np.float32(10 ** (rng.uniform(*GAIN_DB) / 20))
         samples = np.pad(heard.samples * gain, (0, WINDOW))
-        rows = np.stack(SoundFeatures(warp).push(samples))[: steps * STEP_FRAMES]
+        rows = np.stack(SoundFeatures(np.zeros(SPECTRUM_BANDS, np.float32), warp).list_levels(samples))[
+            : steps * STEP_FRAMES
+        ]
         versions.append(rows.reshape(steps, -1).astype(np.float16))
     return targets, versions
 

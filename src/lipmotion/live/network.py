@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.network_steps import ConvolutionalShape
-from lipmotion.speech.features.mfcc import FFT_SIZE, HOP, WINDOW
-from lipmotion.speech.features.spectrum import band_filters
+from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS
@@ -46,29 +45,36 @@ ATTACK = 0.25
 """Share of a frame in the power that raises the level: a click does not count as loud speech."""
 RANGE = 14.0
 """Powers are floored so far below the level, 60 dB."""
+SPEECH_RANGE = 7.0
+"""Frames down to 30 dB under the level are speech, and teach how each band sounds in it."""
+KNOWN_FRAMES, REMEMBERED_FRAMES = 40, 300
+"""So many frames of speech the typical spectrum counts, to begin with; and so many are remembered."""
 SCALE = 4.0
-SILENT_STEP = np.full(STEP_FRAMES * (SPECTRUM_BANDS + 1), -RANGE / 2 / SCALE, np.float32)
-"""The features of a step of silence."""
 
 
 class SoundFeatures:
-    """The log mel spectrum of sound as it comes, relative to how loud speech has been.
+    """The log mel spectrum of sound as it comes, relative to how loud speech has been, and to how each band sounds.
 
     Samples are at 16 kHz, full scale 1. Frames are computed one by one: how the sound is cut into pieces changes no
     bit. Frame n is heard when 25 ms around 10 · n ms have come; before the sound there is silence.
+    typical : the mean of every band in speech, relative to the level [shape=(40,)]
     """
 
-    def __init__(self, warp: float = 1.0) -> None:
+    def __init__(self, typical: Array, warp: float = 1.0) -> None:
         self._pending = np.zeros(WINDOW // 2 + 1, np.float32)
-        self._filters = band_filters(warp)
+        self._filters = mel_filters(warp, *BANDS)
         self._window = np.hamming(WINDOW).astype(np.float32)
-        self.level, self._power = START_LEVEL, 0.0
+        self._level, self._power = START_LEVEL, 0.0
+        self._bands = BandMeans(typical)
 
     def push(self, samples: Array) -> list[Array]:
         """Return the features of every frame that is complete [each shape=(41,)]."""
+        return [self._bands.push(row) for row in self.list_levels(samples)]
+
+    def list_levels(self, samples: Array) -> list[Array]:
+        """Return bands and the whole of every frame that is complete, relative to the level [each shape=(41,)]."""
         self._pending = np.concatenate([self._pending, samples])
-        rows = []
-        start = 0
+        rows, start = [], 0
         while start + WINDOW < len(self._pending):
             rows.append(self._frame(self._pending[start : start + WINDOW + 1]))
             start += HOP
@@ -80,20 +86,43 @@ class SoundFeatures:
         powers = (np.square(spectrum.real) + np.square(spectrum.imag)).astype(np.float32) @ self._filters
         total = float(powers.sum()) + 1e-12
         self._power += ATTACK * (total - self._power)
-        self.level = max(self.level - FALL, QUIETEST_LEVEL, float(np.log(self._power)))
-        row = np.empty(SPECTRUM_BANDS + 1, np.float32)
-        row[:-1] = (np.maximum(np.log(powers + 1e-12) - self.level, -RANGE) + RANGE / 2) / SCALE
-        row[-1] = (max(float(np.log(total)) - self.level, -RANGE) + RANGE / 2) / SCALE
-        return row
+        self._level = max(self._level - FALL, QUIETEST_LEVEL, float(np.log(self._power)))
+        row = np.log(np.append(powers + np.float32(1e-12), np.float32(total))) - np.float32(self._level)
+        result: Array = np.maximum(row, np.float32(-RANGE))
+        return result
+
+
+class BandMeans:
+    """Bands relative to their means in the speech that was heard: microphones and rooms differ in these.
+
+    typical : the means that are assumed before anything is heard [shape=(40,)]
+    """
+
+    def __init__(self, typical: Array) -> None:
+        self._means, self._frames = typical.astype(np.float32), KNOWN_FRAMES
+
+    def push(self, row: Array) -> Array:
+        """Return the features of a frame [shape=(41,)], from its levels, which also change the means."""
+        if row[-1] > -SPEECH_RANGE:
+            self._frames = min(self._frames + 1, REMEMBERED_FRAMES)
+            self._means = self._means + (row[:-1] - self._means) / np.float32(self._frames)
+        result: Array = np.append(row[:-1] - self._means, row[-1] + np.float32(SPEECH_RANGE)) / np.float32(SCALE)
+        return result
+
+
+def silent_step(typical: Array) -> Array:
+    """Return the features of a step of silence before any speech [shape=(82,)]."""
+    silent = np.full(SPECTRUM_BANDS + 1, -RANGE, np.float32)
+    return np.tile(BandMeans(typical).push(silent), STEP_FRAMES)
 
 
 class CausalSteps:
     """A convolutional network that is run step by step: each layer keeps the inputs that it will still need.
 
-    It begins after as much silence as it hears.
+    It begins after as much silence as it hears: steps of ``silent`` [shape=(82,)].
     """
 
-    def __init__(self, network: ConvolutionalNetwork) -> None:
+    def __init__(self, network: ConvolutionalNetwork, silent: Array) -> None:
         self._network = network
         widths = [len(layer.weights) // 3 for layer in network.layers]
         self._waiting = [
@@ -102,7 +131,7 @@ class CausalSteps:
         ]
         self._steps = 0
         for _ in range(network.reach):
-            self.push(SILENT_STEP)
+            self.push(silent)
 
     def push(self, inputs: Array) -> Array:
         """Return the answers of this step: the network's outputs where it has heard all of it."""
@@ -129,6 +158,7 @@ class LiveNetwork(NamedTuple):
     variances    : of the error of each articulator at each lag [shape=(5, 8)]
     acceleration : variance of the second difference of each articulator from step to step, in people [shape=(8,)]
     gains        : what makes the movements of each articulator at each lag as large as people's [shape=(5, 8)]
+    typical      : the mean of every band of the sound in speech, relative to its level [shape=(40,)]
     curves       : from 1, articulators and visemes to ARKit's weights of the mouth [shape=(24, 28)]
     """
 
@@ -136,6 +166,7 @@ class LiveNetwork(NamedTuple):
     variances: NDArray[np.float64]
     acceleration: NDArray[np.float64]
     gains: NDArray[np.float64]
+    typical: NDArray[np.float64]
     curves: NDArray[np.float64]
 
 

@@ -17,13 +17,13 @@ from lipmotion.errors import InputError
 from lipmotion.live.network import (
     HEARD_S,
     LAGS,
-    SILENT_STEP,
     STEP_FRAMES,
     STEP_S,
     CausalSteps,
     LiveNetwork,
     SoundFeatures,
     live_network,
+    silent_step,
 )
 from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
@@ -47,7 +47,7 @@ CLOSING_STEPS = 2
 """Steps in which they close, or open, at most: 40 ms. What is seen late closes as fast."""
 TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
-CORRELATED_STEPS = 3.0
+CORRELATED_STEPS = 0.05
 """The network's errors are alike for about so many steps."""
 KEPT_STEPS = LAGS[-1] + 3
 LOWEST_RATE_HZ, HIGHEST_RATE_HZ = 4_000, 384_000
@@ -184,7 +184,9 @@ class Stream:
     def _listen(self) -> None:
         """Begin to hear, as after silence."""
         self._resampler = _Resampler(self.sample_rate)
-        self._features, self._steps = SoundFeatures(), CausalSteps(live_network().network)
+        network = live_network()
+        self._features = SoundFeatures(network.typical.astype(np.float32))
+        self._steps = CausalSteps(network.network, silent_step(network.typical.astype(np.float32)))
         self._rows: list[NDArray[np.float32]] = []
         self._answers = deque([self._smoother.silent] * KEPT_STEPS, KEPT_STEPS)
         self._heard = 0  # steps
@@ -267,10 +269,11 @@ class _Smoother:
             first = np.linalg.solve(normal, np.eye(count)[0])
             self._of_answers[:, column] = first * trust[:, column]
             self._of_before[:, column] = -first @ (unknown.T @ known) / variance
-        hears = CausalSteps(network.network)
+        step = silent_step(network.typical.astype(np.float32))
+        hears = CausalSteps(network.network, step)
         for _ in range(network.network.reach):
-            silent = hears.push(SILENT_STEP)
-        self.silent = silent.reshape(len(LAGS), -1)
+            answers = hears.push(step)
+        self.silent = answers.reshape(len(LAGS), -1)
         self.rest = self.silent[-1, : len(ARTICULATORS)].astype(float)
 
     def solve(self, answers: deque[NDArray[np.float32]], before: list[Array]) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from lipmotion.hmm.multistream.densities import (
     fit_scale,
     make_standard_normals,
 )
-from lipmotion.hmm.multistream.streams import STREAMS, Stream, StreamWeights
+from lipmotion.hmm.multistream.streams import STREAMS, ObservedStream, StreamWeights
 from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
 
@@ -34,7 +34,7 @@ def test_voiced_and_unvoiced_together_are_everything():
     leaves = np.arange(model.forest.size)
 
     def density(values, known):
-        rows = model.scale.standardise(Stream(values[:, None], np.full(len(values), known)))
+        rows = model.scale.standardise(ObservedStream(values[:, None], np.full(len(values), known)))
         return np.exp(model.tied.log_density(rows, leaves, model.scale.log_determinant).astype(float))
 
     voiced = density(grid, True).sum(axis=0) * (grid[1] - grid[0])
@@ -86,9 +86,11 @@ def test_only_gaussians_with_data_are_split():
 
 def test_the_scale_is_that_of_known_frames():
     values = np.array([[1.0, 7.0], [3.0, 7.0], [100.0, 100.0]])
-    scale, share = fit_scale([Stream(values, np.array([True, True, False]))])
+    scale, share = fit_scale([ObservedStream(values, np.array([True, True, False]))])
     assert scale.mean.tolist() == [2, 7]
     assert scale.deviation[0] == 1
     assert 0 < scale.deviation[1] < 1e-3
     assert share == pytest.approx(2 / 3)
-    assert np.isfinite(StreamScale(scale.mean, scale.deviation).standardise(Stream(values, np.ones(3, bool)))).all()
+    assert np.isfinite(
+        StreamScale(scale.mean, scale.deviation).standardise(ObservedStream(values, np.ones(3, bool)))
+    ).all()

@@ -129,7 +129,9 @@ def test_a_stream_counts_as_much_as_its_weight(usual):
             frames = min(utterance.observed.frames, other.observed.frames)
             mixed = {name: of.observed.streams[name] for name, of in
                      [("speech", utterance), *((stream, other) for stream in F0_STREAMS)]}  # fmt: skip
-            cut = {name: ObservedStream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()}
+            cut = {
+                name: ObservedStream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()
+            }
             said = [s.unit for s in recogniser.recognise(StreamObservations(cut))]
             count += sum(a == b for a, b in zip(said, utterance.units, strict=False))
         right.append(count)

@@ -58,7 +58,7 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
     energy : ``log_energy`` of the recording [shape=(T,)]
     Raises InputError: as ``mfcc``.
     """
-    log_powers = log_mels(checked_samples(audio), [_filters(warp) for warp in warps])
+    log_powers = log_mels(checked_samples(audio), [mel_filters(warp) for warp in warps])
     features = []
     while log_powers:
         cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
@@ -176,7 +176,7 @@ def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @cache
-def _filters(
+def mel_filters(
     warp: float, count: int = FILTERS, lowest_hz: float = 0.0, highest_hz: float = SPEECH_RATE_HZ / 2
 ) -> NDArray[np.float32]:
     """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, count)]."""
@@ -243,7 +243,7 @@ def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
 
 def log_bands(samples: NDArray[np.float32], warp: float = 1.0) -> NDArray[np.float32]:
     """Return the natural log power in ``SPECTRUM_BANDS`` mel bands, not normalised [shape=(T, 40)]; as ``spectrum``."""
-    return log_mel(samples, _filters(warp, *BANDS))
+    return log_mel(samples, mel_filters(warp, *BANDS))
 
 
 @cache
