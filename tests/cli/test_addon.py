@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 
 
 @pytest.fixture
@@ -15,7 +15,7 @@ def basics(toy_model_file: Path, toy_speech: Path) -> tuple[object, ...]:
     return ("animate", toy_speech, "--model", toy_model_file)
 
 
-def test_the_addon_is_written_or_one_line_says_why_not(run: RunCommand, here: Path) -> None:
+def test_the_addon_is_written_or_one_line_says_why_not(run, here):
     for program, name in (("maya", "a.zip"), ("blender", "a.blend")):
         assert is_one_error(run("addon", program, "-o", name), 7)
         assert list(here.iterdir()) == []
@@ -24,9 +24,7 @@ def test_the_addon_is_written_or_one_line_says_why_not(run: RunCommand, here: Pa
 
 
 @pytest.mark.long
-def test_scenes_takes_and_scripts_are_written_without_a_character(
-    run: RunCommand, here: Path, basics: tuple[object, ...]
-) -> None:
+def test_scenes_takes_and_scripts_are_written_without_a_character(run, here, basics):
     names = ["a.glb", "a.usda", "a.livelink.csv", "a.blender.py"]
     assert run(*basics, "-o", *names, "--rate", "30").code == 0
     assert sorted(path.name for path in here.iterdir()) == sorted(names)

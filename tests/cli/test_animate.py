@@ -17,7 +17,7 @@ def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
     return ("animate", toy_speech, "--model", toy_model_file)
 
 
-def test_motion_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_motion_files(run, basics, here):
     done = run(*basics, "-o", "a.json", "a.csv", "-o", "a.npz", "--rate", "50")
     assert done == (0, ["a.json", "a.csv", "a.npz"], [])
     assert sorted(path.name for path in here.iterdir()) == ["a.csv", "a.json", "a.npz"]
@@ -25,21 +25,19 @@ def test_motion_files(run: RunCommand, basics: tuple[object, ...], here: Path) -
 
 
 @pytest.mark.long
-def test_it_is_the_function_of_the_same_name(
-    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path
-) -> None:
+def test_it_is_the_function_of_the_same_name(run, basics, here, toy_speech, toy_model_file):
     run(*basics, "-o", "command.json")
     model = load_model(toy_model_file)
     write(animate(toy_speech, model=model), ["function.json"], speech=toy_speech, model=model)
     assert (here / "command.json").read_bytes() == (here / "function.json").read_bytes()
 
 
-def test_a_video(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_a_video(run, basics, here):
     assert run(*basics, "-o", "a.mp4", "--fps", "5", "--size", "160") == (0, ["a.mp4"], [])
     assert (here / "a.mp4").stat().st_size > 5000
 
 
-def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_a_transcript(run, basics, here):
     words = "See Bob, papa — mama!"
     (here / "words.lab").write_text("\ufeff" + words, encoding="utf-8")
     for transcript in ("words.lab", words):
@@ -49,14 +47,14 @@ def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path) -
         assert " ".join(unit["phone"] for unit in units) == "sil s iy b aa b p aa p ax m aa m ax sil"
 
 
-def test_an_unknown_word_is_a_warning(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_an_unknown_word_is_a_warning(run, basics, here):
     done = run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama")
     assert done.code == 0
     assert "'bimab' is not in the dictionary; read as 'b " in "".join(done.err)
     assert (here / "a.json").exists()
 
 
-def test_a_lexicon_file(run: RunCommand, basics: tuple[object, ...], here: Path, caplog) -> None:
+def test_a_lexicon_file(run, basics, here, caplog):
     (here / "lexicon.txt").write_text("bimab B AA1 B\n")
     done = run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama", "--lexicon", "lexicon.txt")
     assert (done.code, caplog.text) == (0, "")
@@ -82,7 +80,7 @@ UNUSABLE = [
 ]
 
 
-def test_options_that_cannot_be_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_options_that_cannot_be_used(run, basics, here):
     for options, code, words in UNUSABLE:
         done = run(*basics, "-o", "a.json", "a.mp4", *options)
         assert is_one_error(done, code), done
@@ -98,7 +96,7 @@ def test_outputs_are_checked_before_work_begins(run: RunCommand) -> None:
         assert "no such" not in done.err[0]
 
 
-def test_a_wrong_command_line(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_a_wrong_command_line(run, basics, here):
     for options in ([], ["-o"], ["-o", "a.json", "--rate", "fast"], ["-o", "a.json", "--bogus"]):
         done = run(*basics, *options)
         assert done.code == 2
@@ -106,7 +104,7 @@ def test_a_wrong_command_line(run: RunCommand, basics: tuple[object, ...], here:
         assert list(here.iterdir()) == []
 
 
-def test_edited_units_are_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_edited_units_are_used(run, basics, here):
     run(*basics, "-o", "a.json")
     text = (here / "a.json").read_text(encoding="utf-8")
     document = json.loads(text)
@@ -118,14 +116,14 @@ def test_edited_units_are_used(run: RunCommand, basics: tuple[object, ...], here
     assert [channel["name"] for channel in after["channels"]] == ["opening"]
 
 
-def test_a_textgrid_goes_out_and_comes_back(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_a_textgrid_goes_out_and_comes_back(run, basics, here):
     assert run(*basics, "-o", "a.json", "a.TextGrid").out == ["a.json", "a.TextGrid"]
     assert run(*basics, "-o", "b.json", "--units", "a.TextGrid").code == 0
     first, again = (json.loads((here / name).read_text(encoding="utf-8")) for name in ("a.json", "b.json"))
     assert first["values"] == again["values"]
 
 
-def test_units_with_a_gap_are_silent_there(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_units_with_a_gap_are_silent_there(run, basics, here):
     run(*basics, "-o", "a.json")
     units = json.loads((here / "a.json").read_text(encoding="utf-8"))["units"]
     rows = [{key: row[key] for key in ("start_s", "end_s", "phone")} for row in units]
@@ -136,7 +134,7 @@ def test_units_with_a_gap_are_silent_there(run: RunCommand, basics: tuple[object
     assert after[3]["end_s"] == rows[5]["start_s"]
 
 
-def test_a_picture_of_the_posteriors(run: RunCommand, coupled_model_file: Path, toy_speech: Path, here: Path) -> None:
+def test_a_picture_of_the_posteriors(run, coupled_model_file, toy_speech, here):
     basics = ("animate", toy_speech, "--model", coupled_model_file, "-o")
     assert run(*basics, "a.json", "--posteriors", "a.png") == (0, ["a.json", "a.png"], [])
     with Image.open(here / "a.png") as picture:
@@ -148,9 +146,7 @@ def test_a_picture_of_the_posteriors(run: RunCommand, coupled_model_file: Path, 
 
 
 @pytest.mark.long
-def test_one_of_several_people(
-    run: RunCommand, here: Path, toy_speech: Path, toy_corpus: Corpus, tmp_path: Path
-) -> None:
+def test_one_of_several_people(run, here, toy_speech, toy_corpus, tmp_path):
     people = Corpus.create(tmp_path / "people")
     for number, name in enumerate(toy_corpus.names("train")):
         people.add(replace(toy_corpus.utterance(name), speaker=("anna", "ben")[number % 2]))
@@ -166,9 +162,7 @@ def test_one_of_several_people(
     assert "no speaker 'cleo', only: anna, ben" in done.err[0]
 
 
-def test_onto_another_person(
-    run: RunCommand, here: Path, toy_model_file: Path, toy_speech: Path, toy_corpus: Corpus
-) -> None:
+def test_onto_another_person(run, here, toy_model_file, toy_speech, toy_corpus):
     given = ["animate", toy_speech, "--model", toy_model_file, "-o", "one.npz"]
     assert run(*given, "--onto", toy_corpus.path).code == 0
     assert (here / "one.npz").is_file()
@@ -185,7 +179,7 @@ def test_onto_another_person(
     assert not (toy_corpus.path / "one.json").exists()
 
 
-def test_a_staged_face(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_a_staged_face(run, basics, here):
     staging = "--face cartoon --size 64 --background #102030 --intensity 1.5 --still gaze,head --face-seed 3 --fps 5"
     assert run(*basics, "-o", "a%02d.png", *staging.split()) == (0, ["a%02d.png"], [])
     picture = Image.open(here / "a00.png")
@@ -193,7 +187,7 @@ def test_a_staged_face(run: RunCommand, basics: tuple[object, ...], here: Path) 
     assert picture.getpixel((0, 0)) == (16, 32, 48)
 
 
-def test_articulation_in_motion_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_articulation_in_motion_files(run, basics, here):
     assert run(*basics, "-o", "a.csv", "--articulation")[0] == 0
     header = (here / "a.csv").read_text().splitlines()[0].split(",")
     assert header[-6:] == ["tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth"]

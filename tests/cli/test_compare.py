@@ -1,9 +1,8 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion import compare
 from lipmotion.measures.evaluation_table import comparison_table
 
@@ -16,7 +15,7 @@ def table(factor: float) -> str:
 WAVE = table(1.0)
 
 
-def test_the_figures_are_those_of_the_function(run: RunCommand, here: Path) -> None:
+def test_the_figures_are_those_of_the_function(run, here):
     (here / "a.csv").write_text(WAVE)
     (here / "b.csv").write_text(table(0.5))
     done = run("compare", "a.csv", "b.csv", "a.csv", "-o", "figures.json")
@@ -31,7 +30,7 @@ def test_the_figures_are_those_of_the_function(run: RunCommand, here: Path) -> N
     ]
 
 
-def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+def test_what_cannot_be_used(run, here):
     (here / "a.csv").write_text(WAVE)
     (here / "b.csv").write_text(WAVE.replace("opening,width", "jawOpen,mouthClose"))
     (here / "nothing.csv").write_text("")
@@ -47,7 +46,7 @@ def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
     assert not (here / "figures.json").exists()
 
 
-def test_programs_read_lines_of_json(run: RunCommand, here: Path) -> None:
+def test_programs_read_lines_of_json(run, here):
     (here / "a.csv").write_text(WAVE)
     done = run("compare", "a.csv", "a.csv", "--machine-readable")
     assert (done.code, done.err) == (0, [])

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus
+from cli.conftest import is_one_error
 from lipmotion.errors import MissingDependencyError
 from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio, Item, Progress
@@ -19,7 +18,7 @@ from lipmotion_faces.video.mp4 import write_mp4
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 
-def test_info(run: RunCommand, toy_corpus: Corpus) -> None:
+def test_info(run, toy_corpus):
     done = run("corpus", "info", toy_corpus.path)
     assert (done.code, done.err) == (0, [])
     summary = dict(line.split(maxsplit=1) for line in done.out)
@@ -28,7 +27,7 @@ def test_info(run: RunCommand, toy_corpus: Corpus) -> None:
     assert summary["offset"].startswith("toy: ") or summary["offset"].startswith("corpus: ")
 
 
-def test_sync(run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sync(run, toy_corpus, here, monkeypatch):
     shutil.copytree(toy_corpus.path, here / "mine")
     monkeypatch.setattr(offset, "sync", lambda _corpus: {"studio": 0.12})
     assert run("corpus", "sync", "mine") == (0, ["studio: sound moved by -120 ms"], [])
@@ -42,7 +41,7 @@ def test_sync(run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pyte
 EVENTS = (Item("a", "prepared"), Progress("preparing recordings", 1, 2, 0.5), Item("d", "skipped", "no face"))
 
 
-def test_prepare_prints_the_counts(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_prepare_prints_the_counts(run, monkeypatch):
     asked: dict[str, object] = {}
 
     def done(directory: Path, output: Path, **options: object) -> PrepareReport:
@@ -71,7 +70,7 @@ def test_prepare_prints_the_counts(run: RunCommand, monkeypatch: pytest.MonkeyPa
     }
 
 
-def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+def test_what_cannot_be_used(run, here):
     (here / "empty").mkdir()
     for arguments, code, words in (
         (["info", "missing"], 4, "missing: no such corpus"),
@@ -84,7 +83,7 @@ def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
         assert [path.name for path in here.rglob("*")] == ["empty"]
 
 
-def test_without_the_packages_for_video(run: RunCommand, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_packages_for_video(run, here, monkeypatch):
     def missing() -> dict[str, str]:
         raise MissingDependencyError('face tracking needs MediaPipe; pip install "lipmotion[video]"')
 
@@ -103,7 +102,7 @@ def faceless(path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.video
-def test_videos_that_cannot_be_used(run_outside: RunCommand, here: Path, bad_speech: dict[str, Path]) -> None:
+def test_videos_that_cannot_be_used(run_outside, here, bad_speech):
     """Videos without a face, without sound, or empty: each is named, and no corpus is made of them."""
     pytest.importorskip("mediapipe")
     (here / "videos").mkdir()
@@ -123,7 +122,7 @@ def test_videos_that_cannot_be_used(run_outside: RunCommand, here: Path, bad_spe
     assert [path.name for path in here.iterdir()] == ["videos"]
 
 
-def test_offset_of_two_recordings(run: RunCommand, here: Path) -> None:
+def test_offset_of_two_recordings(run, here):
     chance = np.random.default_rng(5)
     scene = np.concatenate([np.zeros(RATE_HZ), speech_like(chance, 3.0)])
     made = clap(chance)

@@ -1,14 +1,12 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
-from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus
+from cli.conftest import is_one_error
 from lipmotion_faces.corpus.coverage import coverage
 
 
-def test_coverage_of_a_corpus(run: RunCommand, toy_corpus: Corpus) -> None:
+def test_coverage_of_a_corpus(run, toy_corpus):
     done = run("corpus", "coverage", toy_corpus.path, "--count", "3")
     assert (done.code, done.err) == (0, [])
     found = coverage(toy_corpus)
@@ -18,7 +16,7 @@ def test_coverage_of_a_corpus(run: RunCommand, toy_corpus: Corpus) -> None:
     assert f"and {len(found.kinds[1].missing) - 3} more diphones" in done.out
 
 
-def test_options(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
+def test_options(run, here, toy_corpus):
     (here / "mine.txt").write_text("Two qwrtzx.\nFive.\nPapa vxvx.\n")
     (here / "lexicon.txt").write_text("qwrtzx zh oy\n")
     given = ["corpus", "coverage", toy_corpus.path, "--text", "mine.txt", "--lexicon", "lexicon.txt"]
@@ -32,7 +30,7 @@ def test_options(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
     assert [kind["kind"] for kind in document["kinds"]] == ["phones", "diphones", "triphones"]
 
 
-def test_what_cannot_be_used(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
+def test_what_cannot_be_used(run, here, toy_corpus):
     for arguments, code, words in (
         ([toy_corpus.path, "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
         (["missing"], 4, "missing: no such corpus"),

@@ -1,13 +1,10 @@
 from __future__ import annotations
 
-from pathlib import Path
-
-from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus
+from cli.conftest import is_one_error
 from lipmotion.pipeline.training.prompts import prompts
 
 
-def test_sentences_with_what_they_cover(run: RunCommand) -> None:
+def test_sentences_with_what_they_cover(run):
     done = run("corpus", "prompts", "--count", "3")
     found = prompts(count=3)
     assert (done.code, done.err) == (0, [])
@@ -19,7 +16,7 @@ def test_sentences_with_what_they_cover(run: RunCommand) -> None:
     )
 
 
-def test_options(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
+def test_options(run, here, toy_corpus):
     (here / "mine.txt").write_text("Two qwrtzx.\nFive.\nPapa vxvx.\n")
     (here / "lexicon.txt").write_text("qwrtzx zh oy\n")
     done = run("corpus", "prompts", "--text", "mine.txt", "--lexicon", "lexicon.txt", "--have", toy_corpus.path)
@@ -27,14 +24,14 @@ def test_options(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
     assert done.err == ["lipmotion: warning: left out 1 sentences for their words: vxvx"]
 
 
-def test_nothing_new(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
+def test_nothing_new(run, here, toy_corpus):
     words = toy_corpus.utterance("toy00").words
     (here / "mine.txt").write_text(" ".join(words or ()))
     done = run("corpus", "prompts", "--text", "mine.txt", "--have", toy_corpus.path)
     assert (done.code, done.out) == (0, ["0 of 1 sentences: they add nothing"])
 
 
-def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+def test_what_cannot_be_used(run, here):
     for arguments, code, words in (
         (["--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
         (["--have", "missing"], 4, "missing: no such corpus"),

@@ -24,11 +24,11 @@ PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
         ),
     ],
 )
-def test_requirements_are_read(text: str, expected: Requirement) -> None:
+def test_requirements_are_read(text, expected):
     assert requirement(text) == expected
 
 
-def test_markers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_markers(monkeypatch):
     machine = {"sys_platform": "darwin", "platform_machine": "arm64", "python_version": "3.9"}
     monkeypatch.setattr("packaging.markers.default_environment", lambda: default_environment() | machine)
     for marker, expected in (
@@ -41,7 +41,7 @@ def test_markers(monkeypatch: pytest.MonkeyPatch) -> None:
         assert Requirement("a", "", marker).applies is expected, marker
 
 
-def test_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_versions(monkeypatch):
     monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
     for versions, expected in (
         ("", True),
@@ -55,7 +55,7 @@ def test_versions(monkeypatch: pytest.MonkeyPatch) -> None:
         assert Requirement("a", versions).is_met is expected, versions
 
 
-def test_what_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_not_installed(monkeypatch):
     def missing(name: str) -> str:
         raise metadata.PackageNotFoundError(name)
 
@@ -65,6 +65,6 @@ def test_what_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert declared_requirements() == ()
 
 
-def test_every_extra_is_explained() -> None:
+def test_every_extra_is_explained():
     table = PYPROJECT.read_text(encoding="utf-8").split("[project.optional-dependencies]")[1].split("\n[")[0]
     assert set(re.findall(r"^([\w-]+) = \[", table, re.MULTILINE)) == set(EXTRAS)

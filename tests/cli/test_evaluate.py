@@ -2,12 +2,11 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus, evaluate, load_model
+from cli.conftest import is_one_error
+from lipmotion import evaluate, load_model
 from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.model import VERSION
@@ -20,9 +19,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
 
 
-def test_the_figures_are_those_of_the_function(
-    run: RunCommand, toy_corpus: Corpus, toy_model_file: Path, here: Path
-) -> None:
+def test_the_figures_are_those_of_the_function(run, toy_corpus, toy_model_file, here):
     done = run("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json")
     assert (done.code, done.err) == (0, [])
     figures = evaluate(load_model(toy_model_file), toy_corpus)
@@ -32,13 +29,11 @@ def test_the_figures_are_those_of_the_function(
 
 
 @pytest.mark.long
-def test_other_lists(run: RunCommand, toy_corpus: Corpus, toy_model_file: Path) -> None:
+def test_other_lists(run, toy_corpus, toy_model_file):
     assert run("evaluate", toy_model_file, toy_corpus.path, "--split", "val").out[0].startswith("split val: 2 clips")
 
 
-def test_what_cannot_be_used(
-    run: RunCommand, toy_corpus: Corpus, toy_model_file: Path, newer_model: Path, here: Path
-) -> None:
+def test_what_cannot_be_used(run, toy_corpus, toy_model_file, newer_model, here):
     corpus, model = toy_corpus.path, toy_model_file
     for arguments, code, words in (
         (["missing", corpus], 3, "missing: no such model"),

@@ -13,7 +13,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.testing.toy import toy_sentences
 from lipmotion_faces.film import build
-from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
+from lipmotion_faces.filmed.face import load_face, save_face
 from pipeline.film.toy_footage import ToyVideo, install, write_video
 from speech import stand_in_voice
 
@@ -52,7 +52,7 @@ def decoded(path: Path) -> np.ndarray:
 
 
 @pytest.mark.long
-def test_build_and_info(run: RunCommand, tracker: Path, here: Path) -> None:
+def test_build_and_info(run, tracker, here):
     done = run("face", "build", tracker, "-o", "anna.face", "--name", "Anna", "--workers", "1")
     assert done.code == 0, done
     lines = {line.split()[0]: line[12:].strip() for line in done.out}
@@ -66,7 +66,7 @@ def test_build_and_info(run: RunCommand, tracker: Path, here: Path) -> None:
 
 
 @pytest.mark.long
-def test_build_for_a_program(run: RunCommand, tracker: Path, here: Path) -> None:
+def test_build_for_a_program(run, tracker, here):
     """One object a line: progress that rises, and at the end the name of the file."""
     done = run("face", "build", tracker, "-o", "anna.face", "--workers", "1", "--machine-readable")
     events: list[dict[str, Any]] = [json.loads(line) for line in done.out]
@@ -82,7 +82,7 @@ def test_build_for_a_program(run: RunCommand, tracker: Path, here: Path) -> None
 
 
 @pytest.mark.long
-def test_what_cannot_be_built(run: RunCommand, tracker: Path, here: Path) -> None:
+def test_what_cannot_be_built(run, tracker, here):
     video = tracker / "toy00.mp4"
     before = video.read_bytes()
     for arguments, code, words in (
@@ -100,12 +100,12 @@ def test_what_cannot_be_built(run: RunCommand, tracker: Path, here: Path) -> Non
     assert video.read_bytes() == before
 
 
-def test_a_wrong_command_line(run: RunCommand) -> None:
+def test_a_wrong_command_line(run):
     for arguments in ([], ["build"], ["build", "a.mp4"], ["info"], ["paint", "a.mp4"]):
         assert run("face", *arguments).code == 2
 
 
-def test_info(run: RunCommand, filmed_face_file: Path) -> None:
+def test_info(run, filmed_face_file):
     done = run("face", "info", filmed_face_file)
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "name         toy"
@@ -113,7 +113,7 @@ def test_info(run: RunCommand, filmed_face_file: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_video_of_the_person(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_a_video_of_the_person(run, basics, here):
     done = run(*basics, "-o", "a.mp4", "a.json")
     assert done == (0, ["a.mp4", "a.json"], [])
     assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.mp4"]
@@ -139,9 +139,7 @@ def test_frames_a_second_and_the_mark(run: RunCommand, basics: tuple[object, ...
 
 @pytest.mark.long
 @pytest.mark.usefixtures("here")
-def test_another_background(
-    run: RunCommand, basics: tuple[object, ...], tracker: Path, videos: dict[Path, ToyVideo]
-) -> None:
+def test_another_background(run, basics, tracker, videos) -> None:
     path = tracker / "toy01.mp4"
     done = run(*basics, "-o", "a.mp4", "--background", path)
     assert done == (0, ["a.mp4"], [])
@@ -154,9 +152,7 @@ def test_another_background(
 
 @pytest.mark.long
 @pytest.mark.parametrize("overlay", ["inset", "mouth"])
-def test_an_aid_to_lip_reading(
-    run: RunCommand, basics: tuple[object, ...], tracker: Path, here: Path, overlay: str
-) -> None:
+def test_an_aid_to_lip_reading(run, basics, tracker, here, overlay):
     """On the video of the speech itself."""
     video = tracker / "toy01.mp4"
     done = run(basics[0], video, *basics[2:], "-o", "a.mp4", "--overlay", overlay)
@@ -175,9 +171,7 @@ def test_an_aid_to_lip_reading(
 
 
 @pytest.mark.long
-def test_a_face_of_another_person(
-    run: RunCommand, basics: tuple[object, ...], here: Path, filmed_face: FilmedFace
-) -> None:
+def test_a_face_of_another_person(run, basics, here, filmed_face):
     """The motion is mapped onto that person by the speech in the file."""
     from dataclasses import replace
 
@@ -190,9 +184,7 @@ def test_a_face_of_another_person(
     assert "the face was built from footage without sound" in done.err[0]
 
 
-def test_speak(
-    run: RunCommand, here: Path, toy_model_file: Path, filmed_face_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_speak(run, here, toy_model_file, filmed_face_file, monkeypatch):
     stand_in_voice.install(monkeypatch)
     done = run("speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "a.mp4")
     assert (done.code, done.out) == (0, ["a.mp4"]), done

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 
 BLENDER, WORD = b"BLENDER-v402REND", b"PK\x03\x04" + bytes(40) + b"word/document.xml"
 
@@ -29,7 +27,7 @@ BLENDER, WORD = b"BLENDER-v402REND", b"PK\x03\x04" + bytes(40) + b"word/document
         ("animate SPEECH -o out.json --lexicon FILE.dict", WORD, "a Word document"),
     ],
 )
-def test_it_is_named(line: str, content: bytes, named: str, run: RunCommand, here: Path, toy_speech: Path) -> None:
+def test_it_is_named(line, content, named, run, here, toy_speech):
     words = line.split()
     file = next(word for word in words if word.startswith("FILE"))
     (here / file).write_bytes(content)

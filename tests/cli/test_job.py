@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion import Job, Outputs, Request
 from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import part_of
@@ -73,13 +73,13 @@ def parsed(*words: str) -> Job:
     return part_of(options, options.start, request=request)
 
 
-def test_the_command_line_makes_the_same_job() -> None:
+def test_the_command_line_makes_the_same_job():
     assert parsed(*LINE.split()) == SAME
     assert parsed("animate", "a.wav", "-o", "a.json") == Job(Request(Path("a.wav")), Outputs(("a.json",)))
 
 
 @needs_toml
-def test_a_file_is_behind_the_command_line(here: Path) -> None:
+def test_a_file_is_behind_the_command_line(here):
     (here / "scene.toml").write_text(FILE)
     assert parsed("animate", "--job", "scene.toml") == Job.from_file("scene.toml") == SAME
     line = "animate b.wav --job scene.toml --face portrait -o d.json --face-seed 0 --still gaze -o e.json --offset-ms 0"
@@ -90,7 +90,7 @@ def test_a_file_is_behind_the_command_line(here: Path) -> None:
     assert job.delivery == Delivery(stepped=True)
 
 
-def test_a_level_of_detail_is_behind_the_command_line() -> None:
+def test_a_level_of_detail_is_behind_the_command_line():
     job = parsed("animate", "a.wav", "-o", "a.json", "--detail", "mobile")
     assert (job.outputs.rate_hz, job.delivery, job.staging) == (
         30,
@@ -102,7 +102,7 @@ def test_a_level_of_detail_is_behind_the_command_line() -> None:
     assert parsed("animate", "a.wav", "-o", "a.json", "--detail", "film") == parsed("animate", "a.wav", "-o", "a.json")
 
 
-def test_each_option_is_declared_once() -> None:
+def test_each_option_is_declared_once():
     """No flag stands twice in the parts of a job, and none of them in a module of the command line."""
     parts = (Request, Outputs, Delivery, Staging)
     told = [each for part in parts for each in fields(part) if "help" in each.metadata and "still" not in each.metadata]
@@ -126,7 +126,7 @@ def test_only_files_that_are_read_are_declared_as_inputs() -> None:
 
 
 @needs_toml
-def test_a_job_is_done(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_job_is_done(run, here, toy_speech, toy_model_file):
     (here / "scene.toml").write_text(
         f"[request]\nrecording = {str(toy_speech)!r}\nmodel = {str(toy_model_file)!r}\nrecogniser = 'own'\n"
         "[outputs]\nfiles = ['a.json']\nrate_hz = 25\n"
@@ -142,7 +142,7 @@ def test_a_job_is_done(run: RunCommand, here: Path, toy_speech: Path, toy_model_
 
 
 @needs_toml
-def test_a_batch_takes_a_job(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_batch_takes_a_job(run, here, toy_speech, toy_model_file):
     (here / "sounds").mkdir()
     (here / "sounds" / "a.wav").write_bytes(toy_speech.read_bytes())
     (here / "scene.toml").write_text(
@@ -160,7 +160,7 @@ def test_a_batch_takes_a_job(run: RunCommand, here: Path, toy_speech: Path, toy_
 
 
 @needs_toml
-def test_what_is_wrong_with_a_file(run: RunCommand, here: Path) -> None:
+def test_what_is_wrong_with_a_file(run, here):
     (here / "half.toml").write_text("[request]\nrecording = 'a.wav'\n")
     (here / "wrong.toml").write_text("[staging]\nface-seed = 3\n")
     done = run("animate", "--job", "half.toml")

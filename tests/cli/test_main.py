@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 
 from children import PIPE, child, run_child
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion.cli import main
 from lipmotion.cli.verbs import info
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
@@ -15,7 +15,7 @@ STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
 
 
-def test_help_lists_verbs_and_exit_codes(run: RunCommand) -> None:
+def test_help_lists_verbs_and_exit_codes(run):
     done = run("--help")
     assert (done.code, done.err) == (0, [])
     text = " ".join(" ".join(done.out).split())
@@ -24,36 +24,36 @@ def test_help_lists_verbs_and_exit_codes(run: RunCommand) -> None:
     assert "0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus, 5 align" in text
 
 
-def test_every_verb_has_help(run: RunCommand) -> None:
+def test_every_verb_has_help(run):
     for verb in (*VERBS, "corpus prepare", "corpus info"):
         done = run(*verb.split(), "--help")
         assert (done.code, done.err) == (0, [])
         assert done.out[0].startswith(f"usage: lipmotion {verb} ")
 
 
-def test_the_version(run: RunCommand) -> None:
+def test_the_version(run):
     from importlib.metadata import version
 
     assert run("--version") == (0, [f"lipmotion {version('lipmotion')}"], [])
 
 
-def test_the_package_is_a_program() -> None:
+def test_the_package_is_a_program():
     done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
     assert done.stdout.startswith("usage: lipmotion info ")
 
 
-def test_a_wrong_command_line(run: RunCommand) -> None:
+def test_a_wrong_command_line(run):
     for arguments in (["bogus"], ["corpus"], ["corpus", "bogus"], ["--bogus"], ["train"], ["cues", "a.wav", "b.wav"]):
         done = run(*arguments)
         assert is_one_error(done, 2)
         assert " --help" in done.err[0]
 
 
-def test_without_a_word_there_is_help(run: RunCommand) -> None:
+def test_without_a_word_there_is_help(run):
     assert run() == run("--help")
 
 
-def test_a_misspelt_option(run: RunCommand) -> None:
+def test_a_misspelt_option(run):
     for misspelt, hint in (
         (["animate", "a.wav", "-o", "a.json", "--fase", "woman"], "did you mean --face? see: lipmotion animate --help"),
         (["animate", "a.wav", "--otput", "a.json"], "did you mean --output?"),
@@ -68,7 +68,7 @@ def test_a_misspelt_option(run: RunCommand) -> None:
         assert hint in done.err[0]
 
 
-def test_words_of_other_tools_are_answered_with_a_verb(run: RunCommand) -> None:
+def test_words_of_other_tools_are_answered_with_a_verb(run):
     for words, hint in (
         (["convert", "a.vmd", "b.mp4"], "no verb 'convert'; did you mean: lipmotion render IN -o OUT"),
         (["animat", "a.wav"], "no verb 'animat'; did you mean: lipmotion animate"),
@@ -81,7 +81,7 @@ def test_words_of_other_tools_are_answered_with_a_verb(run: RunCommand) -> None:
         assert done.err[-1].startswith(f"lipmotion: error: {hint}")
 
 
-def test_an_error_is_one_line(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_is_one_line(run, monkeypatch):
     errors: list[tuple[BaseException, int, str]] = [
         (LipMotionError("what"), 1, "lipmotion: error: what"),
         (AlignmentError("two\n  lines"), 5, "lipmotion: error: two\\n  lines"),
@@ -100,14 +100,14 @@ def _fail(error: BaseException, _: object) -> None:
     raise error
 
 
-def test_a_bug_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_is_not_hidden(monkeypatch):
     monkeypatch.setattr(info, "run", partial(_fail, ZeroDivisionError()))
     with pytest.raises(ZeroDivisionError):
         main.main(["info"])
 
 
 @pytest.mark.parametrize("arguments", [["info"], ["--help"]])
-def test_a_reader_that_has_gone_is_no_error(arguments: list[str]) -> None:
+def test_a_reader_that_has_gone_is_no_error(arguments):
     """As in ``lipmotion info | head -0``: the output is buffered, so it is found at the very end."""
     program = [
         sys.executable,
@@ -115,9 +115,6 @@ def test_a_reader_that_has_gone_is_no_error(arguments: list[str]) -> None:
         "import sys; sys.stdin.read(); from lipmotion.cli.main import main; sys.exit(main())",
     ]
     with child([*program, *arguments], stdin=PIPE, stderr=PIPE) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        assert process.stderr is not None
         process.stdout.close()
         process.stdin.close()  # now it may begin
         assert process.stderr.read() == ""

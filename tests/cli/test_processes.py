@@ -11,9 +11,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 
 
-def test_a_terminal_that_does_not_know_the_letters(
-    run_outside: RunCommand, toy_speech: Path, toy_model_file: Path, here: Path
-) -> None:
+def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_model_file, here):
     line = ("animate", toy_speech, "--model", toy_model_file, "-o", "ä.json", "--transcript", "see bimab papa mama")
     done = run_outside(*line, encoding="ascii")
     (warning,) = done.err
@@ -30,7 +28,7 @@ def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside: RunCommand, bad
     assert run_outside("animate", "a.wav").code == 2
 
 
-def test_the_console_script(run_outside: RunCommand) -> None:
+def test_the_console_script(run_outside):
     script = shutil.which("lipmotion", path=str(Path(sys.executable).parent))
     if script is None:
         pytest.skip("the package is not installed")

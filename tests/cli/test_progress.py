@@ -16,7 +16,6 @@ import pytest
 
 from children import LIPMOTION, environment, run_child
 from cli.conftest import Done, RunCommand
-from lipmotion import Corpus
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, JsonLines
 from lipmotion.cli.terminal.progress import report_progress
@@ -44,7 +43,7 @@ def options(machine_readable: bool) -> Namespace:
     )
 
 
-def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_event_is_one_json_object_on_a_line(capsys):
     with report_progress(options(machine_readable=True)) as report:
         for event in EVENTS:
             report.receive(event)
@@ -63,7 +62,7 @@ def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[
     ]
 
 
-def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys):
     with report_progress(options(machine_readable=False)) as report:
         for event in EVENTS:
             report.receive(event)
@@ -71,7 +70,7 @@ def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pyte
     assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face\\nanywhere\n")
 
 
-def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_gets_a_bar(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     with report_progress(options(machine_readable=False)) as report:
         for event in EVENTS:
@@ -87,7 +86,7 @@ def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: 
 
 
 @pytest.mark.long
-def test_training_for_a_program(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_training_for_a_program(run, toy_corpus, here):
     done = run("train", toy_corpus.path, "-o", "m.lipmotion", "--from", "none", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     first, *between, last = objects(done)
@@ -99,7 +98,7 @@ def test_training_for_a_program(run: RunCommand, toy_corpus: Corpus, here: Path)
     assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
 
 
-def test_a_failure_is_said_to_both(run: RunCommand) -> None:
+def test_a_failure_is_said_to_both(run):
     done = run("train", "missing", "-o", "m", "--machine-readable")
     assert done.code == 4
     start, failure = objects(done)
@@ -107,7 +106,7 @@ def test_a_failure_is_said_to_both(run: RunCommand) -> None:
     assert done.err == [f"lipmotion: error: {failure['reason']}"]
 
 
-def test_why_it_failed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_why_it_failed(capsys, monkeypatch):
     def fail(error: BaseException, _: Namespace) -> None:
         raise error
 
@@ -126,7 +125,7 @@ def test_why_it_failed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.M
         assert said.err.endswith(f"{reason}\n") or code == 1
 
 
-def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
+def test_an_error_on_the_command_line_is_a_failure_too(run):
     done = run("evaluate", "--machine-readable")
     assert done.code == 2
     (failure,) = objects(done)
@@ -140,7 +139,7 @@ def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
     "arguments",
     [["info"], ["--help"], ["cues", "--help"], ["--version"], ["train", "CORPUS", "-o", "m", "--machine-readable"]],
 )
-def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str]) -> None:
+def test_output_that_is_full(toy_corpus, here, arguments):
     command = [str(toy_corpus.path) if argument == "CORPUS" else argument for argument in arguments]
     with Path("/dev/full").open("w") as full:
         unbuffered = "1" if command[0] == "train" else ""
@@ -155,7 +154,7 @@ CLOSED = "standard {} is closed"
 
 @pytest.mark.skipif(sys.platform == "win32", reason="streams are closed as POSIX shells do")
 @pytest.mark.long
-def test_streams_that_are_closed(toy_speech: Path, toy_model_file: Path, here: Path) -> None:
+def test_streams_that_are_closed(toy_speech, toy_model_file, here):
     """No file that is opened takes the number of a standard stream."""
     own = shlex.join([str(toy_speech), "--model", str(toy_model_file), "--recogniser", "own"])
     for line, code, said in (

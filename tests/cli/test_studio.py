@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import socket
-from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion.storage.files import lock_folder
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
 
-def test_what_the_studio_refuses(here: Path, run: RunCommand) -> None:
+def test_what_the_studio_refuses(here, run):
     assert is_one_error(run("studio", "nothing.wav"), 3)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         assert is_one_error(run("studio", "--port", taken.getsockname()[1], "-o", "project"), 3)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion_studio.study.answers import read_answers
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
 from study.small_study import small_study
 from study.test_design import write_video
 
 
-def test_design_makes_a_study(here: Path, run: RunCommand) -> None:
+def test_design_makes_a_study(here, run):
     for name in ("one", "two"):
         write_video(here / "said" / f"{name}.mp4", 10)
         write_video(here / "ours" / f"{name}.mp4", 90)
@@ -26,7 +25,7 @@ def test_design_makes_a_study(here: Path, run: RunCommand) -> None:
     assert run("study", "design", "-o", "other", "--paired", "--mos", *words).code == 2
 
 
-def test_export_and_forget(here: Path, run: RunCommand) -> None:
+def test_export_and_forget(here, run):
     small_study(here / "study")
     with closing(StudyStore(here / "study")) as store:
         for _ in range(2):
@@ -48,6 +47,6 @@ def test_export_and_forget(here: Path, run: RunCommand) -> None:
 
 
 @pytest.mark.parametrize("words", [("serve", "none"), ("export", "none", "-o", "a.csv"), ("forget", "none", "r001")])
-def test_what_is_no_study_is_one_error(here: Path, run: RunCommand, words: tuple[str, ...]) -> None:
+def test_what_is_no_study_is_one_error(here, run, words):
     assert is_one_error(run("study", *words), 3)
     assert list(here.iterdir()) == []

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion_studio.study.analysis.analyse import analyse_study
 from lipmotion_studio.study.analysis.analysis_table import analysis_table
@@ -19,7 +19,7 @@ def write_study(path: Path) -> None:
     write_answers(path, answers + paired_answers(comparisons(draw, np.array([-0.5, 0.5]), (8, 6), Effects())))
 
 
-def test_the_figures_are_those_of_the_function(run: RunCommand, here: Path) -> None:
+def test_the_figures_are_those_of_the_function(run, here):
     write_study(here / "answers.csv")
     done = run("study", "analyse", "answers.csv", "-o", "result.json", "--baseline", "c1", "--sentences", "12")
     assert (done.code, done.err) == (0, [])
@@ -28,14 +28,14 @@ def test_the_figures_are_those_of_the_function(run: RunCommand, here: Path) -> N
     assert json.loads((here / "result.json").read_text()) == json.loads(json.dumps(nan_as_null(figures)))
 
 
-def test_programs_read_lines_of_json(run: RunCommand, here: Path) -> None:
+def test_programs_read_lines_of_json(run, here):
     write_study(here / "answers.csv")
     done = run("study", "analyse", "answers.csv", "--machine-readable")
     assert done.code == 0
     assert [part["kind"] for part in json.loads(done.out[-1])["figures"]["all"]] == ["mos", "paired"]
 
 
-def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+def test_what_cannot_be_used(run, here):
     write_study(here / "answers.csv")
     (here / "other.csv").write_text("rater,kind\n1,2\n")
     for arguments, code, words in (

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
 from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.train import TrainReport
@@ -18,7 +18,7 @@ from lipmotion.testing.toy import toy_sentences
 from lipmotion.units import load_unit_set
 
 
-def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_a_model_and_what_it_was_made_of(run, toy_corpus, here):
     done = run("train", toy_corpus.path, "-o", "mine.lipmotion")
     use = "use it: lipmotion animate SPEECH -o FILE --model mine.lipmotion"
     assert done == (0, [f"mine.lipmotion: 8 used, 0.3 minutes, 0 skipped; {use}"], [])
@@ -29,13 +29,13 @@ def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, he
 
 
 @pytest.mark.long
-def test_all_of_a_corpus(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_all_of_a_corpus(run, toy_corpus, here):
     assert run("train", toy_corpus.path, "-o", "all.lipmotion", "--split", "all").code == 0
     assert load_model(here / "all.lipmotion").about["split"] == "all"
 
 
 @pytest.mark.long
-def test_what_was_left_out_is_said(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_what_was_left_out_is_said(run, toy_corpus, here):
     corpus = Corpus.create(here / "corpus")
     for name in toy_corpus.names("train")[:4]:
         utterance = toy_corpus.utterance(name)
@@ -48,7 +48,7 @@ def test_what_was_left_out_is_said(run: RunCommand, toy_corpus: Corpus, here: Pa
 
 
 @pytest.mark.long
-def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_speakers_are_chosen(run, toy_corpus, here):
     corpus = Corpus.create(here / "corpus")
     for name, speaker in zip(toy_corpus.names("train"), ("anna", "anna", "ben", "ben", "carl"), strict=False):
         corpus.add(replace(toy_corpus.utterance(name), speaker=speaker))
@@ -63,9 +63,7 @@ def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) ->
     )
 
 
-def test_what_is_given_wins_over_what_the_joint_engine_recognises(
-    run: RunCommand, toy_corpus: Corpus, toy_speech: Path, here: Path
-) -> None:
+def test_what_is_given_wins_over_what_the_joint_engine_recognises(run, toy_corpus, toy_speech, here):
     own = ["--units", "eVis", "--set", "recognise_units=true", "--set", "mixtures=1"]
     assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
     assert load_model(here / "m").engine.name == "joint"
@@ -82,7 +80,7 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(
     assert {span.label.unit for span in units[0] if not span.label.phone} >= {"bilabial", "low"}
 
 
-def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_a_system_of_the_coupled_engine(run, toy_corpus, here):
     wanted = ["--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
     assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
     config = load_model(here / "m").engine.config
@@ -93,7 +91,7 @@ def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, her
 
 
 @pytest.mark.long
-def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_units_of_a_table_that_is_not_needed_again(run, toy_corpus, here):
     units = load_unit_set("eVis")
     table = here / "mine.txt"
     table.write_text("".join(f"u{n} {' '.join(units.phones(unit))}\n" for n, unit in enumerate(units.units)))
@@ -106,9 +104,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: 
     assert figures[0] == figures[1]
 
 
-def test_other_voices_are_learned_from_but_those_for_judging(
-    run: RunCommand, toy_model: Model, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_voices_are_learned_from_but_those_for_judging(run, toy_model, toy_corpus, toy_speech, here, monkeypatch):
     """Of two installed voices, slt is held out; one friend was recorded."""
     speakers: list[list[str]] = []
 
@@ -132,9 +128,7 @@ def test_other_voices_are_learned_from_but_those_for_judging(
     assert speakers == [["friend", "rms"], ["rms"], []]
 
 
-def test_an_engine_without_a_use_for_voices(
-    run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_engine_without_a_use_for_voices(run, toy_corpus, here, monkeypatch):
     sentence = toy_sentences(3)[0]
     one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
     monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthesise_sentences", lambda **_: iter([one]))
@@ -163,7 +157,7 @@ UNUSABLE = [
 ]
 
 
-def test_what_cannot_be_used(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_what_cannot_be_used(run, toy_corpus, here):
     (here / "folder").mkdir()
     for arguments, code, words in UNUSABLE:
         done = run("train", *arguments.replace("CORPUS", str(toy_corpus.path)).split())
@@ -173,9 +167,7 @@ def test_what_cannot_be_used(run: RunCommand, toy_corpus: Corpus, here: Path) ->
 
 
 @pytest.mark.long
-def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(
-    run: RunCommand, toy_corpus: Corpus, here: Path
-) -> None:
+def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(run, toy_corpus, here):
     for more, visual in (((), "eigenlips"), (("--visual", "geometry"), None)):
         assert run("train", toy_corpus.path, "-o", "m.lipmotion", "--force", "--preset", "xieliu2007", *more).code == 0
         model = load_model(here / "m.lipmotion")
@@ -193,9 +185,7 @@ def sound(path: Path, samples: np.ndarray) -> Path:
 
 
 @pytest.mark.long
-def test_it_is_the_function_of_the_same_name(
-    run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path
-) -> None:
+def test_it_is_the_function_of_the_same_name(run, here, toy_speech, toy_model_file):
     done = run("adapt", toy_speech, "--model", toy_model_file, "-o", "voice.lipmotion")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("voice.lipmotion: 1 recordings, ")
@@ -208,7 +198,7 @@ def test_it_is_the_function_of_the_same_name(
 
 
 @pytest.mark.long
-def test_what_cannot_be_adapted_to(run: RunCommand, here: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_adapted_to(run, here, toy_model_file, tmp_path):
     silent = sound(tmp_path / "silent.wav", np.zeros(32_000))
     (tmp_path / "text.wav").write_bytes(b"words")
     for path, words in (

@@ -82,7 +82,7 @@ def run_as_ordinary(line: str) -> Done:
 
 
 @pytest.mark.long
-def test_what_may_not_be_read_or_written(laid: Path) -> None:
+def test_what_may_not_be_read_or_written(laid):
     before = sorted(path.name for path in laid.iterdir())
     for closed, code, line in LINES:
         (laid / closed).chmod(0)

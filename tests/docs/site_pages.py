@@ -25,8 +25,6 @@ COMMAND = re.compile(r"(?:lipmotion|python|make|pip|ffmpeg|dask|export) ")
 def settings() -> ModuleType:
     """Return the settings of the site, which do not need Sphinx."""
     spec = importlib.util.spec_from_file_location("site_settings", ROOT / "docs" / "conf.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

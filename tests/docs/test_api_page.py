@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from children import environment, run_child
-from lipmotion import Corpus
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
@@ -19,7 +18,7 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.long
-def test_every_block_of_the_page_runs(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_every_block_of_the_page_runs(toy_corpus, tmp_path):
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     shutil.copytree(toy_corpus.path, tmp_path / "my-corpus")
     done = run_child(
@@ -32,7 +31,7 @@ def test_every_block_of_the_page_runs(toy_corpus: Corpus, tmp_path: Path) -> Non
     assert {"welcome.json", "welcome.csv", "welcome.tsv", "small.lipmotion"} <= {p.name for p in tmp_path.iterdir()}
 
 
-def test_every_section_has_a_block_and_uses_the_modules_that_its_title_names() -> None:
+def test_every_section_has_a_block_and_uses_the_modules_that_its_title_names():
     sections = PAGE.split("\n## ")[1:]
     assert len(sections) >= 9
     for section in sections:

@@ -39,7 +39,7 @@ def commands(page: Path) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in block.splitlines()]
 
 
-def test_a_recipe_is_a_short_page_with_three_commands() -> None:
+def test_a_recipe_is_a_short_page_with_three_commands():
     understood, index = parser(), INDEX.read_text(encoding="utf-8")
     assert len(PAGES) >= 6
     for page in PAGES:
@@ -53,7 +53,7 @@ def test_a_recipe_is_a_short_page_with_three_commands() -> None:
         assert f"    {prepare.recordings.parts[0]}/\n" in text
 
 
-def test_links_of_the_recipes_resolve() -> None:
+def test_links_of_the_recipes_resolve():
     assert {page.name: broken(page.read_text(encoding="utf-8"), page) for page in (INDEX, *PAGES)} == {
         page.name: [] for page in (INDEX, *PAGES)
     }
@@ -93,7 +93,7 @@ def write_sound(path: Path, utterance: Utterance) -> None:
 
 
 @pytest.mark.long
-def test_three_commands_make_a_model_of_many_and_judge_it_on_strangers(lrs: Path) -> None:
+def test_three_commands_make_a_model_of_many_and_judge_it_on_strangers(lrs):
     prepare, train, folds = commands(FOLDER / "lrs.md")
     folds[folds.index("5")] = "3"
     for command in (prepare, train, folds):
@@ -102,7 +102,6 @@ def test_three_commands_make_a_model_of_many_and_judge_it_on_strangers(lrs: Path
     assert {speaker: count for speaker, (count, _) in corpus.speakers.items()} == dict.fromkeys(PEOPLE, 3)
     assert corpus.utterance("anna-00001").words == toy_utterances(9)[1].words
     model = load_model(lrs / "lrs.lipmotion")
-    assert model.speakers is not None
     assert model.speakers.names == PEOPLE
     figures = json.loads((lrs / "lrs.json").read_text())
     assert (figures["folds"], figures["trained_on"]) == (3, [6, 6, 6])

@@ -44,5 +44,5 @@ def test_the_examples_of_a_docstring_run(name: str, monkeypatch: pytest.MonkeyPa
     assert result.failed == 0, "".join(reports)
 
 
-def test_every_public_name_has_an_example() -> None:
+def test_every_public_name_has_an_example():
     assert [name for name, _, home in homes() if f"{home}.{name}" not in EXAMPLES] == []

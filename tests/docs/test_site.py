@@ -16,7 +16,7 @@ TOOLS = Path(sys.prefix) / "site-tools"
 """Where ``make site`` installs Sphinx."""
 
 
-def test_the_sidebar_holds_every_page_once() -> None:
+def test_the_sidebar_holds_every_page_once():
     listed = pages()
     there = [
         ROOT / "tests" / "robustness" / "table.md",
@@ -30,7 +30,7 @@ def test_the_sidebar_holds_every_page_once() -> None:
     assert ":caption: Results\n\n/docs/limits\n" in SETTINGS.sidebar(SETTINGS.INDEX)
 
 
-def test_pages_link_files_not_folders() -> None:
+def test_pages_link_files_not_folders():
     """GitHub shows folders, the site does not."""
     for page in pages():
         path = ROOT / f"{page}.md"
@@ -38,11 +38,11 @@ def test_pages_link_files_not_folders() -> None:
         assert [target for target in inside if not (path.parent / target.partition("#")[0]).is_file()] == [], page
 
 
-def test_nothing_from_elsewhere_is_named() -> None:
+def test_nothing_from_elsewhere_is_named():
     assert not re.search(r"https?:|//", (ROOT / "docs" / "conf.py").read_text(encoding="utf-8"))
 
 
-def test_lists_of_arguments_become_field_lists() -> None:
+def test_lists_of_arguments_become_field_lists():
     given = [
         "Return it.",
         "path, name : where",
@@ -64,7 +64,7 @@ def test_lists_of_arguments_become_field_lists() -> None:
 
 
 @pytest.mark.long
-def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+def test_the_site_is_built_without_a_warning(tmp_path):
     if not TOOLS.is_dir():
         pytest.skip("make site installs the tools")
     site = tmp_path / "site"

@@ -53,7 +53,7 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
 
 
 @pytest.mark.long
-def test_what_was_done(figures: dict[str, Any]) -> None:
+def test_what_was_done(figures):
     assert (figures["folds"], figures["seed"], figures["clips"]) == (3, 0, 8)
     assert figures["trained_on"] == [5, 5, 6]
     assert list(figures["conditions"]) == CONDITIONS
@@ -61,7 +61,7 @@ def test_what_was_done(figures: dict[str, Any]) -> None:
 
 
 @pytest.mark.long
-def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
+def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
     generated = np.concatenate([clip.generated[:, 0] for clip in by_hand])
     original = np.concatenate([clip.original[:, 0] for clip in by_hand])
     row = figures["conditions"]["with transcript"]
@@ -74,7 +74,7 @@ def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand:
 
 
 @pytest.mark.long
-def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
+def test_closings_are_of_all_clips_as_one_split(figures, by_hand):
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
     pairs = [(find_closings(c.generated[:, 0], under), find_closings(c.original[:, 0], under)) for c in by_hand]
     hits = [any(abs(int(g) - int(o)) <= 2 for g in made) for made, recorded_ones in pairs for o in recorded_ones]
@@ -84,7 +84,7 @@ def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand
 
 
 @pytest.mark.long
-def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
+def test_p_b_m_and_elsewhere_by_hand(figures, by_hand):
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
     wanted, hit, elsewhere, speech_s = 0, 0, [0, 0], 0.0
     for clip in by_hand:
@@ -106,27 +106,27 @@ def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[Comp
     assert row["original_per_minute"] == pytest.approx(elsewhere[1] / speech_s * 60)
 
 
-def test_counts_that_cannot_be(toy_corpus: Corpus) -> None:
+def test_counts_that_cannot_be(toy_corpus):
     for count in (-1, 1, 9):
         with pytest.raises(InputError, match=f"{count} folds; required: from 2 to 8, which is how many"):
             folds(toy_corpus, count=count)
 
 
-def test_corpora_that_cannot_be(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_corpora_that_cannot_be(toy_corpus, tmp_path):
     with pytest.raises(CorpusError, match="no utterances of split 'train'"):
         folds(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
         folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
-def test_the_document_shows_the_figures_beside_it() -> None:
+def test_the_document_shows_the_figures_beside_it():
     results = Path(__file__).parents[2] / "docs" / "results"
     figures = json.loads((results / "folds.json").read_text(encoding="utf-8"))
     assert f"```text\n{table(figures)}\n```" in (results / "folds.md").read_text(encoding="utf-8")
     assert (figures["folds"], figures["clips"]) == (5, 452)
 
 
-def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus, monkeypatch):
     """A fold with an utterance that has no words lacks a condition, so all folds together lack it."""
     cut: list[tuple[str, ...]] = []
 
@@ -152,9 +152,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
     assert cut != first
 
 
-def test_finished_parts_are_not_generated_again(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_finished_parts_are_not_generated_again(toy_corpus, tmp_path, monkeypatch):
     made: list[tuple[str, ...]] = []
 
     def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
@@ -184,9 +182,7 @@ def test_finished_parts_are_not_generated_again(
     assert run(None) == again
 
 
-def test_by_speaker_everybody_is_a_stranger_once(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypatch):
     people = ["anna", "ben", "", "anna", "eve", "ben", "anna", "eve"]
     speaker_of = dict(zip(toy_corpus.names("train"), people, strict=True))
     corpus = copied(toy_corpus, tmp_path, lambda each: replace(each, speaker=speaker_of.get(each.name, "test only")))

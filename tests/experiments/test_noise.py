@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,7 +17,7 @@ def clean(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
     return load_held_out(toy_corpus, Recogniser(toy_model.phones, "own"), selection=Selection("test"))
 
 
-def test_faces_stay_and_the_sound_is_noisy(clean: HeldOutRecordings) -> None:
+def test_faces_stay_and_the_sound_is_noisy(clean):
     noisy_recordings = add_noise(clean, "white", 10, seed=4)
     assert list(noisy_recordings.conditions) == ["audio only"]
     assert noisy_recordings.reference is clean.reference
@@ -31,7 +29,7 @@ def test_faces_stay_and_the_sound_is_noisy(clean: HeldOutRecordings) -> None:
         assert noisy_recordings.conditions["audio only"][number] == clean.phones.recognise(one.audio, one.features)
 
 
-def test_every_clip_has_noise_of_its_own(clean: HeldOutRecordings) -> None:
+def test_every_clip_has_noise_of_its_own(clean):
     noisy_utterances = add_noise(clean, "white", 0).utterances
     one, other = (
         noisy.audio.samples - before.audio.samples
@@ -41,7 +39,7 @@ def test_every_clip_has_noise_of_its_own(clean: HeldOutRecordings) -> None:
     assert abs(np.corrcoef(one[:shorter], other[:shorter])[0, 1]) < 0.05
 
 
-def test_talkers_are_the_recordings_of_a_folder(toy_speech: Path, tmp_path: Path) -> None:
+def test_talkers_are_the_recordings_of_a_folder(toy_speech, tmp_path):
     for name in ("b.wav", "a.wav"):
         (tmp_path / name).write_bytes(toy_speech.read_bytes())
     (tmp_path / "words.txt").write_text("no sound")
@@ -50,7 +48,7 @@ def test_talkers_are_the_recordings_of_a_folder(toy_speech: Path, tmp_path: Path
     assert all(0 < talker.duration_s <= LONGEST_S for talker in talkers)
 
 
-def test_no_talkers(tmp_path: Path) -> None:
+def test_no_talkers(tmp_path):
     with pytest.raises(InputError, match="nowhere: no such folder; give one with recordings of other people"):
         read_talkers(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no recording in it"):

@@ -69,7 +69,7 @@ def figures(toy_corpus: Corpus, folder: Path, work: Path) -> dict[str, Any]:
 
 
 @LONG
-def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
+def test_every_size_condition_and_system(figures):
     assert [(row["names"], row["used"]) for row in figures["rows"]] == [(3, 3), (8, 8)]
     for row in figures["rows"]:
         assert list(row["conditions"]) == ["audio only", "with transcript"]
@@ -81,7 +81,7 @@ def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
 
 
 @LONG
-def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus):
     wanted = evaluate(train(toy_corpus, recogniser=PHONE_MODELS)[0], toy_corpus)
     for condition, expected_figures in wanted["conditions"].items():
         row = figures["rows"][-1]["conditions"][condition]["trajectory HMM"]
@@ -94,7 +94,7 @@ def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpu
 
 @LONG
 @pytest.mark.parametrize("name", [MULTISTREAM, REFERENCE_SYSTEM])
-def test_a_preset_is_the_row_of_the_table(name: str, figures: dict[str, Any], work: Path, toy_corpus: Corpus) -> None:
+def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     """The arrays of the model file and the motion are the same; conversions of one model differ by that alone."""
     model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine_from_settings(preset=name))[0]
     arrays = model.engine.to_arrays(model.learned)
@@ -121,7 +121,7 @@ def test_a_preset_is_the_row_of_the_table(name: str, figures: dict[str, Any], wo
 
 
 @LONG
-def test_a_tuned_system_is_the_best_that_was_tried(figures: dict[str, Any]) -> None:
+def test_a_tuned_system_is_the_best_that_was_tried(figures):
     for name in (MULTISTREAM, REFERENCE_SYSTEM):
         assert {trial["options"].get("audio_weight", 1.0) for trial in figures["tuning"]["tried"][name]} == {1.0, 0.3}
         row = figures["rows"][-1]["training"][name + TUNED]
@@ -137,9 +137,7 @@ def test_a_tuned_system_is_the_best_that_was_tried(figures: dict[str, Any]) -> N
 
 
 @LONG
-def test_it_goes_on_from_what_is_finished(
-    figures: dict[str, Any], work: Path, toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus, monkeypatch):
     monkeypatch.setattr(systems, "train_stages", None)
     monkeypatch.setattr(six_systems, "generate_clips", None)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], tuning=BRIEF)
@@ -150,7 +148,7 @@ def test_it_goes_on_from_what_is_finished(
 
 
 @LONG
-def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: dict[str, Any]) -> None:
+def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures):
     rows = figures["rows"][-1]["conditions"]["audio only"]
     for name, row in rows.items():
         for key in ("amse", "acc"):
@@ -162,7 +160,7 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: d
 
 
 @LONG
-def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
+def test_noise_makes_it_worse(figures):
     clean = figures["rows"][-1]["conditions"]["audio only"]
     much = figures["noise"][0]["systems"]
     for name in ("trajectory HMM", MULTISTREAM):
@@ -171,14 +169,14 @@ def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
 
 
 @LONG
-def test_pictures_are_written(figures: dict[str, Any], folder: Path) -> None:
+def test_pictures_are_written(figures, folder):
     assert figures
     assert sorted(path.name for path in folder.iterdir()) == sorted(PLOT_FILES.values())
     assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
 
 
 @LONG
-def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
+def test_the_text_names_every_system(figures):
     lines = table(figures).splitlines()
     for name in SYSTEMS:
         assert sum(line.startswith(f"  {name}  ") for line in lines) >= 5
@@ -188,7 +186,7 @@ def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
 
 @LONG
 @pytest.mark.parametrize("visual", ["both"])
-def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
+def test_eigenlips(visual, toy_corpus):
     options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
     received: list[tuple[str, str]] = []
     settings = replace(SMALL, receive=lambda *given: received.append(given[:2]))
@@ -209,7 +207,7 @@ def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
     assert (["eigenlips"] in starts) == (visual == "both")
 
 
-def test_systems_in_the_order_of_the_table() -> None:
+def test_systems_in_the_order_of_the_table():
     assert select_systems(["loudness", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "loudness"]
     assert select_systems([MATCHED]) == ["ph-MSHMM", "ph-vi-FHMM", REFERENCE_SYSTEM, "ph-vi-FHMM" + TUNED, MATCHED]
     assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
@@ -217,7 +215,7 @@ def test_systems_in_the_order_of_the_table() -> None:
         select_systems(["ph-RNN"])
 
 
-def test_other_engines_are_compared_when_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_engines_are_compared_when_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
     left_out = COMPARED_SYSTEMS.keys() - select_systems(None)
     assert left_out == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
@@ -226,15 +224,13 @@ def test_other_engines_are_compared_when_named(monkeypatch: pytest.MonkeyPatch) 
         select_systems([BLSTM])
 
 
-def test_without_matplotlib_there_are_no_pictures(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_matplotlib_there_are_no_pictures(toy_corpus, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingDependencyError, match=r'need matplotlib.*; pip install ".*\[plots\]"'):
         xieliu2007(toy_corpus, plots=tmp_path)
 
 
-def test_what_cannot_be_chosen(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_what_cannot_be_chosen(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="no system 'nothing'"):
         xieliu2007(toy_corpus, ComparisonOptions(systems=["nothing"]), settings=SMALL)
     with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
@@ -248,14 +244,14 @@ def test_what_cannot_be_chosen(toy_corpus: Corpus, tmp_path: Path) -> None:
         xieliu2007(toy_corpus, plots=tmp_path / "file")
 
 
-def test_noise_that_cannot_be_made() -> None:
+def test_noise_that_cannot_be_made():
     with pytest.raises(InputError, match="unknown noise 'pink'; required some of: white, babble"):
         NoiseConditions(("pink",))
     with pytest.raises(InputError, match="a babble of 0 talkers; required at least 2"):
         NoiseConditions(("babble",))
 
 
-def test_the_document_shows_the_figures_beside_it() -> None:
+def test_the_document_shows_the_figures_beside_it():
     results = Path(__file__).parents[2] / "docs" / "results"
     text = (results / "xieliu2007.md").read_text(encoding="utf-8")
     figures = json.loads((results / "xieliu2007.json").read_text(encoding="utf-8"))

@@ -154,12 +154,10 @@ def _of_clip(generation: Generation, fps: float) -> Mask:
 
 
 def _of_scene(character: DrivenCharacter) -> Reader:
-    assert character.shapes is not None
     gap = dict(zip(character.shapes.names, character.shapes.gap.tolist(), strict=True))
 
     def read(generation: Generation, fps: float) -> Mask:
         weights = character_scene(generation, character, fps).weights
-        assert weights is not None
         apart = sum(gap[name] * weights[name] for name in weights.names if name in gap)
         return np.asarray(apart < TOUCHING_GAP)
 
@@ -169,7 +167,6 @@ def _of_scene(character: DrivenCharacter) -> Reader:
 def _of_head_scene(generation: Generation, fps: float) -> Mask:
     moved = _generation(with_mouth(generation.motion), generation.units)
     weights = head_scene(moved, fps).weights
-    assert weights is not None
     character = figure()
     mesh = head_mesh(character, moods=any(map(is_mood, generation.motion.names)))
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
@@ -225,9 +222,7 @@ def _check(generation: Generation, fps: float, readers: dict[str, Reader]) -> No
 
 
 @pytest.mark.parametrize(("kind", "fps"), list(zip(KINDS, RATES * 2, strict=False)))
-def test_lips_touch_in_the_same_frames_everywhere(
-    kind: str, fps: float, characters: dict[str, DrivenCharacter]
-) -> None:
+def test_lips_touch_in_the_same_frames_everywhere(kind, fps, characters):
     readers = _readers(characters)
     if kind != "generated":
         del readers["head scene"]  # takes longer
@@ -236,7 +231,7 @@ def test_lips_touch_in_the_same_frames_everywhere(
 
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("kind", KINDS)
-def test_files_of_vowels_have_the_same_contact(kind: str, name: str, tmp_path: Path) -> None:
+def test_files_of_vowels_have_the_same_contact(kind, name, tmp_path):
     generation = deliver(KINDS[kind](), Delivery())
     write_motion(tmp_path / name, fit_to_format(Path(name), generation, generation, None), source={}, model={})
     read, _ = read_motion(tmp_path / name)
@@ -246,7 +241,7 @@ def test_files_of_vowels_have_the_same_contact(kind: str, name: str, tmp_path: P
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
-def test_at_all_rates(kind: str, characters: dict[str, DrivenCharacter]) -> None:
+def test_at_all_rates(kind, characters):
     generation = deliver(KINDS[kind](), Delivery())
     for fps in RATES:
         _check(generation, fps, _readers(characters))
@@ -264,13 +259,13 @@ def _closures_kept(kind: str, mood: str) -> Generation:
 
 
 @pytest.mark.parametrize("mood", MOODS)
-def test_lips_touch_in_the_same_frames_in_every_mood(mood: str, characters: dict[str, DrivenCharacter]) -> None:
+def test_lips_touch_in_the_same_frames_in_every_mood(mood, characters):
     readers = {name: read for name, read in _readers(characters).items() if name in ("drawn faces", "head", ARKIT, FAP)}
     _check(_closures_kept("imported at 25 Hz", mood), 25.0, readers | {"take": _of_take})
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("mood", MOODS)
-def test_everywhere_in_every_mood(mood: str, characters: dict[str, DrivenCharacter]) -> None:
+def test_everywhere_in_every_mood(mood, characters):
     for kind in ("generated", "captured weights"):
         _check(_closures_kept(kind, mood), 30.0, _readers(characters))

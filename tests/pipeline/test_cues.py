@@ -24,7 +24,7 @@ def generation(toy_speech: Path, toy_model: Model) -> Generation:
     return lipmotion.animate(toy_speech, model=toy_model)
 
 
-def test_several_files_at_once(generation: Generation, tmp_path: Path) -> None:
+def test_several_files_at_once(generation, tmp_path):
     sheet = lipmotion.cues(generation)
     paths = [tmp_path / f"é.{form}" for form in CUE_FORMATS]
     lipmotion.write_cues(sheet, paths, speech="é.wav")
@@ -32,7 +32,7 @@ def test_several_files_at_once(generation: Generation, tmp_path: Path) -> None:
         assert path.read_text() == cue_text(sheet, speech="é.wav", form=form)
 
 
-def test_options_out_of_range(generation: Generation) -> None:
+def test_options_out_of_range(generation):
     for options, words in (
         ({"fps": 0}, "frame rate is 0, required 1 to 100 a second"),
         ({"fps": float("nan")}, "frame rate is nan"),
@@ -43,7 +43,7 @@ def test_options_out_of_range(generation: Generation) -> None:
             lipmotion.cues(generation, **options)
 
 
-def test_results_that_have_no_cues(generation: Generation) -> None:
+def test_results_that_have_no_cues(generation):
     with pytest.raises(ExportError, match="has no phones"):
         lipmotion.cues(replace(generation, units=Timeline(())))
     broken = generation.motion.values.copy()
@@ -52,7 +52,7 @@ def test_results_that_have_no_cues(generation: Generation) -> None:
         lipmotion.cues(replace(generation, motion=replace(generation.motion, values=broken)))
 
 
-def test_all_outputs_are_checked_before_the_first_is_written(generation: Generation, tmp_path: Path) -> None:
+def test_all_outputs_are_checked_before_the_first_is_written(generation, tmp_path):
     (tmp_path / "speech.dat").touch()
     sheet = lipmotion.cues(generation)
     for names, form, words in (
@@ -67,7 +67,7 @@ def test_all_outputs_are_checked_before_the_first_is_written(generation: Generat
 
 
 @pytest.mark.recordings
-def test_real_recordings(recordings: Path) -> None:
+def test_real_recordings(recordings):
     """On clips of GRID s1: every p b m is closed, the mouth rests in silence, no shape is shorter than two frames."""
     grid = recordings / "grid-s1"
     if not grid.is_dir():
@@ -93,7 +93,7 @@ def test_real_recordings(recordings: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("late", [0, 37])
-def test_each_line_of_a_stem_has_the_motion_and_the_cues_of_the_line_alone(toy_model: Model, late: int) -> None:
+def test_each_line_of_a_stem_has_the_motion_and_the_cues_of_the_line_alone(toy_model, late):
     """Three lines at levels 15 dB apart, one of them with an offset, in digital silence; on the frames and beside them.
 
     Motion is that of the line alone but for rounding; within a line nothing follows from the others.

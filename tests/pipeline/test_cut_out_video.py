@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +27,7 @@ def result() -> Generation:
     return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
-def test_every_picture_is_that_of_its_cue(result: Generation, tmp_path: Path) -> None:
+def test_every_picture_is_that_of_its_cue(result, tmp_path):
     drawings = draw(tmp_path / "chart", LETTERS)
     lipmotion.write(result, tmp_path / "a%05d.png", speech=SOUND, face=drawings, fps=24)
     shown = list_frame_shapes(lipmotion.cues(result, fps=24))
@@ -40,7 +39,7 @@ def test_every_picture_is_that_of_its_cue(result: Generation, tmp_path: Path) ->
     assert {10, 90} <= {*greys}
 
 
-def test_what_drawings_cannot_show_is_refused(result: Generation, tmp_path: Path) -> None:
+def test_what_drawings_cannot_show_is_refused(result, tmp_path):
     drawings = draw(tmp_path / "chart", "A B C D E F")
     silent = replace(result, units=Timeline(()))
     with pytest.raises(ExportError, match="has no phones, from which drawings are chosen"):

@@ -19,7 +19,7 @@ two processes, and two files that appear together."""
 @pytest.mark.slow
 @pytest.mark.video
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
-def test_killed_runs_go_on_to_the_same_bytes(tmp_path: Path) -> None:
+def test_killed_runs_go_on_to_the_same_bytes(tmp_path):
     pytest.importorskip("mediapipe")
     chosen = [word for job in JOBS for word in ("--job", job)]
     command = [sys.executable, str(SCRIPT), *chosen, "--kills", "4", "--seed", "1", "-o", "kills.txt"]

@@ -35,7 +35,7 @@ def some_of_grid(recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> 
 @pytest.mark.recordings
 @pytest.mark.video
 @pytest.mark.slow
-def test_from_videos_to_figures(some_of_grid: Path, tmp_path: Path) -> None:
+def test_from_videos_to_figures(some_of_grid, tmp_path):
     pytest.importorskip("mediapipe")
     from lipmotion import prepare
 

@@ -70,8 +70,7 @@ def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarra
 
 
 @pytest.mark.long
-def test_each_person_moves_as_far_as_they_do(model: Model, toy_sentence: ToySentence) -> None:
-    assert model.speakers is not None
+def test_each_person_moves_as_far_as_they_do(model, toy_sentence):
     assert model.speakers.names == ("anna", "ben")
     assert model.about["speakers"] == ["anna", "ben"]
     anna, ben, mean = (opening(model, toy_sentence, name) for name in ("anna", "ben", ""))
@@ -80,7 +79,7 @@ def test_each_person_moves_as_far_as_they_do(model: Model, toy_sentence: ToySent
     assert np.corrcoef(anna, ben)[0, 1] > 0.97
 
 
-def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model: Model, toy_sentence: ToySentence) -> None:
+def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model, toy_sentence):
     ranges = find_closable_ranges(toy_sentence.units, len(opening(model, toy_sentence)))
     assert ranges
     for name, closed in (("anna", 0.0), ("ben", OFFSET[0])):
@@ -89,13 +88,12 @@ def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model: Model, toy
             assert curve[frames].min() < closed + 0.012
 
 
-def test_variances_are_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
-    assert model.speakers is not None
+def test_variances_are_in_the_units_of_the_person(model, toy_sentence):
     mean, ben = (animate(request(toy_sentence, name), model=model) for name in ("", "ben"))
     np.testing.assert_allclose(ben.variance, mean.variance * np.square(model.speakers.of("ben").gain))
 
 
-def test_variances_of_long_recordings(model: Model, toy_sentence: ToySentence, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_variances_of_long_recordings(model, toy_sentence, monkeypatch):
     exact = animate(request(toy_sentence, "ben"), model=model)
     monkeypatch.setattr("lipmotion.motion.generation.DOUBLE_FRAMES", 10)
     single = animate(request(toy_sentence, "ben"), model=model)
@@ -106,7 +104,7 @@ def test_variances_of_long_recordings(model: Model, toy_sentence: ToySentence, m
     np.testing.assert_allclose(single.motion.values, exact.motion.values, atol=1e-5)
 
 
-def test_pins_hold_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
+def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):
     pins = (Pin(0.1, "opening", 0.0), Pin(0.9, "opening", 0.17), Pin(0.93, "opening", 0.0), Pin(1.2, "width", 0.5))
     for speaker in ("anna", "ben"):
         motion = animate(request(toy_sentence, speaker), model=model, constraints=Constraints(pins)).motion
@@ -123,7 +121,7 @@ def test_pins_hold_in_the_units_of_the_person(model: Model, toy_sentence: ToySen
             animate(request(toy_sentence, "ben"), model=model, constraints=Constraints((pin,)))
 
 
-def test_unknown_speakers_are_refused(model: Model, toy_model: Model, toy_sentence: ToySentence) -> None:
+def test_unknown_speakers_are_refused(model, toy_model, toy_sentence):
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
         opening(model, toy_sentence, "cleo")
     with pytest.raises(InputError, match=r"tells no speakers apart.*'cleo'"):
@@ -131,16 +129,14 @@ def test_unknown_speakers_are_refused(model: Model, toy_model: Model, toy_senten
     assert toy_model.speakers is None
 
 
-def test_maps_are_in_the_model_file(model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_maps_are_in_the_model_file(model, toy_sentence, tmp_path):
     save_model(model, tmp_path / "people.lipmotion")
     again = load_model(tmp_path / "people.lipmotion")
     for name in ("anna", "ben"):
         np.testing.assert_allclose(opening(again, toy_sentence, name), opening(model, toy_sentence, name), atol=1e-4)
 
 
-def test_maps_of_other_channels_are_refused(
-    model: Model, toy_sentence: ToySentence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path, monkeypatch):
     def of_jaw(maps: object) -> dict[str, np.ndarray]:
         arrays = speakers_to_arrays(maps)
         arrays["channels"] = np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")])
@@ -153,7 +149,7 @@ def test_maps_of_other_channels_are_refused(
         opening(again, toy_sentence, "ben")
 
 
-def test_evaluation_compares_each_with_their_own_motion(people: Corpus, model: Model) -> None:
+def test_evaluation_compares_each_with_their_own_motion(people, model):
     own, mean = (
         evaluate(each, people, selection=Selection("test"), recogniser="own")
         for each in (model, replace(model, speakers=None))
@@ -164,7 +160,7 @@ def test_evaluation_compares_each_with_their_own_motion(people: Corpus, model: M
     assert "strangers" not in mean
 
 
-def test_strangers_are_named_and_get_the_mean_person(people: Corpus, model: Model, tmp_path: Path) -> None:
+def test_strangers_are_named_and_get_the_mean_person(people, model, tmp_path):
     cleo = replace(people.utterance(people.names("test")[0]), speaker="cleo")
     corpus = corpus_of(tmp_path / "cleo", [cleo])
     figures = evaluate(model, corpus, selection=Selection(None), recogniser="own")
@@ -173,14 +169,14 @@ def test_strangers_are_named_and_get_the_mean_person(people: Corpus, model: Mode
     assert figures["conditions"] == mean["conditions"]
 
 
-def test_an_explanation_is_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
+def test_an_explanation_is_in_the_units_of_the_person(model, toy_sentence):
     motion = animate(request(toy_sentence, "ben"), model=model).motion
     for explanation in explain(request(toy_sentence, "ben"), at=[0.0, 0.9], model=model):
         for name, value in explanation.motion.items():
             assert value.value == pytest.approx(motion[name][explanation.frame], abs=1e-9)
 
 
-def test_one_person_is_not_mapped(people: Corpus) -> None:
+def test_one_person_is_not_mapped(people):
     model, _ = train(
         people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
     )
@@ -189,7 +185,7 @@ def test_one_person_is_not_mapped(people: Corpus) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["joint", "coupled"])
-def test_other_engines(people: Corpus, toy_sentence: ToySentence, engine: str) -> None:
+def test_other_engines(people, toy_sentence, engine):
     settings = {"chains": "sVis 2vis", "mixtures": 2} if engine == "coupled" else {}
     model, _ = train(people, recogniser=SMALL, engine=engine_named(engine, settings))
     anna, ben = (opening(model, toy_sentence, name) for name in ("anna", "ben"))
@@ -210,9 +206,7 @@ def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
 
 
 @pytest.mark.long
-def test_channels_that_all_have_are_trained_on(
-    people: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_channels_that_all_have_are_trained_on(people, tmp_path, caplog):
     footage = [people.utterance(name) for name in people.names("train")[:6]]
     jaw = (Channel("jaw", "weight"), Channel("width"), Channel("opening"))
     capture = [captured(utterance, jaw) for utterance in toy_utterances(6, seed=1)[:3]]
@@ -222,13 +216,12 @@ def test_channels_that_all_have_are_trained_on(
         model, report = train(corpus, recogniser=SMALL)
     assert "training on the 2 channels that all have (width, opening); left out: jaw, outer" in caplog.text
     assert len(report.used) == 9
-    assert model.speakers is not None
     assert model.speakers.names == ("anna", "ben", "captured")
     generated = animate(Request(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
     assert generated.motion.names == ("width", "opening")
 
 
-def test_no_common_channel_is_an_error(people: Corpus, tmp_path: Path) -> None:
+def test_no_common_channel_is_an_error(people, tmp_path):
     weights = tuple(Channel(name, "weight") for name in ("opening", "jaw"))
     strange = [captured(utterance, weights) for utterance in toy_utterances(3)[:1]]
     corpus = corpus_of(tmp_path / "apart", [people.utterance(people.names("train")[1]), *strange])

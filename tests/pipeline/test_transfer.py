@@ -76,13 +76,13 @@ def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) ->
 
 
 @pytest.mark.long
-def test_onto_the_person_of_a_corpus(toy_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+def test_onto_the_person_of_a_corpus(toy_model, toy_sentence, ben):
     is_like_ben(toy_model, toy_sentence, ben.path)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["coupled", "selection"])
-def test_every_engine(toy_corpus: Corpus, toy_sentence: ToySentence, ben: Corpus, engine: str) -> None:
+def test_every_engine(toy_corpus, toy_sentence, ben, engine):
     settings: dict[str, object] = {"articulation": False}  # the toy's mouth does not move as English ones do
     if engine == "coupled":
         settings |= {"chains": "sVis 2vis", "mixtures": 2}
@@ -90,9 +90,7 @@ def test_every_engine(toy_corpus: Corpus, toy_sentence: ToySentence, ben: Corpus
     is_like_ben(model, toy_sentence, ben)
 
 
-def test_variance_and_pins_and_explanations_are_of_the_person(
-    toy_model: Model, toy_sentence: ToySentence, ben: Corpus
-) -> None:
+def test_variance_and_pins_and_explanations_are_of_the_person(toy_model, toy_sentence, ben):
     person = map_onto(toy_model, ben)
     own, mapped = (animate(request(toy_sentence, onto), model=toy_model) for onto in (None, person))
     np.testing.assert_allclose(mapped.variance, own.variance * np.square(person.gain))
@@ -105,7 +103,7 @@ def test_variance_and_pins_and_explanations_are_of_the_person(
 
 
 @pytest.mark.long
-def test_a_person_of_the_model_onto_another(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+def test_a_person_of_the_model_onto_another(two_model, toy_sentence, ben):
     """Whoever of the model's people speaks, the motion is in ben's place and range."""
     people = [animate(request(toy_sentence, ben, speaker=name), model=two_model).motion for name in ("", "anna", "ben")]
     ranges = np.stack([np.ptp(np.percentile(motion.values, [5, 95], axis=0), axis=0) for motion in people])
@@ -116,16 +114,14 @@ def test_a_person_of_the_model_onto_another(two_model: Model, toy_sentence: ToyS
         animate(request(toy_sentence, ben, speaker="cleo"), model=two_model)
 
 
-def test_onto_one_person_of_a_corpus_of_several(toy_model: Model, toy_sentence: ToySentence, of_two: Corpus) -> None:
+def test_onto_one_person_of_a_corpus_of_several(toy_model, toy_sentence, of_two):
     is_like_ben(toy_model, toy_sentence, of_two, onto_speaker="ben")
     for more, found in (({}, "2 speakers"), ({"onto_speaker": "cleo"}, "no speaker 'cleo'")):
         with pytest.raises(InputError, match=rf"{found}, required one of: anna, ben; name it \(--onto-speaker\)"):
             animate(request(toy_sentence, of_two, **more), model=toy_model)
 
 
-def test_onto_a_person_of_another_model(
-    toy_model: Model, two_model: Model, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
+def test_onto_a_person_of_another_model(toy_model, two_model, toy_sentence, tmp_path):
     save_model(two_model, tmp_path / "two.lipmotion")
     mapped = animate(request(toy_sentence, tmp_path / "two.lipmotion", onto_speaker="ben"), model=toy_model).motion
     wanted = animate(request(toy_sentence, speaker="ben"), model=two_model).motion
@@ -137,9 +133,7 @@ def test_onto_a_person_of_another_model(
         map_onto(toy_model, two_model)
 
 
-def test_onto_the_person_of_a_video(
-    toy_model: Model, toy_sentence: ToySentence, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_onto_the_person_of_a_video(toy_model, toy_sentence, toy_speech, monkeypatch):
     """The video is as short as a sentence, so that the gain counts in part."""
     tracked = []
 
@@ -157,7 +151,7 @@ def test_onto_the_person_of_a_video(
         map_onto(toy_model, toy_speech, onto_speaker="ben")
 
 
-def test_a_map_is_kept_in_a_model(toy_model: Model, toy_sentence: ToySentence, ben: Corpus, tmp_path: Path) -> None:
+def test_a_map_is_kept_in_a_model(toy_model, toy_sentence, ben, tmp_path):
     person = map_onto(toy_model, ben)
     known = with_person(with_person(toy_model, "ben", person), "cleo", replace(person, gain=2 * person.gain))
     save_model(known, tmp_path / "known.lipmotion")
@@ -174,7 +168,7 @@ def test_a_map_is_kept_in_a_model(toy_model: Model, toy_sentence: ToySentence, b
 
 
 @pytest.mark.long
-def test_a_person_joins_those_of_a_model(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+def test_a_person_joins_those_of_a_model(two_model, toy_sentence, ben):
     person = map_onto(two_model, ben)
     known = with_person(two_model, "other", person)
     found = animate(request(toy_sentence, speaker="other"), model=known).motion
@@ -185,7 +179,7 @@ def test_a_person_joins_those_of_a_model(two_model: Model, toy_sentence: ToySent
     np.testing.assert_allclose(anna, same)
 
 
-def test_other_channels_are_refused(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_other_channels_are_refused(toy_model, toy_sentence, tmp_path):
     def weights(utterance: Utterance) -> Utterance:
         channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
         motion = replace(utterance.track.motion, channels=channels)
@@ -196,7 +190,7 @@ def test_other_channels_are_refused(toy_model: Model, toy_sentence: ToySentence,
         animate(request(toy_sentence, corpus), model=toy_model)
 
 
-def test_no_face_and_no_speech_are_refused(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
     def unseen(utterance: Utterance) -> Utterance:
         return replace(utterance, track=replace(utterance.track, seen=np.zeros_like(utterance.track.seen)))
 
@@ -207,7 +201,7 @@ def test_no_face_and_no_speech_are_refused(toy_model: Model, toy_sentence: ToySe
         animate(request(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
 
 
-def test_what_is_no_person(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_what_is_no_person(toy_model, toy_sentence, tmp_path):
     (tmp_path / "empty.mp4").touch()
     for onto, error, message in (
         (tmp_path, CorpusError, "not a corpus"),
@@ -222,7 +216,7 @@ def test_what_is_no_person(toy_model: Model, toy_sentence: ToySentence, tmp_path
 
 @pytest.mark.recordings
 @pytest.mark.video
-def test_onto_a_real_person(recordings: Path) -> None:
+def test_onto_a_real_person(recordings):
     """A face that rests with parted lips: the third of a second of it counts for nearly half of the way."""
     pytest.importorskip("mediapipe")
     from lipmotion_faces.tracking.track import track

@@ -19,7 +19,7 @@ def motion() -> Motion:
     return Motion(whole.values[10:40], 25.0, whole.channels)
 
 
-def test_frames_show_the_lower_faces_where_they_are_placed(motion: Motion) -> None:
+def test_frames_show_the_lower_faces_where_they_are_placed(motion):
     places = toy_places(len(motion.values))
     drawn = toy_lower_faces(motion, noise=0)
     frames = toy_frames(motion, places, noise=0)
@@ -28,7 +28,7 @@ def test_frames_show_the_lower_faces_where_they_are_placed(motion: Motion) -> No
         assert np.abs(seen - face).mean() < 1.5
 
 
-def test_the_mouth_opens_and_the_chin_drops_as_far_as_they_should(motion: Motion) -> None:
+def test_the_mouth_opens_and_the_chin_drops_as_far_as_they_should(motion):
     faces = toy_lower_faces(motion, 2, noise=0).astype(int)
     column = faces[:, :, 134]  # in the middle of a tooth
     inside = ((column < 90).all(axis=2) | (column.min(axis=2) > 190)).sum(axis=1) / 2 / 90
@@ -40,7 +40,7 @@ def test_the_mouth_opens_and_the_chin_drops_as_far_as_they_should(motion: Motion
 
 
 @pytest.mark.long
-def test_the_same_every_time() -> None:
+def test_the_same_every_time():
     first, again = toy_footage_pictures(3), toy_footage_pictures(3)
     assert all(np.array_equal(one, other) for one, other in zip(first.clips, again.clips, strict=True))
     assert len(first.motion) == len(first.levels_db) == len(first.chin_px) == sum(map(len, first.clips))
@@ -49,7 +49,7 @@ def test_the_same_every_time() -> None:
     assert np.abs(finer[0, ::2, ::2].astype(int) - first.clips[0][3]).mean() < 3
 
 
-def test_what_is_refused() -> None:
+def test_what_is_refused():
     with pytest.raises(InputError, match="at least 3"):
         toy_face(2)
     with pytest.raises(InputError, match="a background of 0 frames a second, required more than 0"):

@@ -40,7 +40,7 @@ def sound(path: Path, spoken_s: float, seed: int, level: float = 0.1) -> None:
         file.writeframes(samples.tobytes())
 
 
-def test_every_kind_is_found(tmp_path: Path) -> None:
+def test_every_kind_is_found(tmp_path):
     sounds = tmp_path / "sounds"
     words = "the old house at the end of the road"
     for seed, (name, spoken_s) in enumerate({"good": 2.2, "short": 0.6, "long": 9.0, "spanish": 2.2}.items()):
@@ -79,19 +79,19 @@ def test_every_kind_is_found(tmp_path: Path) -> None:
     assert "sounds/spanish" not in {each.name for each in spanish.findings if each.kind == "language"}
 
 
-def test_tags_are_no_words(tmp_path: Path) -> None:
+def test_tags_are_no_words(tmp_path):
     sound(tmp_path / "a.wav", 1.0, 1)
     line = BatchLine("a", str(tmp_path / "a.wav"), "[angry] Who is <smile> there?")
     assert check_line(LineToCheck(line, Request())).words == ("who", "is", "there")
 
 
-def test_a_folder_has_no_orphans(tmp_path: Path) -> None:
+def test_a_folder_has_no_orphans(tmp_path):
     sound(tmp_path / "a.wav", 1.0, 0)
     sound(tmp_path / "deep" / "b.wav", 1.0, 1)
     assert check(tmp_path, jobs=1).text == "2 lines: nothing found"
 
 
-def test_the_measure_of_length_is_the_usual_rate() -> None:
+def test_the_measure_of_length_is_the_usual_rate():
     """What is too long among quick talkers is not among slow ones."""
 
     def lines(share: float) -> list[CheckedLine]:
@@ -102,11 +102,11 @@ def test_the_measure_of_length_is_the_usual_rate() -> None:
     assert list(_find_problems(lines(1.3), [])) == []
 
 
-def test_short_lines_may_have_the_same_words() -> None:
+def test_short_lines_may_have_the_same_words():
     long, short = ("who", "goes", "there", "now"), ("yes", "sir")
     checked = [CheckedLine(name, words=words) for name, words in zip("abcd", (long, short, long, short), strict=True)]
     assert list(_find_problems(checked, [])) == [Finding("same words", "c", "as of a")]
 
 
-def test_letters_of_other_scripts_take_longer() -> None:
+def test_letters_of_other_scripts_take_longer():
     assert count_letters(["hello", "\uac00"]) == pytest.approx(8.0)

@@ -86,7 +86,7 @@ def until(window: Browser, script: str) -> None:
     wait_until(lambda: window.run(f"return {script}"), LIMIT_S)
 
 
-def test_ten_thousand_lines_are_heard_and_marked(window: Browser, toy_speech: Path, tmp_path: Path) -> None:
+def test_ten_thousand_lines_are_heard_and_marked(window, toy_speech, tmp_path):
     page = report(tmp_path, toy_speech, LINES, film=False)
     window.open(page.as_uri())
     assert "10000 of 10000 lines, 0 failed, 1 approved, 0 to redo" in window.text("#count")
@@ -111,7 +111,7 @@ def test_ten_thousand_lines_are_heard_and_marked(window: Browser, toy_speech: Pa
     assert window.problems() == []
 
 
-def test_videos_of_lines_are_seen(window: Browser, toy_speech: Path, tmp_path: Path) -> None:
+def test_videos_of_lines_are_seen(window, toy_speech, tmp_path):
     window.open(report(tmp_path, toy_speech, 6, film=True).as_uri())
     until(window, "list.querySelector('video').videoWidth === 160")
     window.press("j", SPACE)

@@ -140,7 +140,7 @@ def test_words_without_times_are_told_to_be_of_no_use(talk: Path, tmp_path: Path
     assert "its transcript has no times" in caplog.text
 
 
-def test_cuts_divide_and_the_person_is_followed(talk: Path, tmp_path: Path, scanned):
+def test_cuts_divide_and_the_person_is_followed(talk, tmp_path, scanned):
     scanned |= {"cuts_s": (2.4,), "person": (3.0,)}
     report = prepare(talk, tmp_path / "corpus", workers=1)
     assert report.prepared[:3] == ("talk-00h00m00.68s", "talk-00h00m02.40s", "talk-00h00m05.16s")
@@ -180,7 +180,7 @@ def test_progress_is_reported(talk: Path, tmp_path: Path):
     assert (shares[0], shares[-1]) == pytest.approx((0.0, 1.0))
 
 
-def test_a_short_video_is_one_utterance(monkeypatch, tmp_path: Path, talk: Path, scanned):
+def test_a_short_video_is_one_utterance(monkeypatch, tmp_path, talk, scanned):
     del scanned
     monkeypatch.setattr(long_videos, "LONG_S", 100.0)
     report = prepare(talk, tmp_path / "corpus", workers=1)
@@ -190,7 +190,7 @@ def test_a_short_video_is_one_utterance(monkeypatch, tmp_path: Path, talk: Path,
 
 @pytest.mark.video
 @pytest.mark.recordings
-def test_clips_one_after_the_other(recordings: Path, tmp_path: Path):
+def test_clips_one_after_the_other(recordings, tmp_path):
     """Eleven sentences of one speaker and one of another in one file: the other is left out, motion is as it was."""
     pytest.importorskip("mediapipe")
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[:11]

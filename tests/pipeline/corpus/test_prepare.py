@@ -287,7 +287,6 @@ def prepare_partly(script: Path, folder: Path, corpus: Path, stop: signal.Signal
     """
     script.write_text(SCRIPT)
     with child([sys.executable, script, folder, corpus], stderr=NOWHERE) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "two are done\n"
         if stop == signal.SIGINT:
             os.killpg(process.pid, stop)  # as Ctrl-C does: the workers get it, too

@@ -46,7 +46,7 @@ def rewritten(source: Path, target: Path, kept: Sequence[int]) -> None:
 
 @pytest.mark.video
 @pytest.mark.recordings
-def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_path: Path) -> None:
+def test_variable_frame_rate_with_subtitles_and_a_cover(recordings, tmp_path):
     pytest.importorskip("mediapipe")
     source = recordings / "grid-s1" / "clips" / f"{CLIP}.mkv"
     draw = np.random.default_rng(0)
@@ -66,7 +66,7 @@ def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_pa
     assert np.array_equal(varied.audio.samples, plain.audio.samples)
 
 
-def test_each_of_many_unusable_files_is_reported_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_of_many_unusable_files_is_reported_once(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "lipmotion_faces.corpus.prepare.make_tracker", lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "1"})
     )

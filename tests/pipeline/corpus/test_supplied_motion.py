@@ -147,7 +147,6 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
     labelled = spans(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
     duration_s = max(float(edges[-1]) + longer_s, 0.1)
     found = read_supplied_phones(recording(labelled), duration_s)
-    assert found is not None
     assert found[0].start_s == 0
     assert found[-1].end_s == pytest.approx(duration_s)
     assert all(a.end_s == b.start_s for a, b in zip(found, found.spans[1:], strict=False))
@@ -173,7 +172,7 @@ def cut_array(content: bytes, rows: int) -> bytes:
 
 @pytest.mark.long
 @pytest.mark.recordings
-def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_facegood_from_recordings_to_figures(recordings, tmp_path, monkeypatch):
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
     monkeypatch.setattr(acoustic_network, "MIN_STEPS", 100)
     monkeypatch.setattr(posterior_network, "STEPS", 6.0)

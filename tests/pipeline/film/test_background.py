@@ -40,14 +40,14 @@ def numbers(sequence: BackgroundSequence, shown: list[Background]) -> list[int]:
     return [int(np.abs(places - each.face_to_frame.ravel()).sum(axis=1).argmin()) for each in shown]
 
 
-def test_short_speech_shows_the_beginning(sequence: BackgroundSequence) -> None:
+def test_short_speech_shows_the_beginning(sequence):
     for count in (1, 50):
         shown = list(sequence.frames(count, 25.0))
         assert numbers(sequence, shown) == list(range(count))
         assert [each.chin_px for each in shown] == pytest.approx(sequence.chin_px[:count])
 
 
-def test_any_length(sequence: BackgroundSequence) -> None:
+def test_any_length(sequence):
     """It goes on without a jump: neither the picture nor the place of the face."""
     count = 130
     shown = list(sequence.frames(count, 25.0))
@@ -59,7 +59,7 @@ def test_any_length(sequence: BackgroundSequence) -> None:
     assert len({each.frame.tobytes() for each in shown}) > 25
 
 
-def test_heads_lie_upon_one_another_where_a_frame_fades(sequence: BackgroundSequence) -> None:
+def test_heads_lie_upon_one_another_where_a_frame_fades(sequence):
     """A head in two places is shown once, between them, and not twice."""
     (first,) = sequence.frames(1, 25.0)
     moved, place = np.roll(first.frame, (4, 6), axis=(0, 1)), first.face_to_frame.copy()
@@ -73,21 +73,21 @@ def test_heads_lie_upon_one_another_where_a_frame_fades(sequence: BackgroundSequ
     assert np.abs(half.frame[face] - wanted).mean() < 0.25 * np.abs(faded - wanted).mean()
 
 
-def test_any_rate(sequence: BackgroundSequence) -> None:
+def test_any_rate(sequence):
     for rate_hz, frames in ((29.97, 58), (60.0, 60), (12.5, 24)):
         shown = numbers(sequence, list(sequence.frames(frames, rate_hz)))
         assert len(shown) == frames
         assert np.abs(np.array(shown) - np.arange(frames) / rate_hz * 25).max() <= 0.5 + 1e-6
 
 
-def test_frames_are_those_that_were_filmed(sequence: BackgroundSequence, filmed_face: FilmedFace) -> None:
+def test_frames_are_those_that_were_filmed(sequence, filmed_face):
     (first,) = sequence.frames(1, 25.0)
     motion = filmed_face.takes[0].motion
     drawn = next(toy_frames(motion, toy_places(len(motion.values))))
     assert np.abs(first.frame.astype(int) - drawn).mean() < 2
 
 
-def test_the_face_box_holds_the_head_in_every_frame(sequence: BackgroundSequence) -> None:
+def test_the_face_box_holds_the_head_in_every_frame(sequence):
     left, top, right, bottom = sequence.face_box
     for place in sequence.face_to_frame:
         for x in HEAD_PX[::2]:
@@ -98,7 +98,7 @@ def test_the_face_box_holds_the_head_in_every_frame(sequence: BackgroundSequence
     assert right - left < (HEAD_PX[2] - HEAD_PX[0]) * SCALE + 20
 
 
-def test_a_larger_mouth_in_the_same_place(sequence: BackgroundSequence) -> None:
+def test_a_larger_mouth_in_the_same_place(sequence):
     middle = np.array([0.0, 76.0, 1.0])
     larger = sequence.enlarge(1.3)
     for old, new in zip(sequence.face_to_frame, larger.face_to_frame, strict=True):
@@ -107,13 +107,13 @@ def test_a_larger_mouth_in_the_same_place(sequence: BackgroundSequence) -> None:
     assert np.array_equal(larger.chin_px, sequence.chin_px)
 
 
-def test_the_chin_is_where_the_tracker_sees_it(video: ToyVideo) -> None:
+def test_the_chin_is_where_the_tracker_sees_it(video):
     found, drawn = chin_px(footage_of(video)), toy_chin_px(video.motion)
     assert np.abs(found - drawn).max() < 4  # it is smoothed over about a frame
     assert np.corrcoef(found, drawn)[0, 1] > 0.95
 
 
-def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_video_as_a_background(video, monkeypatch):
     install(monkeypatch, {video.path: video}, {})
     opened = open_background(video.path)
     count = len(opened.chin_px)
@@ -125,7 +125,7 @@ def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.long
-def test_the_best_background_is_one_part(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_best_background_is_one_part(video, monkeypatch):
     """Of at most some seconds, without cuts, in which the face is seen."""
     monkeypatch.setattr(background, "register_maps", lambda footage: footage.face_to_image)
     monkeypatch.setattr(background, "MOST_BACKGROUND_S", 1.0)
@@ -138,7 +138,7 @@ def test_the_best_background_is_one_part(video: ToyVideo, monkeypatch: pytest.Mo
     assert early.chin_px == pytest.approx(chin_px(footage_of(video))[: len(early.chin_px)])
 
 
-def test_frames_of_odd_sizes_are_cut(sequence: BackgroundSequence) -> None:
+def test_frames_of_odd_sizes_are_cut(sequence):
     """H.264 with half the colours takes even sizes only."""
 
     class OddGroups:

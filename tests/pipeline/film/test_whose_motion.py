@@ -22,7 +22,7 @@ def face_of(face: FilmedFace, speaker: str) -> FilmedFace:
     return replace(face, about={"corpus": ["filmed/many"], "speaker": speaker})
 
 
-def test_the_person_of_one_corpus(filmed_face: FilmedFace) -> None:
+def test_the_person_of_one_corpus(filmed_face):
     for people, speaker, filmed, same in (
         ((), "", "anna", True),  # a corpus without names has one person
         (("anna",), "", "anna", True),
@@ -37,7 +37,7 @@ def test_the_person_of_one_corpus(filmed_face: FilmedFace) -> None:
         assert not is_person_of(model_of(*people, corpus="filmed/other"), face, speaker)
 
 
-def test_without_speech_nothing_is_mapped(filmed_face: FilmedFace, caplog: pytest.LogCaptureFixture) -> None:
+def test_without_speech_nothing_is_mapped(filmed_face, caplog):
     face = face_of(filmed_face, "anna")
     assert person_shown(model_of("ben"), face) is face
     assert person_shown(model_of("ben"), replace(face, takes=())) is None
@@ -47,7 +47,7 @@ def test_without_speech_nothing_is_mapped(filmed_face: FilmedFace, caplog: pytes
     assert shown_face("portrait").other_person(model_of("ben")) is None
 
 
-def test_mouth_pictures_cannot_be_mapped_onto_another_person(filmed_face: FilmedFace) -> None:
+def test_mouth_pictures_cannot_be_mapped_onto_another_person(filmed_face):
     pictured = SimpleNamespace(about={"corpus": ["filmed/many"], "speakers": ["ben"]}, visual="eigenlips")
     assert is_person_of(pictured, face_of(filmed_face, "ben"))  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"mouth pictures of the person of filmed/many, the face is that of another"):

@@ -27,7 +27,7 @@ from lipmotion.speech.sound.noise import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.testing.toy import ToySentence, toy_sentences
+from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Item, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
 
@@ -114,18 +114,18 @@ def test_sentences_become_training_data() -> None:
         assert speaker == sentence.speaker
 
 
-def test_without_voices_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_voices_it_says_what_to_install(monkeypatch):
     monkeypatch.setattr(module, "installed_voices", lambda: ())
     with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
         next(synthesise_sentences(TEXTS))
 
 
-def test_sides_never_change() -> None:
+def test_sides_never_change():
     named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
     assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
 
 
-def test_a_quarter_is_kept_aside() -> None:
+def test_a_quarter_is_kept_aside():
     assert np.mean([is_held_out_speaker(f"speaker {number}") for number in range(2000)]) == pytest.approx(
         0.25, abs=0.03
     )
@@ -159,7 +159,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recordings_are_aligned(folder, own, monkeypatch):
     monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
     items: list[Item] = []
     given = {"anna-*": "Anna B."}
@@ -176,9 +176,7 @@ def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pyte
     ]
 
 
-def test_a_transcript_of_other_words_is_detected(
-    folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_transcript_of_other_words_is_detected(folder, own, monkeypatch):
     monkeypatch.setattr(module, "agreement_score", lambda *_: -4.3)
     items: list[Item] = []
     assert list(align_recordings(folder, own, monitor=items.append)) == []  # type: ignore[arg-type]
@@ -186,14 +184,14 @@ def test_a_transcript_of_other_words_is_detected(
 
 
 @pytest.mark.parametrize("name", ["nothing", ""])
-def test_a_folder_without_transcripts(tmp_path: Path, own: Recogniser, toy_sentence: ToySentence, name: str) -> None:
+def test_a_folder_without_transcripts(tmp_path, own, toy_sentence, name):
     write(tmp_path / "unsaid.wav", toy_sentence.audio)
     with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
         next(align_recordings(tmp_path / name, own))
 
 
 @pytest.mark.recordings
-def test_real_recordings(recordings: Path, toy_model: Model) -> None:
+def test_real_recordings(recordings, toy_model):
     folder = recordings / "speech-open"
     if not folder.is_dir():
         pytest.skip("speech-open is not here")
@@ -206,7 +204,7 @@ def test_real_recordings(recordings: Path, toy_model: Model) -> None:
 
 
 @pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
-def test_real_voices() -> None:
+def test_real_voices():
     voices = installed_voices()[-1:]
     if not voices:
         pytest.skip("the synthesisers have no voices")
