@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 import json
-import wave
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from children import LIPMOTION, environment, run_child
 from lipmotion.cli.main import main
@@ -85,11 +86,7 @@ def bad_speech(here: Path) -> dict[str, Path]:
     (folder / "empty.wav").touch()
     (folder / "text.wav").write_text("words, not sound\n" * 50)
     write_pictures(folder / "mute.mp4")
-    with wave.open(str(folder / "short.wav"), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(16_000)
-        file.writeframes(bytes(1000))
+    wavfile.write(folder / "short.wav", 16_000, np.zeros(500, "<i2"))
     names = {"missing": "nothing.wav", "empty": "empty.wav", "text": "text.wav", "mute": "mute.mp4"}
     names |= {"short": "short.wav", "folder": "folder", "long name": "x" * 300 + ".wav"}
     return {what: folder / name for what, name in names.items()}

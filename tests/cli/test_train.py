@@ -1,13 +1,12 @@
 from __future__ import annotations
 
 import shutil
-import wave
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from cli.conftest import is_one_error
 from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
@@ -175,15 +174,6 @@ def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(run, toy_corp
         assert (model.engine.config.conversion, model.engine.config.states) == ("em", 5)
 
 
-def sound(path: Path, samples: np.ndarray) -> Path:
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(16_000)
-        file.writeframes(np.round(samples * 32767).astype("<i2").tobytes())
-    return path
-
-
 @pytest.mark.long
 def test_it_is_the_function_of_the_same_name(run, here, toy_speech, toy_model_file):
     done = run("adapt", toy_speech, "--model", toy_model_file, "-o", "voice.lipmotion")
@@ -199,7 +189,8 @@ def test_it_is_the_function_of_the_same_name(run, here, toy_speech, toy_model_fi
 
 @pytest.mark.long
 def test_what_cannot_be_adapted_to(run, here, toy_model_file, tmp_path):
-    silent = sound(tmp_path / "silent.wav", np.zeros(32_000))
+    silent = tmp_path / "silent.wav"
+    wavfile.write(silent, 16_000, np.zeros(32_000, "<i2"))
     (tmp_path / "text.wav").write_bytes(b"words")
     for path, words in (
         (tmp_path / "missing.wav", "no such file"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import wave
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from docs.test_links import broken
 from lipmotion import Corpus, load_model
@@ -85,11 +85,7 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def write_sound(path: Path, utterance: Utterance) -> None:
     samples = (np.clip(utterance.audio.samples, -1, 1) * 32767).astype("<i2")
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(utterance.audio.rate_hz)
-        file.writeframes(samples.tobytes())
+    wavfile.write(path, utterance.audio.rate_hz, samples)
 
 
 @pytest.mark.long

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -57,12 +56,6 @@ def test_a_saved_and_loaded_adaptation_gives_the_same_phones(adapted, adapted_fi
     request = Request(toy_speech, recogniser="fast")
     before, after = (animate(request, model=model).units for model in (adapted, again))
     assert [span.label.phone for span in before] == [span.label.phone for span in after]
-
-
-def test_a_model_without_it_is_written_as_before(toy_model_file):
-    with zipfile.ZipFile(toy_model_file) as file:
-        assert not [name for name in file.namelist() if name.startswith("adaptation")]
-    assert load_model(toy_model_file).adaptation is None
 
 
 @pytest.mark.long

@@ -239,14 +239,6 @@ def test_files_of_vowels_have_the_same_contact(kind, name, tmp_path):
     assert np.flatnonzero(_closed(read)[: len(contact)] != contact).tolist() == []
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("kind", KINDS)
-def test_at_all_rates(kind, characters):
-    generation = deliver(KINDS[kind](), Delivery())
-    for fps in RATES:
-        _check(generation, fps, _readers(characters))
-
-
 def _closures_kept(kind: str, mood: str) -> Generation:
     """Return motion in a mood; every p, b and m closes the lips in it for as long as in none."""
     generation, moody = (deliver(KINDS[kind](), Delivery(mood=name)) for name in ("", mood))

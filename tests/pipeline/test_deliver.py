@@ -18,7 +18,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift_prosody
 from lipmotion.pipeline.request import Outputs, Request
-from lipmotion.types import Generation, Prosody, StateTrace
+from lipmotion.types import Prosody
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.moods import MoodKey
 from lipmotion_faces import Face, Staging
@@ -26,15 +26,7 @@ from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.scenes import delivered_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
-from meshes.speech import motion, units
 from speech.made_voices import laugh, pulses, recording, said, vowels
-
-
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
 @pytest.mark.parametrize("offset_ms", [500.0, -250.0])

@@ -25,20 +25,12 @@ from lipmotion.pipeline.outputs.calibration import POSES, calibrate_rows, pose_s
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, thin_keys
 from lipmotion.pipeline.outputs.motion_input import read_generation
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline
 from lipmotion.types.moods import parse_moods
 from lipmotion_faces import Staging
 from meshes.heads import head, write_glb
-from meshes.speech import motion, units
 
 TAKE = Path("a.livelink.csv")
-
-
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
 def test_plain_formats_hold_what_was_chosen(generation):

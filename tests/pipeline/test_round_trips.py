@@ -15,20 +15,12 @@ from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.recognised_speech import relied_on
-from lipmotion.types import Generation, Span, StateTrace, Timeline, Unit
-from meshes.speech import motion, units
+from lipmotion.types import Generation, Span, Timeline, Unit
 from speech import stand_in_voice
 
 LEFT_CORNER = "y_291"
 """A channel of one side of the mouth: an edit may be of that side alone."""
 PHONE_FILES = ("a.TextGrid", "a.json", "a.npz")
-
-
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
 def test_spoken_text_and_its_phones_give_the_motion_of_speak(monkeypatch, toy_model, tmp_path):

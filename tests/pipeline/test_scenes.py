@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,26 +18,18 @@ from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
-from lipmotion.types import Channel, Generation, Motion, Pin, StateTrace, Timeline
+from lipmotion.types import Channel, Generation, Motion, Pin, Timeline
 from lipmotion.types.moods import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
-from lipmotion_faces.outputs.scenes import SceneOutput, character_scene, delivered_scene, head_scene, write_scene
+from lipmotion_faces.outputs.scenes import character_scene, delivered_scene, head_scene, write_scene
 from lipmotion_faces.outputs.shown_faces import shown_face
 from meshes.heads import head, write_glb
-from meshes.speech import motion, units
 from programs import convert_to_fbx, gltf_report, gltf_validator, python_with, run_with
 
 TIMES_S = (0.0, 0.31, 0.555, 0.75, 0.95, 1.15, 1.62, 2.0)
 """Times at which other programs are asked for values; most lie between two keys."""
-
-
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
 @pytest.fixture(scope="module")
@@ -59,11 +50,6 @@ def scene(request: pytest.FixtureRequest) -> Scene:
     return made
 
 
-@pytest.mark.parametrize(("name", "is_one"), [("a.glb", True), ("a.USDA", True), ("a.usd", False), ("glb", False)])
-def test_scenes_are_known_by_their_suffix(name, is_one):
-    assert SceneOutput.takes(Path(name), OutputSettings(shown_face("head"))) == is_one
-
-
 def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
     table, mesh = own_head.table(), own_head.mesh
     ring = figure().skin.lip_rows()[VISIBLE_RINGS - 1]
@@ -77,17 +63,6 @@ def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
         said = (time_s >= start_s) & (time_s <= end_s)
         assert abs(gap[said].min() - at_rest) < 1e-6
     assert gap[(time_s > 0.7) & (time_s < 0.8)].max() > 0.15
-
-
-@pytest.mark.long
-def test_what_moves_on_its_own_can_be_switched_off(generation):
-    still = head_scene(generation, 25.0, staging=Staging(blinks=False, gaze=False, brows=False, head=False))
-    moving = head_scene(generation, 25.0)
-    eyes = [name for name in still.weights.names if name.startswith(("eye", "brow"))]
-    assert len(eyes) == 11
-    assert max(float(np.abs(still.weights[name]).max()) for name in eyes) < 1e-9
-    assert max(float(np.abs(moving.weights[name]).max()) for name in eyes) > 0.01
-    assert np.abs(still.turn.rotations - [0, 0, 0, 1]).max() < 1e-9
 
 
 @pytest.mark.long
@@ -144,11 +119,9 @@ def test_closures_between_two_keys_are_kept(generation, character, tmp_path):
     assert parted[closed].min() < 0.02
 
 
-def test_a_motion_without_opening_is_refused():
-    other = Motion(np.zeros((10, 1)), 100.0, (Channel("x_61"),))
-    trace = StateTrace(("a",), np.zeros(10, np.intp))
+def test_a_motion_without_opening_is_refused(generation):
     with pytest.raises(InputError, match="no channel 'opening'"):
-        head_scene(Generation(other, np.zeros((10, 1)), units(), trace))
+        head_scene(generation.selected(["x_13"]))
 
 
 def test_the_sound_is_named_from_the_folder_of_the_file(tmp_path):

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from lipmotion import Model, load_model, read_motion, speak, write
-from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.pipeline.generate import speak as module
 from lipmotion.pipeline.generate.speak import REST_S
-from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.installed import default_voice, installed_voices
 from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, is_silent
@@ -104,33 +101,6 @@ def test_files(spoken, toy_model, tmp_path):
     write(spoken.generation, [tmp_path / name for name in names], speech=spoken.sound, model=toy_model, fps=2)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert len(read_motion(tmp_path / "a.json")[1]) == len(spoken.generation.units)
-
-
-def test_a_recording_is_not_written_as_sound(spoken, toy_speech, tmp_path):
-    with pytest.raises(ExportError, match=r"unknown format '.wav'; required one of: (?!.* \.wav)"):
-        write(spoken.generation, tmp_path / "a.wav", speech=toy_speech)
-    with pytest.raises(ExportError, match="a video needs the recording"):
-        write(spoken.generation, tmp_path / "a.mp4")
-
-
-@pytest.mark.parametrize(
-    ("text", "more", "message"),
-    [
-        ("...", {}, "holds no word"),
-        (TEXT, {"voice": "three"}, "no voice 'three' is installed; lipmotion speak --voices lists"),
-        (TEXT, {"speaker": "nobody"}, "no 'nobody'"),
-    ],
-)
-def test_what_cannot_be_said(stand_in: None, toy_model: Model, text: str, more: dict[str, str], message: str) -> None:  # noqa: ARG001
-    with pytest.raises(InputError, match=message):
-        speak(text, model=toy_model, **more)
-
-
-def test_without_a_synthesiser(toy_model, monkeypatch):
-    nothing = {name: replace(each, voices=tuple, others=tuple) for name, each in installed.SYNTHESISERS.items()}
-    monkeypatch.setattr(installed, "SYNTHESISERS", nothing)
-    with pytest.raises(MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
-        speak(TEXT, model=toy_model)
 
 
 def test_neighbouring_silences_are_one_and_short_ones_are_pauses():

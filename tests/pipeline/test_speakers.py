@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
+from pipeline.made import corpus_of
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
@@ -42,13 +42,6 @@ def two_people(count: int = 12) -> Iterator[Utterance]:
             yield replace(with_motion(utterance, values), speaker="ben")
         else:
             yield replace(utterance, speaker="anna")
-
-
-def corpus_of(folder: Path, utterances: list[Utterance]) -> Corpus:
-    corpus = Corpus.create(folder)
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
 
 
 @pytest.fixture(scope="module")

@@ -67,23 +67,11 @@ def test_phones_that_the_engine_recognises_are_aligned_as_in_training(toy_model,
 
 
 def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_sentence):
-    assert recognised(RecognisingEngine(), toy_model, toy_sentence).units[1].label.phone == "aa"
-
-
-def test_general_models_alone_are_taken_by_their_word(toy_model, toy_sentence):
-    assert (
-        recognised(RecognisingEngine(found=toy_sentence.units), toy_model, toy_sentence, "general").units[1].label.phone
-        == "aa"
-    )
-
-
-def test_phones_that_do_not_fit_are_not_taken(toy_model, toy_sentence):
-    spans = toy_sentence.units.spans[1:-1]
-    crowd = [span for n in range(30) for span in Timeline(spans).shifted(3.0 * n)]
-    assert (
-        recognised(RecognisingEngine(found=Timeline(tuple(crowd))), toy_model, toy_sentence).units[1].label.phone
-        == "aa"
-    )
+    """Or what general models alone are asked for, or what does not fit the sound."""
+    crowd = [span for n in range(30) for span in Timeline(toy_sentence.units.spans[1:-1]).shifted(3.0 * n)]
+    for found, kind in ((None, "own"), (toy_sentence.units, "general"), (Timeline(tuple(crowd)), "own")):
+        speech = recognised(RecognisingEngine(found=found), toy_model, toy_sentence, kind)
+        assert speech.units[1].label.phone == "aa"
 
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
+from pipeline.made import corpus_of
 
 GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
 """How ben's opening, width and outer differ from those of the toy."""
@@ -29,13 +29,6 @@ def of_ben(utterance: Utterance, speaker: str = "ben") -> Utterance:
     motion = utterance.track.motion
     changed = Motion(OFFSET + GAIN * motion.values, motion.rate_hz, motion.channels)
     return replace(utterance, track=replace(utterance.track, motion=changed), speaker=speaker)
-
-
-def corpus_of(folder: Path, utterances: Sequence[Utterance]) -> Corpus:
-    corpus = Corpus.create(folder)
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
 
 
 @pytest.fixture(scope="module")
@@ -191,10 +184,10 @@ def test_other_channels_are_refused(toy_model, toy_sentence, tmp_path):
 
 
 def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
-    def unseen(utterance: Utterance) -> Utterance:
-        return replace(utterance, track=replace(utterance.track, seen=np.zeros_like(utterance.track.seen)))
-
-    corpus = corpus_of(tmp_path / "unseen", [unseen(each) for each in toy_utterances(3)])
+    unseen = [
+        replace(each, track=replace(each.track, seen=np.zeros_like(each.track.seen))) for each in toy_utterances(3)
+    ]
+    corpus = corpus_of(tmp_path / "unseen", unseen)
     with pytest.raises(InputError, match=r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
         animate(request(toy_sentence, corpus), model=toy_model)
     with pytest.raises(InputError, match="the corpus is empty"):

@@ -17,10 +17,7 @@ from lipmotion_studio.folder import open_folder
 from studio.test_page import LIMIT_S, SCREENS, WEBGL, WELCOME, Page, served
 from studio.toy_recordings import SENTENCES, write_recordings
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING),
-]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
 
 
 def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:

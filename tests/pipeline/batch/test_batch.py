@@ -143,36 +143,25 @@ def test_inputs_are_never_outputs(sounds, settings):
         batch([BatchLine("a", str(sounds / "one.wav"))], sounds, settings, jobs=1)
 
 
-def test_a_mistake_in_the_settings_ends_it_before_the_first_line(sounds, tmp_path):
-    with pytest.raises(InputError, match="no such model"):
-        batch(sounds, tmp_path / "out", Job(Request(model=Path("missing.lipmotion"))), jobs=1)
-    with pytest.raises(ExportError, match="required some of"):
-        batch(sounds, tmp_path / "out", Job(outputs=Outputs(kinds=("wav",))), jobs=1)
-    with pytest.raises(ExportError, match="a video has its own sound"):
-        batch(sounds, tmp_path / "out", Job(outputs=Outputs(kinds=("mp4",)), delivery=Delivery(offset_ms=50)), jobs=1)
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         ({"outputs": Outputs(kinds=("cues.tsv",), fps=120.0)}, "frame rate is 120"),
         ({"outputs": Outputs(channels=("nope",))}, "nope"),
+        ({"outputs": Outputs(kinds=("wav",))}, "required some of"),
+        ({"outputs": Outputs(kinds=("mp4",)), "delivery": Delivery(offset_ms=50)}, "a video has its own sound"),
+        ({"request": Request(model=Path("missing.lipmotion"))}, "no such model"),
         ({"request": Request(speaker="nobody")}, "nobody"),
         ({"request": Request(Path("one.wav"))}, "the job of a batch has 'recording', which belongs to one recording"),
         ({"outputs": Outputs(("one.json",))}, "the job of a batch has 'files'"),
+        ({"jobs": 0}, "processes, required 1 or more"),
     ],
 )
 def test_what_no_line_could_do_ends_it_before_the_first_line(sounds, settings, tmp_path, wrong, message):
+    jobs = wrong.get("jobs", 1)
     with pytest.raises((InputError, ExportError), match=message):
-        batch(sounds, tmp_path / "out", replace(settings, **wrong), jobs=1)
+        batch(sounds, tmp_path / "out", replace(settings, **{k: v for k, v in wrong.items() if k != "jobs"}), jobs=jobs)
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("jobs", [0, -3])
-def test_a_number_of_processes(sounds, settings, tmp_path, jobs):
-    with pytest.raises(InputError, match="processes, required 1 or more"):
-        batch(sounds, tmp_path / "out", settings, jobs=jobs)
 
 
 def test_silence_can_have_every_form_that_speech_can(settings):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import wave
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from lipmotion import Job, Request
 from lipmotion.pipeline.batch import check
@@ -33,11 +33,7 @@ def sound(path: Path, spoken_s: float, seed: int, level: float = 0.1) -> None:
     noise = np.random.default_rng(seed).normal(0, level, round(spoken_s * RATE_HZ))
     quiet = np.random.default_rng(seed).normal(0, level / 1000, RATE_HZ // 2)
     samples = (np.r_[quiet, noise, quiet].clip(-1, 1) * 32767).astype("<i2")
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(RATE_HZ)
-        file.writeframes(samples.tobytes())
+    wavfile.write(path, RATE_HZ, samples)
 
 
 def test_every_kind_is_found(tmp_path):

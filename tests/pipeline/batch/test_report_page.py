@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +16,7 @@ from lipmotion.pipeline.batch.marks import Mark, read_marks
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
-from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, axe_script, browser
+from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, browser, check_screen
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
 SCREENS = ((1200, 800, "light"), (1200, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
@@ -64,17 +63,10 @@ def report(folder: Path, speech: Path, count: int, *, film: bool) -> Path:
 
 
 def look(window: Browser, name: str) -> None:
-    """Check the page on every screen: no scrolling to the side, and nothing that axe-core finds."""
-    axe, folder = axe_script(), os.environ.get("LIPMOTION_SCREENS")
+    """Check the page on every screen."""
     for width, height, scheme in SCREENS:
         window.show_as(width, height, scheme, mobile=width < 600)
-        if folder:
-            window.picture(Path(folder) / f"{name}-{width}-{scheme}.png")
-        assert window.run("return document.documentElement.scrollWidth") <= width, (name, width)
-        if axe is not None:
-            window.run(axe)
-            found = window.run_until_done("const done = arguments[0]; axe.run().then(r => done(r.violations))")
-            assert [(each["id"], each["nodes"][0]["html"][:200]) for each in found] == [], (name, width, scheme)
+        check_screen(window, name, width, scheme)
     window.show_as(*SCREENS[0])
 
 

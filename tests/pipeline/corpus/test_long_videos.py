@@ -87,9 +87,7 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
     monkeypatch.setattr(long_videos, "scan_video", scan)
     monkeypatch.setattr(module, "track", track)
     monkeypatch.setattr(
-        module,
-        "make_tracker",
-        lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"}),
+        module, "make_tracker", lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
     )
     return told
 

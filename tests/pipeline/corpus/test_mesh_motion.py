@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import wave
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from lipmotion.corpora.folder import discover
 from lipmotion.corpora.vocaset import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
 from lipmotion.errors import InputError
 from meshes.flame import head
+from pipeline.made import write_noise
 
 RATE_HZ, MESHES = 60.0, 30
 
@@ -23,11 +23,7 @@ def write_sentence(folder: Path, person: str, sentence: str) -> np.ndarray:
         each.mkdir(parents=True, exist_ok=True)
     for number, lowered in enumerate(jaw, 1):
         (meshes / f"{sentence}.{number:06}.ply").write_bytes(head(lowered, "<"))
-    with wave.open(str(sound), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(22_000)
-        file.writeframes(np.random.default_rng(1).integers(-9000, 9000, 11_000).astype("<i2").tobytes())
+    write_noise(sound, 0.5, 1, 22_000)
     return jaw
 
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
-from types import SimpleNamespace
 
 import av
 import numpy as np
 import pytest
 
 from lipmotion import Corpus, prepare
-from lipmotion.errors import CorpusError
-from lipmotion.types import Item
 
 CLIP = "brwa3s"
 COUNT = 75
@@ -64,24 +61,3 @@ def test_variable_frame_rate_with_subtitles_and_a_cover(recordings, tmp_path):
     assert np.corrcoef(opening[seen], usual[seen])[0, 1] > 0.99
     assert np.corrcoef(opening[:-1], usual[1:])[0, 1] < np.corrcoef(opening, usual)[0, 1]
     assert np.array_equal(varied.audio.samples, plain.audio.samples)
-
-
-def test_each_of_many_unusable_files_is_reported_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "lipmotion_faces.corpus.prepare.make_tracker", lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "1"})
-    )
-    names = [f"clip{number:03d}" for number in range(30)]
-    (tmp_path / "clips").mkdir()
-    for name in names:
-        (tmp_path / "clips" / f"{name}.mp4").write_bytes(b"not a video")
-    items: list[Item] = []
-    with pytest.raises(CorpusError, match=r"none of 30 recordings is usable; the first, clip000: .*is text") as e:
-        prepare(
-            tmp_path / "clips",
-            tmp_path / "corpus",
-            workers=1,
-            monitor=lambda event: items.append(event) if isinstance(event, Item) else None,
-        )
-    assert len(str(e.value)) < 500
-    assert [item.name for item in items] == names
-    assert not (tmp_path / "corpus").exists()

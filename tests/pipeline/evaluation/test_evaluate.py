@@ -23,12 +23,8 @@ from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Tim
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
 from lipmotion_lab.evaluation.evaluate import _was_trained_on, figures_of
-from lipmotion_lab.evaluation.held_out import (
-    AUDIO_ONLY,
-    ComparedClip,
-    load_held_out,
-    make_speech,
-)
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, load_held_out, make_speech
+from pipeline import made
 
 evaluate = partial(evaluated, recogniser="own")
 """The toy's voice is that of its model."""
@@ -103,10 +99,7 @@ def perfect(toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) ->
 
 
 def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
-    corpus = Corpus.create(folder / "corpus")
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
+    return made.corpus_of(folder / "corpus", utterances)
 
 
 def held_out(corpus: Corpus) -> list[Utterance]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import wave
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 
 from lipmotion import Model
 from lipmotion.errors import CorpusError, MissingDependencyError
+from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.training import other_speakers as module
 from lipmotion.pipeline.training.other_speakers import (
     align_recordings,
@@ -133,9 +133,7 @@ def test_a_quarter_is_kept_aside():
 
 def write(path: Path, audio: Audio, text: str | None = None) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, audio.rate_hz, 0, "NONE", ""))
-        file.writeframes(np.round(audio.samples * 32767).astype("<i2").tobytes())
+    write_sound(path, audio)
     if text is not None:
         path.with_suffix(".txt").write_text(text, encoding="utf-8")
 

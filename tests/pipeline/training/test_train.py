@@ -20,6 +20,7 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon
+from pipeline import made
 
 SMALL, JOINT = HmmConfig(mixtures=1, iterations=2), engine_named("joint", {})
 TRAINED = tuple(f"toy0{number}" for number in range(8))
@@ -30,10 +31,7 @@ def some(corpus: Corpus, count: int = 5) -> list[Utterance]:
 
 
 def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
-    corpus = Corpus.create(folder / "corpus")
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
+    return made.corpus_of(folder / "corpus", utterances)
 
 
 @pytest.mark.long
