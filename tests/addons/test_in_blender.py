@@ -1,7 +1,5 @@
 """The add-on and the script in Blender itself: what is evaluated at frames is the motion."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -65,9 +63,7 @@ def compare(found: dict[str, Any], wanted: dict[str, list[float]], names: Path, 
 
 
 @pytest.mark.parametrize("kind", ["legacy", "extension"])
-def test_the_addon_keys_a_face(
-    kind: str, generation: Generation, wanted: dict[str, list[float]], names: Path, sound: Audio, tmp_path: Path
-) -> None:
+def test_the_addon_keys_a_face(kind, generation, wanted, names, sound, tmp_path):
     write_addon("blender", tmp_path / "addon.zip")
     curves, chosen = with_curves(generation, "face")
     write(curves, [tmp_path / "a.json", tmp_path / "a.wav"], speech=sound, channels=chosen)
@@ -77,9 +73,7 @@ def test_the_addon_keys_a_face(
     compare(found, wanted, names, 1e-5)
 
 
-def test_the_addon_keys_from_a_take_of_live_link_face(
-    generation: Generation, wanted: dict[str, list[float]], names: Path, sound: Audio, tmp_path: Path
-) -> None:
+def test_the_addon_keys_from_a_take_of_live_link_face(generation, wanted, names, sound, tmp_path):
     write_addon("blender", tmp_path / "addon.zip")
     write(generation, [tmp_path / "a.livelink.csv", tmp_path / "a.wav"], speech=sound, rate_hz=100.0)
     files = (tmp_path / "addon.zip", tmp_path / "a.livelink.csv", tmp_path / "a.wav", names)
@@ -92,9 +86,7 @@ def test_the_addon_keys_from_a_take_of_live_link_face(
     )  # frames that show a closure are chosen among rounded values
 
 
-def test_the_script_keys_a_face(
-    generation: Generation, names: Path, sound: Audio, wanted: dict[str, list[float]], tmp_path: Path
-) -> None:
+def test_the_script_keys_a_face(generation, names, sound, wanted, tmp_path):
     write(generation, [tmp_path / "a.blender.py", tmp_path / "a.wav"], speech=sound)
     found = run_with("bpy", "blender_keys.py", "script", tmp_path / "a.blender.py", names)
     listed = json.loads(names.read_text())
@@ -106,9 +98,7 @@ def test_the_script_keys_a_face(
     assert found["strips"] == ["lipmotion sound"] * found["plays_sound"]
 
 
-def test_the_script_keys_bones_and_properties(
-    generation: Generation, names: Path, sound: Audio, tmp_path: Path
-) -> None:
+def test_the_script_keys_bones_and_properties(generation, names, sound, tmp_path):
     (tmp_path / "rig.csv").write_text("control,source,gain\n" + RIG)
     curves, chosen = with_curves(generation, tmp_path / "rig.csv")
     write(curves, tmp_path / "a.blender.py", speech=sound, channels=chosen)

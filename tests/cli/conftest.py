@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import zipfile
 from collections.abc import Callable
@@ -95,3 +93,9 @@ def bad_speech(here: Path) -> dict[str, Path]:
 def is_one_error(done: Done, code: int) -> bool:
     """Return whether a command printed one error line, and nothing else."""
     return done.code == code and done.out == [] and len(done.err) == 1 and done.err[0].startswith("lipmotion: error: ")
+
+
+def check_refused(done: Done, code: int, words: str) -> None:
+    """Raise AssertionError unless a command printed one error line with some words, and nothing else."""
+    assert is_one_error(done, code), done
+    assert words in done.err[0]

@@ -1,7 +1,5 @@
 """``lipmotion addon``."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``lipmotion batch`` as a command."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

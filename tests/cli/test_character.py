@@ -1,16 +1,13 @@
 """Characters on the command line: looked into, animated, and driven elsewhere."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import av
-import numpy as np
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion import read_motion
 from lipmotion.meshes.files.character_files import read_character
 from meshes.heads import head, lip_points, write_glb
@@ -51,9 +48,7 @@ def test_a_table_is_written_calibrated_and_found(run, glb, here):
         (("character", glb, "--open", "0.3"), "--open: '0.3' names no control, required NAME=X"),
         (("character", "rig.csv"), "state values of its controls"),
     ):
-        done = run(*arguments)
-        assert is_one_error(done, 3)
-        assert message in done.err[0]
+        check_refused(run(*arguments), 3, message)
 
 
 def test_the_table_of_a_mouth_that_is_not_found_is_written_to_be_filled_in(run, here):
@@ -94,33 +89,11 @@ def test_a_character_speaks(run, glb, basics, here):
     assert stored["animations"][0]["name"] == "speech"
 
 
-def test_curves_without_a_mesh(run, here, basics):
-    for curves, first in (("arkit", "jawForward"), ("visemes", "viseme_sil"), ("fap", "fap3_open_jaw")):
-        assert run(*basics, "--curves", curves, "-o", "curves.csv").code == 0
-        assert (here / "curves.csv").read_text().startswith(f"time_s,{first},")
-
-
-def test_a_rig_of_the_users_own(run, here, basics):
-    (here / "rig.csv").write_text("control,source,gain\nJaw,jawOpen,-25\nDrop,opening,1\nOh,viseme_oh,1\n")
-    assert run(*basics, "--curves", "rig.csv", "-o", "rig.json", "--rate", "25").code == 0
-    motion, _ = read_motion(here / "rig.json")
-    assert motion.names == ("Jaw", "Drop", "Oh")
-    assert motion["Jaw"].min() < 0
-    assert np.abs(motion.values[0]).max() < 1
-
-
-def test_some_channels_of_a_set(run, here, basics):
-    assert run(*basics, "--curves", "arkit", "--channels", "opening,jawOpen", "-o", "two.csv").code == 0
-    assert (here / "two.csv").read_text().startswith("time_s,opening,jawOpen\n")
-
-
 def test_what_is_wrong_is_said_in_one_line(run, here, basics):
     for arguments, message in (
         (("--curves", "visems", "-o", "a.csv"), "no set of curves 'visems', required one of arkit, face, "),
         (("--control-points", "-o", "a.csv"), "belong to a character"),
         (("--character", "nothing.glb", "-o", "a.mp4"), "no such file"),
     ):
-        done = run(*basics, *arguments)
-        assert is_one_error(done, 3)
-        assert message in done.err[0]
+        check_refused(run(*basics, *arguments), 3, message)
         assert list(here.iterdir()) == []

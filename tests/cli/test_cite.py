@@ -1,10 +1,8 @@
-from __future__ import annotations
-
 import re
 from importlib.metadata import version
 from pathlib import Path
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion.citations import ENGINE_KEYS, bibliography, engine_citations, model_citations
 from lipmotion.engines import ENGINES
 from lipmotion.pipeline.model import shipped_path
@@ -45,9 +43,7 @@ def test_what_cannot_be_cited(run, here):
         ("text", 6, "text: not a lipmotion model"),
         (".", 3, ".: no such model"),
     ):
-        done = run("cite", name)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("cite", name), code, words)
 
 
 def test_every_built_in_engine_names_its_papers():
@@ -64,13 +60,13 @@ def test_what_a_header_adds():
     assert keys(model_citations({"engine": "ridge"}).splitlines()) == ["lipmotion"]
 
 
+def test_the_version_is_this_one():
+    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
+    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
 def test_every_entry_is_whole():
     for entry in bibliography().values():
         assert entry.count("{") == entry.count("}")
         assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
         assert entry.endswith("\n}")
-
-
-def test_the_version_is_this_one():
-    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
-    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")

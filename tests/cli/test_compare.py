@@ -1,8 +1,6 @@
-from __future__ import annotations
-
 import json
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion import compare
 from lipmotion.measures.evaluation_table import comparison_table
 
@@ -39,9 +37,7 @@ def test_what_cannot_be_used(run, here):
         ("b.csv", "no channel of a.csv"),
         ("c.csv", "c.csv: cannot"),
     ):
-        done = run("compare", "a.csv", other, "-o", "figures.json")
-        assert is_one_error(done, 3)
-        assert words in done.err[0]
+        check_refused(run("compare", "a.csv", other, "-o", "figures.json"), 3, words)
     assert is_one_error(run("compare", "a.csv", "a.csv", "-o", "a.csv"), 7)
     assert not (here / "figures.json").exists()
 

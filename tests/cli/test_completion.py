@@ -1,7 +1,5 @@
 """``completion``: what the scripts offer, asked of the shells themselves where they are installed."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 
@@ -49,9 +47,3 @@ def test_it_loads_no_numpy():
     asked = "main(['completion', 'bash']); sys.exit('numpy' in sys.modules)"
     program = f"import sys; from lipmotion.cli.main import main; {asked}"
     assert run_child([sys.executable, "-c", program]).returncode == 0
-
-
-def test_an_unknown_shell(run):
-    done = run("completion", "csh")
-    assert (done.code, done.out) == (2, [])
-    assert "invalid choice: 'csh'" in done.err[-1]

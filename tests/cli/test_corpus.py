@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion.errors import MissingDependencyError
 from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio, Item, Progress
@@ -77,9 +75,7 @@ def test_what_cannot_be_used(run, here):
         (["info", "x" * 300], 3, "File name too long"),
         (["prepare", "empty", "-o", "mine"], 4, "empty: no videos in it"),
     ):
-        done = run("corpus", *arguments)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("corpus", *arguments), code, words)
         assert [path.name for path in here.rglob("*")] == ["empty"]
 
 

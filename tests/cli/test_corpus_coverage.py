@@ -1,8 +1,6 @@
-from __future__ import annotations
-
 import json
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion_faces.corpus.coverage import coverage
 
 
@@ -36,7 +34,5 @@ def test_what_cannot_be_used(run, here, toy_corpus):
         (["missing"], 4, "missing: no such corpus"),
         ([toy_corpus.path, "--lexicon", "missing"], 3, "missing: no such lexicon file"),
     ):
-        done = run("corpus", "coverage", *arguments)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("corpus", "coverage", *arguments), code, words)
     assert not list(here.iterdir())

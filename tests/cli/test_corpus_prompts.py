@@ -1,6 +1,4 @@
-from __future__ import annotations
-
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion.pipeline.training.prompts import prompts
 
 
@@ -38,7 +36,5 @@ def test_what_cannot_be_used(run, here):
         (["--count", "0"], 3, "0 prompts asked for, required at least 1"),
         (["--lexicon", "missing"], 3, "missing: no such lexicon file"),
     ):
-        done = run("corpus", "prompts", *arguments)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("corpus", "prompts", *arguments), code, words)
     assert not list(here.iterdir())

@@ -1,7 +1,5 @@
 """``edit`` writes down what is changed; ``animate``, ``render`` and ``cues`` say it again."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,11 +1,9 @@
-from __future__ import annotations
-
 import json
 from functools import partial
 
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion import evaluate, load_model
 from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.measures.evaluation_table import figures_table
@@ -43,7 +41,5 @@ def test_what_cannot_be_used(run, toy_corpus, toy_model_file, newer_model, here)
         ([model, corpus, "-o", "missing/a.json"], 7, "the folder missing does not exist"),
         ([model, corpus, "-o", "a.json", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
     ):
-        done = run("evaluate", *arguments)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("evaluate", *arguments), code, words)
     assert list(here.iterdir()) == []

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import partial
@@ -7,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.curves import bootstrap_interval
@@ -89,15 +87,6 @@ def test_folds_of_the_training_list(run, toy_corpus, here):
 
 
 @pytest.mark.long
-def test_a_program_reads_them(run, toy_corpus):
-    done = run("experiment", "learning-curve", toy_corpus.path, "--sizes", "3", "--machine-readable")
-    assert (done.code, done.err) == (0, [])
-    last = json.loads(done.out[-1])
-    assert (last["type"], last["figures"]["order"]) == ("success", "shuffled")
-    assert {"type", "stage", "step", "steps", "value"} == set(json.loads(done.out[1]))
-
-
-@pytest.mark.long
 def test_xieliu2007_of_some_systems(run, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
     few = ("--systems", "ph-MSHMM;loudness", "--order", "order.txt")
@@ -156,13 +145,5 @@ def test_what_cannot_be_used(run, toy_corpus, here):
     (here / "empty.txt").write_text("\n")
     (here / "strange.txt").write_text("toy00\nnobody\n")
     for arguments, code, words in UNUSABLE:
-        done = run("experiment", *arguments.replace("CORPUS", str(toy_corpus.path)).split())
-        assert is_one_error(done, code), done
-        assert words in done.err[0]
+        check_refused(run("experiment", *arguments.replace("CORPUS", str(toy_corpus.path)).split()), code, words)
         assert len(list(here.iterdir())) == 2
-
-
-def test_sizes_that_are_not_numbers(run, toy_corpus):
-    done = run("experiment", "learning-curve", toy_corpus.path, "--sizes", "20,many")
-    assert done.code == 2
-    assert "'20,many'; required: numbers with commas between them" in done.err[-1]

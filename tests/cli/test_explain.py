@@ -1,19 +1,10 @@
-from __future__ import annotations
-
 import json
 
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 
 pytestmark = pytest.mark.usefixtures("here")
-
-
-def test_a_frame_of_a_coupled_model(run, coupled_model_file, toy_speech):
-    done = run("explain", coupled_model_file, toy_speech, "--at", "0.8", "--transcript", "See Bob, papa & mama!")
-    assert (done.code, done.err) == (0, [])
-    assert done.out[0] == "0.80 s (frame 80)"
-    assert [line for line in done.out if line.startswith("  asynchrony ")]
 
 
 def test_several_times_and_any_engine(run, toy_model_file, toy_speech):
@@ -37,9 +28,7 @@ def test_what_cannot_be_explained(run, coupled_model_file, toy_speech):
         ([coupled_model_file, "missing.wav", "--at", "1"], 3, "missing.wav: no such file"),
         ([toy_speech, coupled_model_file, "--at", "1"], 6, "not a lipmotion model"),
     ):
-        done = run("explain", *options)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("explain", *options), code, words)
 
 
 def test_without_a_time_all_states_are_listed(run, toy_model_file, toy_speech):

@@ -1,7 +1,5 @@
 """``lipmotion face``, and ``animate`` and ``speak`` with a filmed face."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -10,7 +8,7 @@ import av
 import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion.testing.toy import toy_sentences
 from lipmotion_faces.film import build
 from lipmotion_faces.filmed.face import load_face, save_face
@@ -93,9 +91,7 @@ def test_what_cannot_be_built(run, tracker, here):
         ([video, "-o", "a.face"], 3, "s of footage with the face, required 5 s or more"),
         ([video, "-o", video], 7, "is the footage itself; give another name"),
     ):
-        done = run("face", "build", *arguments, "--workers", "1")
-        assert is_one_error(done, code), done
-        assert words in done.err[0]
+        check_refused(run("face", "build", *arguments, "--workers", "1"), code, words)
         assert list(here.iterdir()) == []
     assert video.read_bytes() == before
 
@@ -128,7 +124,7 @@ def test_a_video_of_the_person(run, basics, here):
 
 @pytest.mark.long
 @pytest.mark.usefixtures("here")
-def test_frames_a_second_and_the_mark(run: RunCommand, basics: tuple[object, ...]) -> None:
+def test_frames_a_second_and_the_mark(run, basics):
     assert run(*basics, "-o", "a.mp4", "--fps", "10", "--mark", "none").code == 0
     assert run(*basics, "-o", "b.mp4", "--fps", "10", "--mark", "visible", "--jaw", "energy").code == 0
     assert [comment(Path(name))[:9] for name in ("a.mp4", "b.mp4")] == ["", "synthetic"]
@@ -139,7 +135,7 @@ def test_frames_a_second_and_the_mark(run: RunCommand, basics: tuple[object, ...
 
 @pytest.mark.long
 @pytest.mark.usefixtures("here")
-def test_another_background(run, basics, tracker, videos) -> None:
+def test_another_background(run, basics, tracker, videos):
     path = tracker / "toy01.mp4"
     done = run(*basics, "-o", "a.mp4", "--background", path)
     assert done == (0, ["a.mp4"], [])
@@ -170,6 +166,19 @@ def test_an_aid_to_lip_reading(run, basics, tracker, here, overlay):
         assert changed.mean() < 0.15
 
 
+def test_speak(run, here, toy_model_file, filmed_face_file, monkeypatch):
+    stand_in_voice.install(monkeypatch)
+    done = run("speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "a.mp4")
+    assert (done.code, done.out) == (0, ["a.mp4"]), done
+    assert comment(here / "a.mp4").startswith("synthetic:")
+    done = run(
+        "speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "b.mp4", "--overlay", "inset"
+    )
+    assert is_one_error(done, 3)
+    assert "an overlay shows the video of the speech" in done.err[0]
+    assert [path.name for path in here.iterdir()] == ["a.mp4"]
+
+
 @pytest.mark.long
 def test_a_face_of_another_person(run, basics, here, filmed_face):
     """The motion is mapped onto that person by the speech in the file."""
@@ -182,16 +191,3 @@ def test_a_face_of_another_person(run, basics, here, filmed_face):
     done = run(*basics[:-1], "mute.face", "-o", "b.mp4")
     assert (done.code, done.out) == (0, ["b.mp4"])
     assert "the face was built from footage without sound" in done.err[0]
-
-
-def test_speak(run, here, toy_model_file, filmed_face_file, monkeypatch):
-    stand_in_voice.install(monkeypatch)
-    done = run("speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "a.mp4")
-    assert (done.code, done.out) == (0, ["a.mp4"]), done
-    assert comment(here / "a.mp4").startswith("synthetic:")
-    done = run(
-        "speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "b.mp4", "--overlay", "inset"
-    )
-    assert is_one_error(done, 3)
-    assert "an overlay shows the video of the speech" in done.err[0]
-    assert [path.name for path in here.iterdir()] == ["a.mp4"]

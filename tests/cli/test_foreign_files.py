@@ -1,7 +1,5 @@
 """What every verb says of a file of another program: what it is, and what to do, in one line."""
 
-from __future__ import annotations
-
 import pytest
 
 from cli.conftest import is_one_error

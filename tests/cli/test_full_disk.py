@@ -1,7 +1,5 @@
 """A full disk, simulated by a limit on the size of files: one error line, and no partial file."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

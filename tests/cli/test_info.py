@@ -1,8 +1,6 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion import load_model, save_model
 from lipmotion.pipeline.model import VERSION, read_header, shipped_path
 
@@ -69,6 +67,4 @@ def test_what_is_no_model(run, newer_model, here):
         (".", 3, ".: no such model"),
         (newer_model, 6, f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
     ):
-        done = run("info", name)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("info", name), code, words)

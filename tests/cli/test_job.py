@@ -1,7 +1,5 @@
 """``--job``: the command line makes the same job as Python, and is ahead of a file."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 import re
@@ -11,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion import Job, Outputs, Request
 from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import part_of
@@ -118,7 +116,7 @@ def test_each_option_is_declared_once():
 
 
 @pytest.mark.usefixtures("here")
-def test_only_files_that_are_read_are_declared_as_inputs() -> None:
+def test_only_files_that_are_read_are_declared_as_inputs():
     options = command_line.parse_words(LINE.split(), argparse.Namespace())
     read = {one.name for one in options.reads}
     assert {"speech", "transcript", "lexicon", "units", "model", "onto", "face", "background", "job"} <= read
@@ -154,9 +152,7 @@ def test_a_batch_takes_a_job(run, here, toy_speech, toy_model_file):
     rows = (here / "out" / "a.csv").read_text().splitlines()
     assert (rows[0], re.split(",", rows[2])[0]) == ("time_s,width", "0.04")
     (here / "scene.toml").write_text("[request]\nrecording = 'a.wav'\n")
-    done = run(*line)
-    assert is_one_error(done, 3)
-    assert "the job of a batch has 'recording'" in done.err[0]
+    check_refused(run(*line), 3, "the job of a batch has 'recording'")
 
 
 @needs_toml
@@ -172,6 +168,4 @@ def test_what_is_wrong_with_a_file(run, here):
         ("wrong.toml", "wrong.toml: in [staging]: no option 'face-seed'; here it is called 'seed'"),
         ("missing.toml", "missing.toml: no such job file"),
     ):
-        done = run("animate", "--job", words)
-        assert is_one_error(done, 3)
-        assert message in done.err[0]
+        check_refused(run("animate", "--job", words), 3, message)

@@ -1,12 +1,10 @@
-from __future__ import annotations
-
 import sys
 from functools import partial
 
 import pytest
 
 from children import PIPE, child, run_child
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion.cli import main
 from lipmotion.cli.verbs import info
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
@@ -44,9 +42,7 @@ def test_the_package_is_a_program():
 
 def test_a_wrong_command_line(run):
     for arguments in (["bogus"], ["corpus"], ["corpus", "bogus"], ["--bogus"], ["train"], ["cues", "a.wav", "b.wav"]):
-        done = run(*arguments)
-        assert is_one_error(done, 2)
-        assert " --help" in done.err[0]
+        check_refused(run(*arguments), 2, " --help")
 
 
 def test_without_a_word_there_is_help(run):
@@ -63,9 +59,7 @@ def test_a_misspelt_option(run):
         (["cues", "a.wav", "--text", "hello"], "did you mean --transcript?"),
         (["info", "--zzz"], "--zzz; see: lipmotion info --help"),
     ):
-        done = run(*misspelt)
-        assert is_one_error(done, 2)
-        assert hint in done.err[0]
+        check_refused(run(*misspelt), 2, hint)
 
 
 def test_words_of_other_tools_are_answered_with_a_verb(run):

@@ -1,7 +1,5 @@
 """Every output of every verb is kept apart from every input of the same call."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil
@@ -10,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion import Corpus, Run, animate, cues, load_model, prepare, train, write, write_cues
 from lipmotion.cli.command_line import parser
 from lipmotion.errors import ExportError
@@ -92,7 +90,7 @@ def test_the_model_that_ships_is_an_input_too(run, laid):
 
 
 @pytest.mark.usefixtures("laid")
-def test_a_program_is_told(run: RunCommand) -> None:
+def test_a_program_is_told(run):
     done = run("train", "c", "-o", "c/corpus.json", "--machine-readable", "--force")
     assert done.code == 7
     assert '"exit_code": 7' in done.out[-1]
@@ -122,7 +120,7 @@ def test_a_recording_is_never_replaced(run, laid):
 
 
 @pytest.mark.usefixtures("here")
-def test_a_transcript_may_have_the_name_of_a_folder(run, here, toy_speech, toy_model_file) -> None:
+def test_a_transcript_may_have_the_name_of_a_folder(run, here, toy_speech, toy_model_file):
     (here / "papa").mkdir()
     line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "--transcript", "papa"]
     assert run(*line, "-o", "papa/a.json").code == 0

@@ -1,7 +1,5 @@
 """Contents and names of files, and arguments, reach a terminal as printable text only."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os
@@ -140,7 +138,7 @@ NOT_SHOWN = {
 
 @pytest.mark.skipif(sys.platform == "win32", reason="names that Windows does not allow")
 @pytest.mark.usefixtures("poisoned")
-def test_what_is_obeyed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_obeyed_is_shown(capsys):
     for line in LINES:
         with logged():
             main([word.replace("EVIL", EVIL) for word in line.split()])

@@ -1,14 +1,12 @@
 """Commands in processes of their own: behaviour that calls in this process cannot show."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 
 
 def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_model_file, here):
@@ -21,7 +19,7 @@ def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_
 
 
 @pytest.mark.usefixtures("here")
-def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside: RunCommand, bad_speech: dict[str, Path]) -> None:
+def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, bad_speech):
     """FFmpeg's own messages are not printed."""
     assert is_one_error(run_outside("animate", bad_speech["text"], "-o", "a.json"), 3)
     assert is_one_error(run_outside("animate", "a.wav", "-o", "missing/a.json"), 7)

@@ -1,7 +1,5 @@
 """Progress of long work for a program and on a terminal."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os
@@ -15,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from children import LIPMOTION, environment, run_child
-from cli.conftest import Done, RunCommand
+from cli.conftest import Done
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, JsonLines
 from lipmotion.cli.terminal.progress import report_progress
@@ -175,7 +173,7 @@ def test_streams_that_are_closed(toy_speech, toy_model_file, here):
 
 
 @pytest.mark.usefixtures("ordinary_signals")
-def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPatch, run: RunCommand) -> None:
+def test_what_is_swallowed_stops_at_the_next_event(monkeypatch, run):
     """As when the signal comes during an import that treats any exception as a missing package."""
 
     def swallows(given: Namespace) -> None:

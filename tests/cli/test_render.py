@@ -1,7 +1,5 @@
 """``lipmotion render``: motion files are drawn, edited ones, and those of blendshapes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from shutil import copy
@@ -10,7 +8,7 @@ import av
 import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import RunCommand, check_refused, is_one_error
 from lipmotion import read_motion
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.scene import Scene
@@ -98,9 +96,7 @@ def test_what_cannot_be_drawn(run, motion_file, here):
         ("slow.csv -o a.json", 3, "1e-06 frames a second, required 1 to 10000; export it again"),
         ("fast.csv -o a.json", 3, "1e+06 frames a second, required 1 to 10000"),
     ):
-        done = run("render", *options.split())
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("render", *options.split()), code, words)
     assert motion_file.read_bytes() == before
 
 

@@ -1,7 +1,5 @@
 """Calls that programs make of Rhubarb Lip Sync, in their order and form, and what these programs read of the answer."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys
@@ -86,22 +84,6 @@ def test_opentoonz(rhubarb, here):
     assert {name for _, name in rows[1:]} <= {"MBP", "etc", "E", "AI", "O", "U", "FV", "L", "rest"}
     kind, reason = opentoonz(rhubarb(*line, "--machineReadable", "missing.wav").err[-1])
     assert (kind, "missing.wav" in reason) == ("failure", True)
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "-f json --machineReadable --extendedShapes GHX -r pocketSphinx take.wav --dialogFile dialog.txt",  # Blender
-        "-f json --machineReadable --extendedShapes GHX -r phonetic --dialogFile dialog.txt take.wav",  # Blender, NG
-        "-f json --recognizer phonetic --extendedShapes GHX take.wav",  # a server
-        "-q -f json -d dialog.txt --extendedShapes GHX take.wav",
-    ],
-)
-def test_cues_on_standard_output(rhubarb, line):
-    done = rhubarb(*line.split())
-    assert done.code == 0
-    assert shapes_of("\n".join(done.out))
-    assert all(json.loads(text) for text in done.err)
 
 
 @pytest.mark.parametrize(

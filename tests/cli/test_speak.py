@@ -1,12 +1,10 @@
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion import load_model, read_motion, speak, write
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices import installed
@@ -90,18 +88,14 @@ def test_errors(run, basics, here):
         ("-o a.json --channels smile", 3, "no motion channel 'smile'"),
         ("-o a.json --speaker nobody", 3, "no 'nobody'"),
     ):
-        done = run(*basics, *more.split())
-        assert is_one_error(done, code)
-        assert said in done.err[0]
+        check_refused(run(*basics, *more.split()), code, said)
         assert list(here.iterdir()) == []
 
 
 def test_without_a_synthesiser_it_says_what_to_install(run, basics, monkeypatch):
     only = installed.SYNTHESISERS["stand-in"]
     monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": replace(only, voices=tuple)})
-    done = run(*basics, "-o", "a.wav")
-    assert is_one_error(done, 8)
-    assert f"{install_command('text')}, or: apt install stand-in" in done.err[0]
+    check_refused(run(*basics, "-o", "a.wav"), 8, f"{install_command('text')}, or: apt install stand-in")
 
 
 def test_an_output_never_replaces_the_model(run, basics, toy_model_file):

@@ -1,7 +1,5 @@
 """``lipmotion studio``: what it refuses before it begins."""
 
-from __future__ import annotations
-
 import socket
 
 import pytest

@@ -1,7 +1,5 @@
 """``lipmotion study``."""
 
-from __future__ import annotations
-
 from contextlib import closing
 
 import pytest

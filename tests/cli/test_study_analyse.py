@@ -1,11 +1,9 @@
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import numpy as np
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion_studio.study.analysis.analyse import analyse_study
 from lipmotion_studio.study.analysis.analysis_table import analysis_table
@@ -45,6 +43,4 @@ def test_what_cannot_be_used(run, here):
         (("answers.csv", "--power", "2"), 3, "a power of 2"),
         (("answers.csv", "-o", "answers.csv"), 7, "answers.csv"),
     ):
-        done = run("study", "analyse", *arguments)
-        assert is_one_error(done, code), done
-        assert words in done.err[0]
+        check_refused(run("study", "analyse", *arguments), code, words)

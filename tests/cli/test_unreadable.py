@@ -1,7 +1,5 @@
 """Files without permission: one error line, the exit code of its kind, and no file left behind."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

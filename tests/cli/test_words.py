@@ -1,11 +1,9 @@
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 
 pytestmark = pytest.mark.usefixtures("here")
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
@@ -39,6 +37,4 @@ def test_errors(run):
         ([WELCOME, "--recogniser", "fast"], 3, "'fast' recognises phones, not words; required one of: auto, w"),
         ([WELCOME, "--recogniser", "own"], 3, "'own' recognises phones, not words; required one of: auto, wo"),
     ):
-        done = run("words", *line)
-        assert is_one_error(done, code)
-        assert said in done.err[0]
+        check_refused(run("words", *line), code, said)

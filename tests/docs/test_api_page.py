@@ -1,7 +1,5 @@
 """docs/api.md, run from top to bottom."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """What pages say to type is run: here, by the test of the page, or by hand, as a marker says, with the last output."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from functools import partial
@@ -72,7 +70,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory, toy_model_file: Path, coupled
 @pytest.mark.long
 @pytest.mark.usefixtures("recognised_once")
 @pytest.mark.parametrize("page", dict.fromkeys(block.page for block in HERE))
-def test_blocks_of_a_page_run(page, desk, toy_model, tmp_path, monkeypatch) -> None:
+def test_blocks_of_a_page_run(page, desk, toy_model, tmp_path, monkeypatch):
     monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     monkeypatch.chdir(copied(desk, tmp_path / "desk"))
     names: dict[str, object] = {"lipmotion": lipmotion, "corpus": Corpus.open(Path("my-corpus"))}

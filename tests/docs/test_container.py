@@ -1,7 +1,5 @@
 """The Containerfile says what the repository has; where a builder is, it is built."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

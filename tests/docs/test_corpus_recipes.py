@@ -1,7 +1,5 @@
 """The recipes for published corpora: three commands each, and that these do what the pages say."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The pages of docs/extend: their code is written to files, installed as packages, checked and used."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Links of all Markdown files resolve, the index has every page, and names of modules and options are present ones."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import fields

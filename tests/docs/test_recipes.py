@@ -1,7 +1,5 @@
 """The pages for other programs: short, and with tables that exist."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

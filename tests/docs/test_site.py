@@ -1,7 +1,5 @@
 """The documentation site: every page is in its sidebar, nothing comes from elsewhere, no warning when it is built."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

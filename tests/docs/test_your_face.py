@@ -1,7 +1,5 @@
 """docs/your-face.md, done: a video of a drawn person becomes a model and a face that say another sentence."""
 
-from __future__ import annotations
-
 import shlex
 from itertools import chain
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Corpora that differ from the toy corpus in one way."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

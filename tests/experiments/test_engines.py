@@ -1,7 +1,5 @@
 """The comparison of all engines."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The system of Minnis & Breen 2000 beside its variants."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

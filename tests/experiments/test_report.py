@@ -1,7 +1,5 @@
 """The report as a whole: what is run, what is kept, what is written; the experiments are stand-ins, but for one."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -149,7 +147,7 @@ def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.usefixtures("ran")
-def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus, tmp_path):
     without_val = toy_corpus.part([*toy_corpus.names("train"), *toy_corpus.names("test")])
     found = experiment_report(without_val, tmp_path / "r")
     assert set(found.left_out) == {"hofer2008"}

@@ -1,7 +1,5 @@
 """A picture in a corner of a video."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -7,8 +7,6 @@ The minutes are shared between the readers; making the good input (a minute) is 
 folder of its own, reduced, with its trace beside it; ``--replay`` reads such a folder again. Exit code 1: defects.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -3,8 +3,6 @@
 Of readers of JSON, every other input has a hostile value in one place of a good document, until all have been read.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator

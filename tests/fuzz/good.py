@@ -1,7 +1,5 @@
 """The good corpus and models of the fuzzer, made from the toy corpus."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from fuzz.inputs import Good

@@ -1,7 +1,5 @@
 """Inputs of the fuzzer, the readers that are fuzzed, and the good inputs from which all others are made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256

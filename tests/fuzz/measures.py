@@ -1,7 +1,5 @@
 """What the reading of one input takes: lines of the package that it reaches, memory and processor time."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys

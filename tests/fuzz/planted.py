@@ -1,7 +1,5 @@
 """A reader with planted defects, to test that the fuzzer finds them."""
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The findings of a fuzzing run: reduced, stored, and with all figures as a table and as JSON."""
 
-from __future__ import annotations
-
 import json
 import re
 import time

@@ -1,7 +1,5 @@
 """Mutations that keep the form of a file."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """Every reader with its good inputs, some mutations of them, and all inputs that once showed defects."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from random import Random
 

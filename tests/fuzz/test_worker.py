@@ -1,7 +1,5 @@
 """The worker process, with a reader that has planted defects, its judgement, and the report."""
 
-from __future__ import annotations
-
 import json
 import sys
 import warnings

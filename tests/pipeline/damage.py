@@ -1,7 +1,5 @@
 """Arrays of a model, damaged in every way; and what came of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 

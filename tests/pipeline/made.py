@@ -1,7 +1,5 @@
 """What tests of several rooms make: corpora of utterances, and sounds of noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Contact of the lips: the same in all faces, characters and curve sets, at all rates, for all kinds of motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A text said by the recordings of a corpus, and the motion that belongs to them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of a folder of drawings: every one is that of the cue of its time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

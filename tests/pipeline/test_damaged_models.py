@@ -1,7 +1,5 @@
 """No array of a model, whatever is done to it, gives motion that no face has."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Delivery as files and videos have it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

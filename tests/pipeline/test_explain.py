@@ -1,7 +1,5 @@
 """Why a frame is what it is, from a model and a recording."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A job is the same value from Python and from a file; what it cannot be is refused in one sentence."""
 
-from __future__ import annotations
-
 import re
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The benchmark that kills and goes on, in small (``benchmarks/kills.py`` does it five hundred times)."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

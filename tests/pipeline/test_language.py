@@ -1,7 +1,5 @@
 """The language of a request: whose words, whose pronunciations, and how sure the phones are."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import io
 import json
 import zipfile
@@ -126,7 +124,7 @@ def test_models_are_one_short_line():
 
 
 @pytest.mark.parametrize("fixture", ["joint_model", "coupled_model"])
-def test_models_of_engines_are_one_short_line(fixture: str, request: pytest.FixtureRequest) -> None:
+def test_models_of_engines_are_one_short_line(fixture, request):
     learned = request.getfixturevalue(fixture).learned
     assert repr(learned).startswith(f"{type(learned).__name__}(")
     assert len(repr(learned)) < 120

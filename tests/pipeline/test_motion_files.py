@@ -1,7 +1,5 @@
 """What formats hold: the channels that were asked for, or curves of their own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """``pipeline.outputs.output``: which kind of output a name asks for; kinds that packages add."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pictures of posterior probabilities: their rows, their size, and where things are drawn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

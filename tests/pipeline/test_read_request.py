@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -17,7 +15,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.usefixtures("here")
-def test_a_text_is_itself() -> None:
+def test_a_text_is_itself():
     texts = ["hello there", "see p. 3", "", "α" * 3000, "a/b/c", "the file words.txt", "..", "\n"]
     for text in (*texts, "é" * 130, "é" * 130 + ".abc", "你好.世界", "a" * 300 + ".txt"):
         assert read_text_or_file(text) == text

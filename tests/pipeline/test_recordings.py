@@ -1,7 +1,5 @@
 """The whole path on real recordings: a part of GRID speaker s1, from video files to figures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What was written and is given back unedited is what it was; an edit stays where it was made."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Characters with their animation: what is written, and what other programs read of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Text to sound and motion, with a stand-in for the synthesiser and with real ones where they are installed."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -45,7 +43,7 @@ def test_sound_and_motion_are_of_the_same_length(spoken):
     "text", ["[00:00.5]Papa, see Bob.\n[00:02]Mama!", "1\n00:00:00,500 --> 00:00:02,000\nPAPA: {0}\n"]
 )
 @pytest.mark.usefixtures("stand_in")
-def test_times_of_subtitles_are_not_spoken(toy_model: Model, text: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_times_of_subtitles_are_not_spoken(toy_model, text, caplog):
     assert phones(speak(text.format(TEXT), model=toy_model)) == phones(speak(TEXT, model=toy_model))
     assert "subtitles" in caplog.text
 

@@ -1,7 +1,5 @@
 """Several people in one model, from the corpus to the motion of one of them."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Who says which phones were spoken, where nobody wrote them down."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any, ClassVar

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -59,7 +57,7 @@ def rules(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("rules")
-def test_what_is_not_in_the_dictionary_is_reported_once(phones, audio, features, caplog) -> None:
+def test_what_is_not_in_the_dictionary_is_reported_once(phones, audio, features, caplog):
     transcribe(phones, audio, features, ("see", "bimab", "papa", "bimab"), Lexicon())
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
@@ -192,7 +190,7 @@ def test_a_long_word_is_not_repeated_in_full(caplog):
 
 
 @pytest.mark.usefixtures("rules")
-def test_of_many_guesses_some_are_reported_one_by_one(caplog: pytest.LogCaptureFixture) -> None:
+def test_of_many_guesses_some_are_reported_one_by_one(caplog):
     warn_of_guesses([f"bimab{'ab' * i}" for i in range(MAX_WARNINGS + 7)], Lexicon())
     *each, last = [record.getMessage() for record in caplog.records]
     assert len(each) == MAX_WARNINGS

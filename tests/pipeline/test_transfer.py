@@ -1,7 +1,5 @@
 """Generated motion onto the face of another person: of a corpus, a video, another model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``pipeline.outputs.write``: one result, several files, all or none."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """``python -m portable.run``: run the numeric tests with the kernels of other processors (``make test-portable``)."""
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import os

@@ -1,7 +1,5 @@
 """Environment variables that make this processor compute like others."""
 
-from __future__ import annotations
-
 import sys
 from functools import cache
 

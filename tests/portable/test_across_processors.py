@@ -1,7 +1,5 @@
 """Results on another processor agree within the tolerances that docs/long-work.md states."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import ExitStack

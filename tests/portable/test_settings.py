@@ -1,7 +1,5 @@
 """Kernels that this processor cannot run are left out."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from portable import settings

@@ -1,7 +1,5 @@
 """Cases of bad input, and the good inputs from which they are made."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil

@@ -1,7 +1,5 @@
 """The table of all bad inputs as Markdown, written by ``PYTHONPATH=tests python -m robustness.document``."""
 
-from __future__ import annotations
-
 from itertools import groupby
 from pathlib import Path
 

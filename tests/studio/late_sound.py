@@ -1,7 +1,5 @@
 """Videos whose streams begin later than at 0."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import av

@@ -1,7 +1,5 @@
 """A studio with one line of the toy's speech, which requests are sent to in this process."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 import time

@@ -1,7 +1,5 @@
 """``lipmotion studio`` as a process: its address, requests to it, random edits that a page could make."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import time

@@ -1,7 +1,5 @@
 """Folders of projects: what is added, dropped and changed is there again; one process at a time."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -29,7 +27,7 @@ def lines(tmp_path: Path, toy_sentence: ToySentence) -> Path:
     return folder
 
 
-def test_a_project_is_there_again(lines: Path) -> None:
+def test_a_project_is_there_again(lines):
     with open_folder(lines) as folder:
         assert [line.name for line in folder.project.lines.values()] == ["a", "b", "inner/a"]
         for content in ("sound", "other"):
@@ -55,26 +53,26 @@ def test_a_project_is_there_again(lines: Path) -> None:
     assert document["lines"][0]["sound"] == "../lines/a.wav"
 
 
-def test_a_second_one_is_told(lines: Path) -> None:
+def test_a_second_one_is_told(lines):
     with open_folder(lines), pytest.raises(ExportError, match="another lipmotion"), open_folder(lines):
         pass
 
 
-def test_the_folder_of_a_project(tmp_path: Path, lines: Path) -> None:
+def test_the_folder_of_a_project(tmp_path, lines):
     assert project_path(lines / "a.wav") == lines / "a.studio"
     assert project_path(lines, tmp_path / "x") == tmp_path / "x"
     with pytest.raises(InputError, match="no such file"):
         project_path(tmp_path / "nothing")
 
 
-def test_a_project_that_is_not_there_is_an_empty_one(tmp_path: Path) -> None:
+def test_a_project_that_is_not_there_is_an_empty_one(tmp_path):
     for _ in range(2):
         with open_folder(tmp_path / "hero.studio") as folder:
             assert (folder.path, folder.project) == (tmp_path / "hero.studio", Project())
     assert (tmp_path / "hero.studio" / PROJECT).is_file()
 
 
-def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_written_is_not_kept(lines, monkeypatch):
     with open_folder(lines) as folder:
         before = folder.project
 
@@ -88,7 +86,7 @@ def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.Mon
         monkeypatch.undo()
 
 
-def test_a_project_is_what_its_document_says() -> None:
+def test_a_project_is_what_its_document_says():
     project = Project(
         {1: ProjectRecording(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
     )
@@ -113,7 +111,7 @@ def test_a_project_is_what_its_document_says() -> None:
         {"more": 1},
     ],
 )
-def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -> None:
+def test_documents_that_are_refused(tmp_path, change):
     document = project_document(Project()) | {"lines": [LINE]}
     assert list(parse_project(document).lines) == [1]
     (tmp_path / PROJECT).write_text(json.dumps(document | change), encoding="utf-8")
@@ -122,7 +120,7 @@ def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -
 
 
 @pytest.mark.parametrize("name", ["CON.wav", "nul .wav", "Aux..wav", "com1.take.wav"])
-def test_what_is_called_as_a_device_gets_another_name(lines: Path, tmp_path: Path, name: str) -> None:
+def test_what_is_called_as_a_device_gets_another_name(lines, tmp_path, name):
     sound = (lines / "a.wav").rename(tmp_path / name)
     assert portable_name(project_path(sound).name) == project_path(sound).name
     with open_folder(sound, tmp_path / "own") as folder:
@@ -134,7 +132,7 @@ def test_what_is_called_as_a_device_gets_another_name(lines: Path, tmp_path: Pat
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
-def test_the_usual_folder_of_a_project_is_no_link(lines: Path, tmp_path: Path) -> None:
+def test_the_usual_folder_of_a_project_is_no_link(lines, tmp_path):
     (lines / "a.studio").symlink_to(tmp_path)
     with pytest.raises(InputError, match="is a link"):
         project_path(lines / "a.wav")

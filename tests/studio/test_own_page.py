@@ -1,10 +1,7 @@
 """A voice of one's own in a real browser: trained on toy recordings, its report read, the voice used and taken back."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -20,7 +17,7 @@ from studio.toy_recordings import SENTENCES, write_recordings
 pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
 
 
-def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:
+def test_a_voice_is_trained_and_used_from_the_page(tmp_path):
     project = tmp_path / "project"
     recordings = os.path.relpath(write_recordings(tmp_path / "recordings"), project)
     (tmp_path / "home").mkdir()

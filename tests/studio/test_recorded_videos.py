@@ -1,7 +1,5 @@
 """Real videos beside faces: when in them the sound of a line begins, and which are played as they are."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +23,11 @@ def video(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -
     return path
 
 
-def test_sound_that_begins_with_the_video_is_in_step(video: Path, toy_speech: Path) -> None:
+def test_sound_that_begins_with_the_video_is_in_step(video, toy_speech):
     assert sound_begins_s(video, video) == sound_begins_s(video, toy_speech) == 0
 
 
-def test_a_later_sound_is_found_in_the_video(video: Path, toy_speech: Path, tmp_path: Path) -> None:
+def test_a_later_sound_is_found_in_the_video(video, toy_speech, tmp_path):
     late = shifted(video, tmp_path / "late.mp4", sound_s=LATE_S)
     assert sound_begins_s(late, late) == 0  # the readers have silence before it
     assert sound_begins_s(late, toy_speech) == pytest.approx(LATE_S, abs=0.03)  # and the silence of the encoder
@@ -38,7 +36,7 @@ def test_a_later_sound_is_found_in_the_video(video: Path, toy_speech: Path, tmp_
     assert sound_begins_s(late, with_silence) == 0
 
 
-def test_what_begins_later_than_0_is_written_anew(video: Path, tmp_path: Path) -> None:
+def test_what_begins_later_than_0_is_written_anew(video, tmp_path):
     assert media_type(video) == MP4
     later = shifted(video, tmp_path / "later.mp4", all_s=1.0)
     assert find_real_video(later) == later

@@ -1,9 +1,6 @@
 """Votes of blind comparisons: what is compared is told by digests, and old files are read."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import pytest
 
@@ -18,20 +15,20 @@ OLD = [
 ]
 
 
-def test_models_of_one_name_have_tallies_of_their_own() -> None:
+def test_models_of_one_name_have_tallies_of_their_own():
     votes = [Vote("one", (A, C), 0), Vote("two", (C, A), 0), Vote("one", (B, C), 1), Vote("one", (A, C))]
     assert tally(votes, Vote("three", (A, C))) == {"better": [1, 1], "neither": 1}
     assert tally(votes, Vote("three", (C, B))) == {"better": [1, 0], "neither": 0}
 
 
-def test_edits_count_where_they_differ_and_names_do_not() -> None:
+def test_edits_count_where_they_differ_and_names_do_not():
     renamed = Side("renamed", A.model, "d" * 64)
     votes = [Vote("one", (A, C), 0), Vote("one", (A, KEPT), 1)]
     assert tally(votes, Vote("two", (renamed, Side("other", C.model, "d" * 64)))) == {"better": [1, 0], "neither": 0}
     assert tally(votes, Vote("two", (KEPT, A))) == {"better": [1, 0], "neither": 0}
 
 
-def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_path: Path) -> None:
+def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_path):
     path = tmp_path / "votes.json"
     assert read_votes(path) == ()
     path.write_text(json.dumps(OLD), encoding="utf-8")
@@ -47,14 +44,14 @@ def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_pat
 @pytest.mark.parametrize(
     "content", ["[1]", '["x"]', "{", '[{"line": "one", "shown": ["a", "b"], "better": "c", "edits": ""}]']
 )
-def test_other_files_are_refused(content: str, tmp_path: Path) -> None:
+def test_other_files_are_refused(content, tmp_path):
     path = tmp_path / "votes.json"
     path.write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=r"votes\.json"):
         read_votes(path)
 
 
-def test_a_vote_is_between_two_motions_that_differ() -> None:
+def test_a_vote_is_between_two_motions_that_differ():
     for shown in ((A,), (A, A), (A, Side("renamed", A.model, A.edits))):
         with pytest.raises(InputError, match="differ"):
             Vote("one", shown)

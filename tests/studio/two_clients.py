@@ -4,8 +4,6 @@ A shadow of the project holds what was acknowledged. A change is made exactly wh
 is; what is refused changes nothing; sounds and edits of lines that were removed stay as they were.
 """
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A real browser without a window: Chromium, driven over the WebDriver protocol (W3C), without a client library."""
 
-from __future__ import annotations
-
 import base64
 import http.client
 import json

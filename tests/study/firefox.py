@@ -5,8 +5,6 @@ parameters are those of WebDriver, which Firefox itself answers only through a f
 draws no WebGL, so it gets one that nobody sees.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import re

@@ -1,7 +1,6 @@
 """Tables of answers."""
 
 import csv
-from pathlib import Path
 
 import pytest
 
@@ -15,13 +14,13 @@ ANSWERS = [
 ]
 
 
-def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_table_is_read_as_it_was_written(tmp_path):
     write_answers(tmp_path / "answers.csv", ANSWERS)
     assert read_answers(tmp_path / "answers.csv") == ANSWERS
 
 
 @pytest.mark.parametrize("name", ["=1+1", "@SUM(A1)", "+1", "-1", "\tx", "\rx", "'=1", "\uff1d1", " =1"])
-def test_no_name_is_a_formula_in_the_table(tmp_path: Path, name: str) -> None:
+def test_no_name_is_a_formula_in_the_table(tmp_path, name):
     answer = Answer("r1", "mos", 0, name, "smoothness", name, name, "1", 8.25, 1, False, "")
     write_answers(tmp_path / "answers.csv", [answer])
     with (tmp_path / "answers.csv").open(encoding="utf-8", newline="") as file:
@@ -46,7 +45,7 @@ def test_no_name_is_a_formula_in_the_table(tmp_path: Path, name: str) -> None:
         ("ranking", "", False),
     ],
 )
-def test_possible_values(kind: str, value: str, wanted: bool) -> None:
+def test_possible_values(kind, value, wanted):
     assert is_possible(kind, value) == wanted
 
 
@@ -59,7 +58,7 @@ def test_possible_values(kind: str, value: str, wanted: bool) -> None:
         ("ranking", "guess", "line 4: an answer of the kind 'guess', required one of paired, mos, ranking"),
     ],
 )
-def test_wrong_tables_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_wrong_tables_are_refused(tmp_path, old, new, message):
     path = tmp_path / "answers.csv"
     write_answers(path, ANSWERS)
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
@@ -67,7 +66,7 @@ def test_wrong_tables_are_refused(tmp_path: Path, old: str, new: str, message: s
         read_answers(path)
 
 
-def test_a_short_line_is_refused(tmp_path: Path) -> None:
+def test_a_short_line_is_refused(tmp_path):
     (tmp_path / "answers.csv").write_text(",".join(COLUMNS) + "\nr1,mos\n", encoding="utf-8")
     with pytest.raises(InputError, match="line 2"):
         read_answers(tmp_path / "answers.csv")

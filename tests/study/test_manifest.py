@@ -1,10 +1,7 @@
 """The folder of a study: what is written is read again, and what was changed is noticed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,7 +13,7 @@ from study.small_study import small_study
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_study_survives_its_file(tmp_path: Path, kind: str) -> None:
+def test_a_study_survives_its_file(tmp_path, kind):
     study = small_study(tmp_path / "study", kind)
     assert read_study(tmp_path / "study") == study
     assert set(check_videos(study, tmp_path / "study")) == {video.file for video in study.videos}
@@ -43,7 +40,7 @@ def put(**members: Any) -> Callable[[dict[str, Any]], object]:
         lambda content: content.pop("seed"),
     ],
 )
-def test_a_manifest_that_was_changed_is_refused(tmp_path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+def test_a_manifest_that_was_changed_is_refused(tmp_path, change):
     small_study(tmp_path / "study")
     path = tmp_path / "study" / MANIFEST
     content = json.loads(path.read_text(encoding="utf-8"))
@@ -53,7 +50,7 @@ def test_a_manifest_that_was_changed_is_refused(tmp_path: Path, change: Callable
         read_study(tmp_path / "study")
 
 
-def test_a_folder_that_is_no_study_says_how_to_make_one(tmp_path: Path) -> None:
+def test_a_folder_that_is_no_study_says_how_to_make_one(tmp_path):
     with pytest.raises(InputError, match="lipmotion study design"):
         read_study(tmp_path)
     (tmp_path / MANIFEST).write_text("[]", encoding="utf-8")
@@ -61,7 +58,7 @@ def test_a_folder_that_is_no_study_says_how_to_make_one(tmp_path: Path) -> None:
         read_study(tmp_path)
 
 
-def test_videos_that_are_missing_or_changed_are_noticed(tmp_path: Path) -> None:
+def test_videos_that_are_missing_or_changed_are_noticed(tmp_path):
     study = small_study(tmp_path / "study")
     path = check_videos(study, tmp_path / "study")[study.videos[0].file]
     path.write_bytes(b"another video")

@@ -1,7 +1,5 @@
 """The page in a real browser: videos play, keys work, answers land, nobody is kept out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from hashlib import sha256
@@ -102,7 +100,7 @@ def look(window: Browser, name: str) -> None:
     window.show_as(1200, 900)
 
 
-def test_pairs_by_keys(opens: Opens, tmp_path: Path) -> None:
+def test_pairs_by_keys(opens, tmp_path):
     with at_work(opens, tmp_path, PAIRED) as (window, _, study):
         look(window, "welcome")
         window.click("#agree")
@@ -125,7 +123,7 @@ def test_pairs_by_keys(opens: Opens, tmp_path: Path) -> None:
     assert all(row.plays == 2 and row.seconds >= 0.9 for row in rows)
 
 
-def test_opinions_by_keys(opens: Opens, tmp_path: Path) -> None:
+def test_opinions_by_keys(opens, tmp_path):
     with at_work(opens, tmp_path, MOS) as (window, _, study):
         join(window)
         look(window, "opinions")
@@ -134,7 +132,7 @@ def test_opinions_by_keys(opens: Opens, tmp_path: Path) -> None:
     assert values == {"smoothness": "1", "closure": "2", "protrusion": "3", "turning": "4", "overall": "5"}
 
 
-def test_a_ranking_by_sliders(opens: Opens, tmp_path: Path) -> None:
+def test_a_ranking_by_sliders(opens, tmp_path):
     moves = """for (const [n, input] of [...document.querySelectorAll('input[type=range]')].entries()) {
         input.value = 20 * n; input.dispatchEvent(new Event('input', { bubbles: true })); }"""
     with at_work(opens, tmp_path, RANKING) as (window, _, study):
@@ -151,7 +149,7 @@ def test_a_ranking_by_sliders(opens: Opens, tmp_path: Path) -> None:
     assert {row.condition for row in counted} == {*CONDITIONS, "anchor"}
 
 
-def test_an_answer_outlives_the_server_and_the_page(opens: Opens, tmp_path: Path) -> None:
+def test_an_answer_outlives_the_server_and_the_page(opens, tmp_path):
     """The server is killed before an answer comes; the page keeps it, sends it again, and also after a reload."""
     with ExitStack() as stack:
         window, server, _ = stack.enter_context(at_work(opens, tmp_path, PAIRED))

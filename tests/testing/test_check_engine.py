@@ -1,7 +1,5 @@
 """The checks of the engine contract: each of them fails for an engine that breaks what it checks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar

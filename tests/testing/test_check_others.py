@@ -1,7 +1,5 @@
 """The checks of faces and motion formats: each fails for something that breaks it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

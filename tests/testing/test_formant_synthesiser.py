@@ -1,7 +1,5 @@
 """The formant synthesiser: exact times, quiet silence, and phones that sound like themselves."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The toy corpus: known words, known times, known motion; and videos that can be tracked."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The toy face: what is drawn is where it should be, in pictures of any scale and in frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 It shows nobody, it needs neither OpenCV nor MediaPipe, and where everything is in every picture is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

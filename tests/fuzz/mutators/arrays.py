@@ -1,7 +1,5 @@
 """Mutations of ``.npy`` files: of the header, and of the values."""
 
-from __future__ import annotations
-
 import io
 from random import Random
 from typing import Any

@@ -1,7 +1,5 @@
 """JSON inside files: of text, of glTF's binary container, and of archives; and every hostile value in every place."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Mutations of JSON documents: other types, huge numbers, NaN, deep nesting, repeated keys."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from copy import deepcopy

@@ -1,7 +1,5 @@
 """Mutations of WAV and AVI files: chunks, their sizes and order, and the fields of the format."""
 
-from __future__ import annotations
-
 import struct
 from random import Random
 

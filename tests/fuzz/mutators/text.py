@@ -1,7 +1,5 @@
 """Mutations of text: lines, words, numbers, characters and encodings."""
 
-from __future__ import annotations
-
 import re
 from random import Random
 

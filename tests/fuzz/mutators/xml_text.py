@@ -1,7 +1,5 @@
 """Mutations of XML: its elements, attributes, values, declarations and nesting."""
 
-from __future__ import annotations
-
 import gzip
 import re
 from random import Random

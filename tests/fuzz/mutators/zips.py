@@ -1,7 +1,5 @@
 """Mutations of zip files: members are changed with correct checksums, removed, doubled, renamed or added."""
 
-from __future__ import annotations
-
 import io
 import warnings
 import zipfile

@@ -1,7 +1,5 @@
 """Prepared corpora."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Plausibility checks of results, and short speech for them."""
 
-from __future__ import annotations
-
 import json
 import math
 import tempfile

@@ -1,7 +1,5 @@
 """Bodies and queries of requests to the studio and to a study, which reply with JSON that every program reads."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """Whole batches: outputs as of ``animate``, failures among them, kept lines, processes that die, a cluster."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """The check of recordings against their script: every kind of finding, and none where there is nothing."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The ledger: what is known of lines after a kill at any moment."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Lists and folders of recordings, and the names of their outputs."""
 
-from __future__ import annotations
-
 import logging
 import os
 from pathlib import Path

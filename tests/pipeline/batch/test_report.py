@@ -1,7 +1,5 @@
 """The report: doubtful lines first, nothing that a name says gets out of its field."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The report in a real browser: it plays, keys mark lines, marks are saved, thousands of lines stay quick."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a corpus has of the sounds of a text."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import replace

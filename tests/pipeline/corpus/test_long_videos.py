@@ -1,7 +1,5 @@
 """One long video becomes a corpus; face tracking is replaced, but for the real recordings at the end."""
 
-from __future__ import annotations
-
 import shutil
 from fractions import Fraction
 from pathlib import Path
@@ -93,7 +91,7 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
 
 
 @pytest.mark.usefixtures("scanned")
-def test_a_long_video_is_divided_at_its_pauses(talk: Path, tmp_path: Path):
+def test_a_long_video_is_divided_at_its_pauses(talk, tmp_path):
     report = prepare(talk.parent, tmp_path / "corpus", workers=1)
     assert len(report.prepared) == len(SENTENCES)
     assert report.prepared[0] == "talk-00h00m00.68s"
@@ -115,14 +113,14 @@ def test_a_long_video_is_divided_at_its_pauses(talk: Path, tmp_path: Path):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_it_is_kept_when_it_is_prepared_again(talk: Path, tmp_path: Path):
+def test_it_is_kept_when_it_is_prepared_again(talk, tmp_path):
     prepare(talk, tmp_path / "corpus", workers=1)
     again = prepare(talk, tmp_path / "corpus", workers=1)
     assert again.counts == {"prepared": 0, "kept": 10, "skipped": 0}
 
 
 @pytest.mark.usefixtures("scanned")
-def test_words_come_from_the_lines_in_time(talk: Path, tmp_path: Path):
+def test_words_come_from_the_lines_in_time(talk, tmp_path):
     lines = [f"{start_s}\t{end_s}\tSentence {n}." for n, (start_s, end_s) in enumerate(SENTENCES[:5])]
     talk.with_suffix(".txt").write_text("\n".join(lines))
     corpus = Corpus.open(prepare(talk, tmp_path / "corpus", workers=1).corpus)
@@ -131,7 +129,7 @@ def test_words_come_from_the_lines_in_time(talk: Path, tmp_path: Path):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_words_without_times_are_told_to_be_of_no_use(talk: Path, tmp_path: Path, caplog):
+def test_words_without_times_are_told_to_be_of_no_use(talk, tmp_path, caplog):
     talk.with_suffix(".txt").write_text("all that is said")
     corpus = Corpus.open(prepare(talk, tmp_path / "corpus", workers=1).corpus)
     assert {corpus.utterance(name).words for name in corpus.names()} == {None}
@@ -146,7 +144,7 @@ def test_cuts_divide_and_the_person_is_followed(talk, tmp_path, scanned):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_lists_and_other_recordings_decide_the_splits(talk: Path, talk_file: Path, tmp_path: Path):
+def test_lists_and_other_recordings_decide_the_splits(talk, talk_file, tmp_path):
     (talk.parent / "test.txt").write_text("talk\n")
     corpus = Corpus.open(prepare(talk.parent, tmp_path / "listed", workers=1).corpus)
     assert {corpus.utterance(name).split for name in corpus.names()} == {"test"}
@@ -158,7 +156,7 @@ def test_lists_and_other_recordings_decide_the_splits(talk: Path, talk_file: Pat
 
 
 @pytest.mark.usefixtures("scanned")
-def test_silence_is_refused(tmp_path: Path):
+def test_silence_is_refused(tmp_path):
     silent = write_talk(tmp_path / "talks" / "talk.mkv", [])
     silent.with_suffix(".txt").write_text("100.0\t101.0\tafter the end\n")
     with pytest.raises(CorpusError, match=r"the first, talk: .*talk\.mkv: no speech in it"):
@@ -167,7 +165,7 @@ def test_silence_is_refused(tmp_path: Path):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_progress_is_reported(talk: Path, tmp_path: Path):
+def test_progress_is_reported(talk, tmp_path):
     seen: list[Progress] = []
     prepare(
         talk, tmp_path / "corpus", workers=1, monitor=lambda event: isinstance(event, Progress) and seen.append(event)

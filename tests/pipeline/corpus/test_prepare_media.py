@@ -1,7 +1,5 @@
 """Videos as people have them, through ``prepare``: the motion is that of the plain clip, in time with the sound."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path

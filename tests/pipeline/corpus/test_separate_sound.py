@@ -1,7 +1,5 @@
 """Sound from a recorder of its own becomes the sound of the corpus, in step with the motion."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Dividing long recordings: every stretch comes once, no word is cut, nothing crosses a cut."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

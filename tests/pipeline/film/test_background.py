@@ -1,7 +1,5 @@
 """Backgrounds: any length of some footage, and where the face is in it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Footage in which the face is not seen all the time: what is shown of it, and what is kept."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A face built from videos of the drawn person, tracked without errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -111,7 +109,7 @@ def test_the_speech_is_kept_with_its_motion(built):
 
 
 @pytest.mark.usefixtures("tracker")
-def test_short_footage_is_refused(videos: Videos) -> None:
+def test_short_footage_is_refused(videos):
     video = next(iter(videos))
     with pytest.raises(InputError) as caught:
         build_face(video, workers=1)
@@ -142,7 +140,7 @@ def test_what_is_not_enough_is_said(videos, tracker, caplog, monkeypatch):
 
 @pytest.mark.long
 @pytest.mark.usefixtures("tracker")
-def test_recordings_that_cannot_be_used_are_left_out(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recordings_that_cannot_be_used_are_left_out(videos, monkeypatch):
     def film(path: Path, *more: object) -> object:
         if path.name == "toy00.mp4":
             raise InputError(f"{path}: no face in 60 of 60 frames")

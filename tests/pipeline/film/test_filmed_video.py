@@ -1,7 +1,5 @@
 """Films: any motion of the person, at any rate, of any length, in any background."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

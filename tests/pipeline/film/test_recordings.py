@@ -1,7 +1,5 @@
 """A face from real recordings: what it says is what was said, to a tracker too."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

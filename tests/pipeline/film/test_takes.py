@@ -1,7 +1,5 @@
 """Which recordings a face is learned from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

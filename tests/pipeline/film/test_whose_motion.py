@@ -1,7 +1,5 @@
 """Whose motion a model generates, and whose face it is shown on."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

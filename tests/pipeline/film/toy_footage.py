@@ -1,7 +1,5 @@
 """Footage of the drawn person: videos, and what a tracker that makes no errors would say of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

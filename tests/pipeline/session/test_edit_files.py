@@ -1,7 +1,5 @@
 """Edits as sentences, and in files: what is written is read again; what is wrong is named."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 

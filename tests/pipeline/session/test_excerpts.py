@@ -1,7 +1,5 @@
 """Edits of long recordings: the motion around an edit at once, and the whole when it is asked for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

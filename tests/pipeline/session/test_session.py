@@ -1,7 +1,5 @@
 """Sessions: the same motion as in one pass, only what changed computed again, edits that hold, threads."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from threading import Barrier

@@ -1,7 +1,5 @@
 """Eigenlips from mouth pictures to figures: learned, trained on, kept in the model, generated, compared."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Many speakers: what they say, what recordings say, and who is kept aside."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from itertools import pairwise
@@ -50,7 +48,7 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_every_text_in_every_voice() -> None:
+def test_every_text_in_every_voice():
     sentences = list(synthesise_sentences(TEXTS))
     assert [sentence.name for sentence in sentences] == [
         "flite-low-001",
@@ -63,7 +61,7 @@ def test_every_text_in_every_voice() -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
+def test_sentences_stand_between_pauses_over_a_faint_noise():
     for sentence in synthesise_sentences(TEXTS):
         first, last = sentence.phones[0], sentence.phones[-1]
         assert first.label == last.label == Unit("sil")
@@ -77,7 +75,7 @@ def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pauses_of_the_synthesiser_become_longer(monkeypatch):
     phones = [("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)]
     monkeypatch.setattr(module, "speak_sentences", lambda *_: iter([synthesise(phones)]))
     (sentence,) = synthesise_sentences(["Bee"], VOICES[:1])
@@ -87,7 +85,7 @@ def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.usefixtures("spoken")
-def test_the_same_again_shared_or_not() -> None:
+def test_the_same_again_shared_or_not():
     shared = synthesise_sentences(TEXTS, each=lambda function, items: iter([function(item) for item in list(items)]))
     for one, other in zip(synthesise_sentences(TEXTS), shared, strict=True):
         assert np.array_equal(one.audio.samples, other.audio.samples)
@@ -96,7 +94,7 @@ def test_the_same_again_shared_or_not() -> None:
 
 @pytest.mark.long
 @pytest.mark.usefixtures("spoken")
-def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
+def test_texts_by_default_say_every_phone_of_the_dictionary():
     sentences = list(synthesise_sentences(voices=VOICES[:1]))
     said = {span.label.phone for sentence in sentences for span in sentence.phones}
     assert len(sentences) == 60
@@ -105,7 +103,7 @@ def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_sentences_become_training_data() -> None:
+def test_sentences_become_training_data():
     sentences = list(synthesise_sentences(TEXTS))
     for sentence, (features, units, speaker) in zip(sentences, make_voice_examples(sentences), strict=True):
         assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)

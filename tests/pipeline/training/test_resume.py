@@ -1,7 +1,5 @@
 """A training that is stopped, wherever it is, goes on from there to the same bytes."""
 
-from __future__ import annotations
-
 import multiprocessing
 import shutil
 from collections.abc import Callable, Iterator
