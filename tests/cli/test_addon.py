@@ -1,5 +1,3 @@
-"""``lipmotion addon``."""
-
 import zipfile
 from pathlib import Path
 

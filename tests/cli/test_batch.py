@@ -1,5 +1,3 @@
-"""``lipmotion batch`` as a command."""
-
 import json
 import shutil
 from pathlib import Path

@@ -11,7 +11,6 @@ ROOT = Path(__file__).parents[2]
 
 
 def keys(lines: list[str]) -> list[str]:
-    """Return the citation keys of BibTeX entries."""
     return re.findall(r"^@\w+\{(\w+),$", "\n".join(lines), flags=re.MULTILINE)
 
 

@@ -9,15 +9,11 @@ from children import run_child
 from lipmotion.cli.verbs.completion import SHELLS
 
 ASKED: dict[tuple[str, ...], set[str]] = {
-    ("cue",): {"cues"},
-    ("corpus", "pre"): {"prepare"},
-    ("corpus", "prepare", "--no"): {"--no-crops"},
-    ("face", "info", "--struc"): set(),
-    ("info", "--struc"): {"--structure"},
-    ("animate", "--pauses", ""): {"rest", "natural"},
-    ("animate", "a.wav", "-o", "ou"): {"out.json"},
+    ("cue",): {"cues"}, ("corpus", "pre"): {"prepare"}, ("corpus", "prepare", "--no"): {"--no-crops"},
+    ("face", "info", "--struc"): set(), ("info", "--struc"): {"--structure"},
+    ("animate", "--pauses", ""): {"rest", "natural"}, ("animate", "a.wav", "-o", "ou"): {"out.json"},
     ("completion", ""): set(SHELLS),
-}
+}  # fmt: skip
 """The words of a command line, and what may stand for the last of them."""
 BASH = 'source "$1"; shift; COMP_WORDS=(lipmotion "$@"); COMP_CWORD=$#; _shtab_lipmotion'
 

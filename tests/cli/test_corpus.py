@@ -3,16 +3,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from cli.conftest import check_refused, is_one_error
 from lipmotion.errors import MissingDependencyError
 from lipmotion.formats.sound import write_sound
-from lipmotion.types import Audio, Item, Progress
+from lipmotion.types import Item, Progress
 from lipmotion_faces.corpus import prepare
 from lipmotion_faces.corpus import sync as offset
 from lipmotion_faces.corpus.prepare import PrepareReport
-from lipmotion_faces.video.mp4 import write_mp4
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 
@@ -60,12 +58,8 @@ def test_prepare_prints_the_counts(run, monkeypatch):
         ["lipmotion: warning: skipped d: no face"],
     )
     assert asked == {
-        "directory": Path("videos"),
-        "output": Path("mine"),
-        "workers": 2,
-        "crops": False,
-        "offset_ms": -40.0,
-    }
+        "directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False, "offset_ms": -40.0,
+    }  # fmt: skip
 
 
 def test_what_cannot_be_used(run, here):
@@ -88,34 +82,6 @@ def test_without_the_packages_for_video(run, here, monkeypatch):
     (here / "videos" / "a.mp4").touch()
     assert is_one_error(run("corpus", "prepare", "videos", "-o", "mine"), 8)
     assert not (here / "mine").exists()
-
-
-def faceless(path: Path) -> None:
-    """Write a second of grey with sound."""
-    sound = Audio(np.random.default_rng(0).normal(0, 0.1, 16_000).astype(np.float32), 16_000)
-    write_mp4(path, [np.full((120, 160, 3), 128, np.uint8)] * 25, fps=25, audio=sound)
-
-
-@pytest.mark.long
-@pytest.mark.video
-def test_videos_that_cannot_be_used(run_outside, here, bad_speech):
-    """Videos without a face, without sound, or empty: each is named, and no corpus is made of them."""
-    pytest.importorskip("mediapipe")
-    (here / "videos").mkdir()
-    faceless(here / "videos" / "faceless.mp4")
-    done = run_outside("corpus", "prepare", "videos", "-o", "mine")
-    assert (done.code, done.out, len(done.err)) == (4, [], 2)
-    assert done.err[0].startswith("lipmotion: warning: skipped faceless: ")
-    assert "lipmotion: error: " in done.err[1]
-    assert "none of 1 recordings is usable; the first, faceless: " in done.err[1]
-    assert "no face" in done.err[1]
-    assert [path.name for path in here.iterdir()] == ["videos"]
-
-    shutil.copy(bad_speech["mute"], here / "videos" / "mute.mp4")
-    (here / "videos" / "empty.mkv").touch()
-    done = run_outside("corpus", "prepare", "videos", "-o", "mine", "--workers", "1")
-    assert (done.code, done.out, len(done.err)) == (4, [], 4)
-    assert [path.name for path in here.iterdir()] == ["videos"]
 
 
 def test_offset_of_two_recordings(run, here):

@@ -26,11 +26,6 @@ def test_the_figures_are_those_of_the_function(run, toy_corpus, toy_model_file, 
     assert [path.name for path in here.iterdir()] == ["figures.json"]
 
 
-@pytest.mark.long
-def test_other_lists(run, toy_corpus, toy_model_file):
-    assert run("evaluate", toy_model_file, toy_corpus.path, "--split", "val").out[0].startswith("split val: 2 clips")
-
-
 def test_what_cannot_be_used(run, toy_corpus, toy_model_file, newer_model, here):
     corpus, model = toy_corpus.path, toy_model_file
     for arguments, code, words in (

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused
 
 BLENDER, WORD = b"BLENDER-v402REND", b"PK\x03\x04" + bytes(40) + b"word/document.xml"
 
@@ -30,7 +30,6 @@ def test_it_is_named(line, content, named, run, here, toy_speech):
     file = next(word for word in words if word.startswith("FILE"))
     (here / file).write_bytes(content)
     done = run(*(toy_speech if word == "SPEECH" else word for word in words))
-    assert is_one_error(done, 3)
-    assert f"{file}: is " in done.err[0]
+    check_refused(done, 3, f"{file}: is ")
     assert named in done.err[0]
     assert ", required a" in done.err[0]

@@ -147,7 +147,6 @@ BROKEN = InstalledPart("main path", "broken", "no model")
 
 @pytest.fixture
 def found(monkeypatch: pytest.MonkeyPatch) -> list[InstalledPart]:
-    """What is found, which a test may change."""
     findings = list(GOOD)
     monkeypatch.setattr("lipmotion.cli.doctor.doctor", lambda: iter(findings))
     return findings

@@ -183,12 +183,8 @@ def test_tables_have_a_line_a_row():
     row = dict.fromkeys(("acc", "acc_per_clip", "nrmse", "global_variance", "jerk"), 0.5)
     condition = {"channels": {EVIL: row}, "acc": 0.5, "amse": 0.5, "leading": EVIL, "lag_ms": 1.0}
     figures = {
-        "closed_under": None,
-        "still_channels": [EVIL],
-        "split": EVIL,
-        "clips": 1,
-        "conditions": {EVIL: condition},
-    }
+        "closed_under": None, "still_channels": [EVIL], "split": EVIL, "clips": 1, "conditions": {EVIL: condition},
+    }  # fmt: skip
     assert figures_table(figures).count(SHOWN) == 5
     assert OBEYED.search(figures_table(figures)) is None
     span = Span(0.0, 1.0, Unit(EVIL, EVIL, EVIL))

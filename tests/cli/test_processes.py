@@ -1,5 +1,3 @@
-"""Commands in processes of their own: behaviour that calls in this process cannot show."""
-
 import shutil
 import sys
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""Progress of long work for a program and on a terminal."""
-
 import json
 import logging
 import os

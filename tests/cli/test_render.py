@@ -1,5 +1,3 @@
-"""``lipmotion render``: motion files are drawn, edited ones, and those of blendshapes."""
-
 import json
 from pathlib import Path
 from shutil import copy

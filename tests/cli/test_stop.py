@@ -253,11 +253,7 @@ def test_little_is_loaded_before_signals_are_listened_to():
     done = run_child([sys.executable, "-S", "-c", program], variables=source, check=True)
     loaded = set(done.stdout.split())
     assert {name for name in loaded if name.startswith("lipmotion")} == {
-        "lipmotion",
-        "lipmotion.cli",
-        "lipmotion.cli.terminal",
-        "lipmotion.cli.terminal.events",
-        "lipmotion.cli.main",
+        "lipmotion", "lipmotion.cli", "lipmotion.cli.terminal", "lipmotion.cli.terminal.events", "lipmotion.cli.main",
         "lipmotion.cli.terminal.stop",
-    }
+    }  # fmt: skip
     assert not loaded & {"typing", "re", "json", "argparse", "logging", "numpy", "pathlib"}

@@ -1,5 +1,3 @@
-"""``lipmotion studio``: what it refuses before it begins."""
-
 import socket
 
 import pytest

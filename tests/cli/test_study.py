@@ -1,5 +1,3 @@
-"""``lipmotion study``."""
-
 from contextlib import closing
 
 import pytest

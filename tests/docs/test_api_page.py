@@ -1,5 +1,3 @@
-"""docs/api.md, run from top to bottom."""
-
 import re
 import shutil
 import sys

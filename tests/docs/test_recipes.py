@@ -1,5 +1,3 @@
-"""The pages for other programs: short, and with tables that exist."""
-
 from pathlib import Path
 
 import numpy as np

@@ -42,22 +42,13 @@ def test_nothing_from_elsewhere_is_named():
 
 def test_lists_of_arguments_become_field_lists():
     given = [
-        "Return it.",
-        "path, name : where",
-        "             it is",
-        "rate_hz : frames",
-        "Note: none.",
+        "Return it.", "path, name : where", "             it is", "rate_hz : frames", "Note: none.",
         "Raises A, B: bad.",
-    ]
+    ]  # fmt: skip
     made = [
-        ":param path,name: where",
-        "             it is",
-        ":param rate_hz: frames",
-        "",
-        "Note: none.",
-        "",
+        ":param path,name: where", "             it is", ":param rate_hz: frames", "", "Note: none.", "",
         ":raises A,B: bad.",
-    ]
+    ]  # fmt: skip
     assert SETTINGS.restructured(given) == ["Return it.", "", *made]
 
 
@@ -67,17 +58,8 @@ def test_the_site_is_built_without_a_warning(tmp_path):
         pytest.skip("make site installs the tools")
     site = tmp_path / "site"
     command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-c",
-        ROOT / "docs",
-        "-d",
-        tmp_path / "cache",
-    ]
+        sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", ROOT / "docs", "-d", tmp_path / "cache",
+    ]  # fmt: skip
     run_child([*command, ROOT, site], variables=environment(PYTHONPATH=f"{ROOT / 'src'}:{TOOLS}"), check=True)
     for page in pages():
         text = (site / f"{page}.html").read_text(encoding="utf-8")

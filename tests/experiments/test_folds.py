@@ -12,10 +12,8 @@ from experiments.copies import copied, renamed
 from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.closures import find_closings
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
-from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
 from lipmotion_lab.folds import folds, table
 from lipmotion_lab.runner import ExperimentSettings
@@ -71,39 +69,6 @@ def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
     assert low <= row["acc"] <= high
 
 
-@pytest.mark.long
-def test_closings_are_of_all_clips_as_one_split(figures, by_hand):
-    under, row = figures["closed_under"], figures["conditions"]["with transcript"]
-    pairs = [(find_closings(c.generated[:, 0], under), find_closings(c.original[:, 0], under)) for c in by_hand]
-    hits = [any(abs(int(g) - int(o)) <= 2 for g in made) for made, recorded_ones in pairs for o in recorded_ones]
-    good = [any(abs(int(g) - int(o)) <= 2 for o in recorded_ones) for made, recorded_ones in pairs for g in made]
-    assert (row["closings"], row["generated_closings"]) == (len(hits), len(good))
-    assert (row["score"], row["precision"]) == pytest.approx((100 * np.mean(hits), 100 * np.mean(good)))
-
-
-@pytest.mark.long
-def test_p_b_m_and_elsewhere_by_hand(figures, by_hand):
-    under, row = figures["closed_under"], figures["conditions"]["with transcript"]
-    wanted, hit, elsewhere, speech_s = 0, 0, [0, 0], 0.0
-    for clip in by_hand:
-        inside = np.zeros(len(clip.original), bool)
-        for start_s, end_s, phone in clip.spoken:
-            if phone not in BILABIAL:
-                speech_s += end_s - start_s
-                continue
-            frames = np.arange(len(clip.original))
-            near = (frames >= np.ceil(start_s * RATE_HZ - 1e-6) - 1) & (frames <= np.floor(end_s * RATE_HZ + 1e-6) + 1)
-            inside |= near
-            wanted += bool((clip.original[near, 0] < under).any())
-            hit += bool((clip.original[near, 0] < under).any() and (clip.generated[near, 0] < under).any())
-        for side, curve in enumerate((clip.generated[:, 0], clip.original[:, 0])):
-            elsewhere[side] += int((~inside[find_closings(curve, under)]).sum())
-    assert wanted > 10
-    assert (row["p_b_m"], row["recall_p_b_m"]) == (wanted, pytest.approx(100 * hit / wanted))
-    assert row["false_per_minute"] == pytest.approx(elsewhere[0] / speech_s * 60)
-    assert row["original_per_minute"] == pytest.approx(elsewhere[1] / speech_s * 60)
-
-
 def test_counts_that_cannot_be(toy_corpus):
     for count in (-1, 1, 9):
         with pytest.raises(InputError, match=f"{count} folds; required: from 2 to 8, which is how many"):
@@ -115,13 +80,6 @@ def test_corpora_that_cannot_be(toy_corpus, tmp_path):
         folds(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
         folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
-
-
-def test_the_document_shows_the_figures_beside_it():
-    results = Path(__file__).parents[2] / "docs" / "results"
-    figures = json.loads((results / "folds.json").read_text(encoding="utf-8"))
-    assert f"```text\n{table(figures)}\n```" in (results / "folds.md").read_text(encoding="utf-8")
-    assert (figures["folds"], figures["clips"]) == (5, 452)
 
 
 def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus, monkeypatch):

@@ -29,7 +29,6 @@ from fuzz.worker import Worker
 
 
 def main() -> int:
-    """Print a table; return 1 if anything was found."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--reader", action="append", choices=sorted(READERS), help="this one only (repeatable)")

@@ -32,7 +32,6 @@ class LineCoverage:
     if sys.version_info >= (3, 12):
 
         def watch(self) -> None:
-            """Start recording."""
             tool, events = sys.monitoring.COVERAGE_ID, sys.monitoring.events
             sys.monitoring.use_tool_id(tool, "fuzz")
             sys.monitoring.register_callback(tool, events.LINE, self._run)
@@ -46,7 +45,6 @@ class LineCoverage:
     else:
 
         def watch(self) -> None:
-            """Start recording."""
             self._missing: dict[CodeType, set[int]] = {}
             self._calls: dict[CodeType, int] = {}
             sys.settrace(self._called)
@@ -98,7 +96,6 @@ class Memory:
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
     def begin(self) -> None:
-        """Start a new measurement."""
         with suppress(OSError):
             PEAK.write_text("5")  # resets the peak
         self._before_mb = _now_mb("VmRSS")

@@ -1,5 +1,3 @@
-"""Mutations that keep the form of a file."""
-
 import io
 import json
 import zipfile

@@ -1,5 +1,3 @@
-"""Delivery as files and videos have it."""
-
 import json
 from dataclasses import replace
 from pathlib import Path

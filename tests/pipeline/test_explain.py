@@ -1,5 +1,3 @@
-"""Why a frame is what it is, from a model and a recording."""
-
 import json
 from dataclasses import replace
 from itertools import pairwise

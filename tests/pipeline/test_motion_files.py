@@ -99,7 +99,6 @@ def test_eyes_look_to_one_side_together(generation):
 
 
 def written(folder: Path, generation: Generation, name: str, **asked: Any) -> list[str]:
-    """Return the lines of a motion file."""
     write(generation, folder / name, **asked)
     return (folder / name).read_text(encoding="utf-8").splitlines()
 

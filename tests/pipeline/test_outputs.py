@@ -1,5 +1,3 @@
-"""``pipeline.outputs.output``: which kind of output a name asks for; kinds that packages add."""
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -48,19 +46,11 @@ def result(toy_model: Model, toy_speech: Path) -> Generation:
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        ("a.json", MotionOutput),
-        ("a.LIVELINK.csv", MotionOutput),
-        ("a.cues.json", CueOutput),
-        ("a.Cues.TSV", CueOutput),
-        ("cues.json", MotionOutput),
-        ("a.mp4", VideoOutput),
-        ("a.MOV", VideoOutput),
-        ("a%05d.png", PicturesOutput),
-        ("a.glb", SceneOutput),
-        ("a.textgrid", LabelOutput),
-        ("a.flac", SoundOutput),
+        ("a.json", MotionOutput), ("a.LIVELINK.csv", MotionOutput), ("a.cues.json", CueOutput),
+        ("a.Cues.TSV", CueOutput), ("cues.json", MotionOutput), ("a.mp4", VideoOutput), ("a.MOV", VideoOutput),
+        ("a%05d.png", PicturesOutput), ("a.glb", SceneOutput), ("a.textgrid", LabelOutput), ("a.flac", SoundOutput),
     ],
-)
+)  # fmt: skip
 def test_a_name_asks_for_a_kind(name, kind, settings):
     assert type(plan(name, settings)) is kind
 

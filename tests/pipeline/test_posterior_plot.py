@@ -1,5 +1,3 @@
-"""Pictures of posterior probabilities: their rows, their size, and where things are drawn."""
-
 from dataclasses import replace
 
 import numpy as np

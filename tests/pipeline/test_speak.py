@@ -103,23 +103,14 @@ def test_files(spoken, toy_model, tmp_path):
 
 def test_neighbouring_silences_are_one_and_short_ones_are_pauses():
     spans = [
-        Span(0.3, 0.5, Unit("aa")),
-        Span(0.5, 0.6, Unit("sil")),
-        Span(0.6, 0.65, Unit("sil")),
-        Span(0.65, 0.8, Unit("p")),
-        Span(0.8, 1.0, Unit("sil")),
-        Span(1.05, 1.2, Unit("p")),
-    ]
+        Span(0.3, 0.5, Unit("aa")), Span(0.5, 0.6, Unit("sil")), Span(0.6, 0.65, Unit("sil")),
+        Span(0.65, 0.8, Unit("p")), Span(0.8, 1.0, Unit("sil")), Span(1.05, 1.2, Unit("p")),
+    ]  # fmt: skip
     joined = [(span.label.phone, span.start_s, span.end_s) for span in module._join_silences(spans, 1.5)]
     assert joined == [
-        ("sil", 0.0, 0.3),
-        ("aa", 0.3, 0.5),
-        ("sp", 0.5, 0.65),
-        ("p", 0.65, 0.8),
-        ("sil", 0.8, 1.05),
-        ("p", 1.05, 1.2),
-        ("sil", 1.2, 1.5),
-    ]
+        ("sil", 0.0, 0.3), ("aa", 0.3, 0.5), ("sp", 0.5, 0.65), ("p", 0.65, 0.8), ("sil", 0.8, 1.05),
+        ("p", 1.05, 1.2), ("sil", 1.2, 1.5),
+    ]  # fmt: skip
 
 
 @pytest.mark.skipif(not installed_voices(), reason="no synthesiser is installed")

@@ -1,5 +1,3 @@
-"""Generated motion onto the face of another person: of a corpus, a video, another model."""
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""``pipeline.outputs.write``: one result, several files, all or none."""
-
 import json
 import shutil
 from dataclasses import replace

@@ -1,5 +1,3 @@
-"""Damaged model files."""
-
 import zipfile
 from collections.abc import Callable
 from typing import Any

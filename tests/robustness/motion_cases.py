@@ -1,5 +1,3 @@
-"""Motion files with bad units or bad values."""
-
 import io
 import json
 import os

@@ -1,5 +1,3 @@
-"""Bad values of options, and outputs that cannot be written."""
-
 import os
 from pathlib import Path
 
@@ -27,18 +25,9 @@ _option("--posteriors of a model without chains", 3, "'trajectory' has no chains
 _option("--posteriors as .jpg", 7, "unknown format '.jpg'; required: .png", "--posteriors", "a.jpg")
 case(GROUP, "cues --hold 1000000000", 0)(
     lambda bench: [
-        "cues",
-        bench.speech,
-        "--model",
-        bench.model,
-        "--recogniser",
-        "own",
-        "--hold",
-        "1000000000",
-        "-o",
-        "a.json",
+        "cues", bench.speech, "--model", bench.model, "--recogniser", "own", "--hold", "1000000000", "-o", "a.json",
     ]
-)
+)  # fmt: skip
 
 
 for _name, _options, _message in [

@@ -1,5 +1,3 @@
-"""Unusable and damaged recordings."""
-
 import os
 import struct
 from pathlib import Path

@@ -29,7 +29,6 @@ class OpenStudio(NamedTuple):
     application: Application
 
     def ask(self, path: str, content: Any = None, **headers: str) -> Reply:
-        """Return the reply to a request of the page."""
         sent = SENT | {name.replace("_", "-"): value for name, value in headers.items()}
         return ask(self.application, path, content, headers=sent)
 

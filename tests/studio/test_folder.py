@@ -96,21 +96,12 @@ def test_a_project_is_what_its_document_says():
 @pytest.mark.parametrize(
     "change",
     [
-        {"format": "other"},
-        {"version": 2},
-        {"lines": [LINE, LINE]},
-        {"lines": [LINE, LINE | {"number": 2}]},
-        {"lines": [LINE | {"name": "../a"}]},
-        {"lines": [LINE | {"mark": "perhaps"}]},
-        {"lines": [LINE | {"number": "1"}]},
-        {"lines": [LINE | {"sound": 3}]},
-        {"lines": [LINE | {"unknown": 3}]},
-        {"lines": 3},
-        {"model": 3},
-        {"characters": []},
-        {"more": 1},
+        {"format": "other"}, {"version": 2}, {"lines": [LINE, LINE]}, {"lines": [LINE, LINE | {"number": 2}]},
+        {"lines": [LINE | {"name": "../a"}]}, {"lines": [LINE | {"mark": "perhaps"}]},
+        {"lines": [LINE | {"number": "1"}]}, {"lines": [LINE | {"sound": 3}]}, {"lines": [LINE | {"unknown": 3}]},
+        {"lines": 3}, {"model": 3}, {"characters": []}, {"more": 1},
     ],
-)
+)  # fmt: skip
 def test_documents_that_are_refused(tmp_path, change):
     document = project_document(Project()) | {"lines": [LINE]}
     assert list(parse_project(document).lines) == [1]

@@ -384,14 +384,9 @@ def walk(model: Model, sentence: ToySentence, folder: Path, examples: int, steps
     """Let two clients make some steps, the same ones every time; return what they did and how often."""
     first, second = " ".join(sentence.words[:2]), sentence.words[1]
     members = {
-        "model": model,
-        "sounds": sounds_of(sentence, folder),
-        "words": (first, second),
-        "steps": 0,
-        "acknowledged": 0,
-        "late": 0,
-        "refused": 0,
-    }
+        "model": model, "sounds": sounds_of(sentence, folder), "words": (first, second), "steps": 0,
+        "acknowledged": 0, "late": 0, "refused": 0,
+    }  # fmt: skip
     machine = type("Walk", (TwoClients,), members)
     run_state_machine_as_test(
         machine,

@@ -127,14 +127,8 @@ def firefox(folder: Path, *switches: str) -> Iterator[Browser]:
     rows = (f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in PREFERENCES.items())
     (profile / "user.js").write_text("".join(rows), encoding="utf-8")
     command = [
-        PROGRAM,
-        "--headless",
-        "--marionette",
-        "--remote-allow-system-access",
-        "--no-remote",
-        "--profile",
-        profile,
-    ]
+        PROGRAM, "--headless", "--marionette", "--remote-allow-system-access", "--no-remote", "--profile", profile,
+    ]  # fmt: skip
     size = {"MOZ_HEADLESS_WIDTH": "1200", "MOZ_HEADLESS_HEIGHT": "1000"}
     with ExitStack() as stack:
         screen = stack.enter_context(

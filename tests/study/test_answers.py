@@ -1,5 +1,3 @@
-"""Tables of answers."""
-
 import csv
 
 import pytest
@@ -32,19 +30,11 @@ def test_no_name_is_a_formula_in_the_table(tmp_path, name):
 @pytest.mark.parametrize(
     ("kind", "value", "wanted"),
     [
-        ("paired", "first", True),
-        ("paired", "both", False),
-        ("mos", "5", True),
-        ("mos", "0", False),
-        ("mos", "6", False),
-        ("mos", "3.5", False),
-        ("mos", "٣", False),
-        ("ranking", "0", True),
-        ("ranking", "101", False),
-        ("ranking", "-1", False),
-        ("ranking", "", False),
+        ("paired", "first", True), ("paired", "both", False), ("mos", "5", True), ("mos", "0", False),
+        ("mos", "6", False), ("mos", "3.5", False), ("mos", "٣", False), ("ranking", "0", True),
+        ("ranking", "101", False), ("ranking", "-1", False), ("ranking", "", False),
     ],
-)
+)  # fmt: skip
 def test_possible_values(kind, value, wanted):
     assert is_possible(kind, value) == wanted
 

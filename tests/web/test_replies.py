@@ -1,5 +1,3 @@
-"""What servers reply to errors."""
-
 import asyncio
 import sqlite3
 

@@ -30,7 +30,6 @@ def require(holds: bool, text: str) -> None:
 
 @cache
 def short_speech(good: Good) -> Audio:
-    """Return 0.75 seconds of speech."""
     corpus = Corpus.open(good.corpus)
     audio = corpus.utterance(corpus.names()[0]).audio
     return Audio(audio.samples[SHORT].copy(), audio.rate_hz)
@@ -38,7 +37,6 @@ def short_speech(good: Good) -> Audio:
 
 @cache
 def good_model(good: Good) -> Model:
-    """Return the model of the default engine."""
     return load_model(good.models[0])
 
 

@@ -299,16 +299,9 @@ def test_lines_that_would_wait_or_lead_elsewhere_fail_and_the_others_go_on(toy_s
     (tmp_path / "to a pipe.wav").symlink_to(tmp_path / "pipe.wav")
     (tmp_path / "empty.wav").touch()
     sounds = {
-        "zero": "/dev/zero",
-        "pipe": "pipe.wav",
-        "link": "to a pipe.wav",
-        "folder": ".",
-        "empty": "empty.wav",
-        "nothing": "nothing.wav",
-        "linked/one": toy_speech,
-        "deep/inside/one": toy_speech,
-        "two": toy_speech,
-    }
+        "zero": "/dev/zero", "pipe": "pipe.wav", "link": "to a pipe.wav", "folder": ".", "empty": "empty.wav",
+        "nothing": "nothing.wav", "linked/one": toy_speech, "deep/inside/one": toy_speech, "two": toy_speech,
+    }  # fmt: skip
     table = tmp_path / "lines.csv"
     table.write_text("file,output\n" + "".join(f"{sound},{name}\n" for name, sound in sounds.items()))
     found = batch(table, out, settings, jobs=1)
@@ -380,7 +373,6 @@ def test_kills(toy_speech, settings, tmp_path, whom):
 
 
 def worker_of(process: int) -> int:
-    """Return a worker process of a batch."""
     listed = run_child(["ps", "-o", "pid=,args=", "--ppid", process], check=True)
     rows = [row.split(maxsplit=1) for row in listed.stdout.splitlines()]
     return next(int(pid) for pid, words in rows if "resource_tracker" not in words)
@@ -420,16 +412,9 @@ def test_a_worker_of_a_cluster_is_killed(cluster, toy_speech, settings, tmp_path
     sounds = many(tmp_path / "sounds", toy_speech, 60)
     batch(sounds, tmp_path / "whole", settings, jobs=1)
     how = [
-        sounds,
-        "--out",
-        tmp_path / "out",
-        "--model",
-        settings.request.model,
-        "--recogniser",
-        "own",
-        "--cluster",
+        sounds, "--out", tmp_path / "out", "--model", settings.request.model, "--recogniser", "own", "--cluster",
         address,
-    ]
+    ]  # fmt: skip
     with child(command(*how)) as process:
         items = 0
         for event in create_events(process):

@@ -26,7 +26,6 @@ RATE_HZ = 16_000
 
 
 def sound(path: Path, spoken_s: float, seed: int, level: float = 0.1) -> None:
-    """Write noise of a length between two pauses."""
     path.parent.mkdir(parents=True, exist_ok=True)
     noise = np.random.default_rng(seed).normal(0, level, round(spoken_s * RATE_HZ))
     quiet = np.random.default_rng(seed).normal(0, level / 1000, RATE_HZ // 2)
@@ -56,15 +55,10 @@ def test_every_kind_is_found(tmp_path):
     (tmp_path / "lines.csv").write_text(f"file,transcript\n{script}", encoding="utf-8")
     found = check(tmp_path / "lines.csv", jobs=1)
     assert [(each.kind, each.name) for each in found.findings] == [
-        ("too short", "sounds/short"),
-        ("too long", "sounds/long"),
-        ("unreadable", "sounds/broken"),
-        ("silent", "sounds/deep/silent"),
-        ("missing", "sounds/nowhere"),
-        ("language", "sounds/spanish"),
-        ("same sound", "sounds/again"),
-        ("orphaned", str(sounds / "deep" / "orphan.wav")),
-    ]
+        ("too short", "sounds/short"), ("too long", "sounds/long"), ("unreadable", "sounds/broken"),
+        ("silent", "sounds/deep/silent"), ("missing", "sounds/nowhere"), ("language", "sounds/spanish"),
+        ("same sound", "sounds/again"), ("orphaned", str(sounds / "deep" / "orphan.wav")),
+    ]  # fmt: skip
     assert found.findings[5].text == "the words are in es, required en"
     assert found.text.startswith("8 lines: 1 too short, 1 too long, ")
     assert found.table.splitlines()[-1] == f"orphaned\t{sounds / 'deep' / 'orphan.wav'}\tno line has this recording"

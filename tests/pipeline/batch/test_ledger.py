@@ -35,14 +35,9 @@ DIGEST = hashlib.sha256(CONTENT).hexdigest()
 def record_of(line: BatchLine, run: str = "old") -> Record:
     inputs = [vars(each) for each in input_files(line)]
     return {
-        "name": line.name,
-        "recording": line.recording,
-        "run": run,
-        "fingerprint": fingerprint_line(line, "settings"),
-        "outcome": DONE,
-        "inputs": inputs,
-        "outputs": {f"{line.name}.json": DIGEST},
-    }
+        "name": line.name, "recording": line.recording, "run": run, "fingerprint": fingerprint_line(line, "settings"),
+        "outcome": DONE, "inputs": inputs, "outputs": {f"{line.name}.json": DIGEST},
+    }  # fmt: skip
 
 
 @pytest.fixture

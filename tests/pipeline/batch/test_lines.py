@@ -1,5 +1,3 @@
-"""Lists and folders of recordings, and the names of their outputs."""
-
 import logging
 import os
 from pathlib import Path

@@ -20,13 +20,8 @@ pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is 
 SCREENS = ((1200, 800, "light"), (1200, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
 LINES = 10_000
 FOUND = {
-    "outcome": "done",
-    "words": "transcript",
-    "confidence": 0.95,
-    "range_db": 41.5,
-    "duration_s": 0.5,
-    "seconds": 0.1,
-}
+    "outcome": "done", "words": "transcript", "confidence": 0.95, "range_db": 41.5, "duration_s": 0.5, "seconds": 0.1,
+}  # fmt: skip
 FOUND |= {"run": "1", "fingerprint": "f", "inputs": [], "closures_heard": 2, "closures_made": 2, "widest": 0.21}
 LIMIT_S = 60.0
 
@@ -61,7 +56,6 @@ def report(folder: Path, speech: Path, count: int, *, film: bool) -> Path:
 
 
 def look(window: Browser, name: str) -> None:
-    """Check the page on every screen."""
     for width, height, scheme in SCREENS:
         window.show_as(width, height, scheme, mobile=width < 600)
         check_screen(window, name, width, scheme)

@@ -1,5 +1,3 @@
-"""What a corpus has of the sounds of a text."""
-
 import json
 from collections import Counter
 from dataclasses import replace

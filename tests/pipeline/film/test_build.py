@@ -1,5 +1,3 @@
-"""A face built from videos of the drawn person, tracked without errors."""
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,7 +23,6 @@ Event = Progress | Item
 
 @pytest.fixture(scope="module")
 def videos(tmp_path_factory: pytest.TempPathFactory) -> Videos:
-    """About eight seconds."""
     folder = tmp_path_factory.mktemp("filmed") / "anna"
     folder.mkdir()
     found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]

@@ -45,7 +45,6 @@ def dark(frames: list[np.ndarray]) -> np.ndarray:
 
 
 def pictures(path: Path) -> tuple[list[np.ndarray], Any, dict[str, str]]:
-    """Return the frames of a video, its frame rate, and its tags."""
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]

@@ -1,5 +1,3 @@
-"""Which recordings a face is learned from."""
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 
 from lipmotion_studio.study.analysis.paired import deviations, fit_strengths, link_groups
 
@@ -66,18 +65,6 @@ def test_errors_are_those_of_a_statistics_package():
     errors = np.sqrt(np.diag(contrast @ model.covariance @ contrast.T))
     expected = [0.347366, 0.344552, 0.340322, 0.340404, 0.337842, 0.335002, 0.130944]
     assert errors == pytest.approx(np.array(expected), abs=2e-6)
-
-
-def log_likelihood(values: np.ndarray) -> float:
-    odds = values[:-1, None] - values[:-1] + values[-1]
-    return float((HOME * -np.log1p(np.exp(-odds)) + AWAY * -np.log1p(np.exp(odds))).sum())
-
-
-def test_strengths_are_those_of_a_general_optimiser():
-    model = fit_strengths(HOME, AWAY)
-    best = minimize(lambda values: -log_likelihood(values), np.zeros(8), method="BFGS", options={"gtol": 1e-7})
-    assert model.strengths == pytest.approx(best.x[:-1] - best.x[:-1].mean(), abs=1e-5)
-    assert model.order == pytest.approx(best.x[-1], abs=1e-5)
 
 
 def test_deviations_of_the_answers_sum_to_nothing():
