@@ -18,14 +18,7 @@ from study.small_study import scripted_answer, small_study
 
 starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
 
-from lipmotion_studio.study.application import (  # noqa: E402
-    ANSWER_BURST,
-    JOIN_BURST,
-    PAGE,
-    RateLimit,
-    check_sheet,
-    study_application,
-)
+from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, PAGE, RateLimit, check_sheet, study_application  # noqa: E402
 from lipmotion_studio.web.replies import HEADERS  # noqa: E402
 
 SENT = {"trial": 4, "values": ["second"], "plays": [1, 2], "seconds": 1.25}
