@@ -1,5 +1,3 @@
-"""What the add-on for Blender does without Blender: files, names, frames."""
-
 import numpy as np
 import pytest
 

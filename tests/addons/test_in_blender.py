@@ -1,5 +1,3 @@
-"""The add-on and the script in Blender itself: what is evaluated at frames is the motion."""
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,3 @@
-"""What the add-on does with a scene, with a stand-in for Blender's."""
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,5 +1,3 @@
-"""Characters on the command line: looked into, animated, and driven elsewhere."""
-
 import json
 from dataclasses import replace
 from pathlib import Path

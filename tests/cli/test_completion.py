@@ -1,5 +1,3 @@
-"""``completion``: what the scripts offer, asked of the shells themselves where they are installed."""
-
 import shutil
 import sys
 

@@ -1,5 +1,3 @@
-"""``edit`` writes down what is changed; ``animate``, ``render`` and ``cues`` say it again."""
-
 import json
 import shutil
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""``lipmotion face``, and ``animate`` and ``speak`` with a filmed face."""
-
 import json
 from pathlib import Path
 from typing import Any

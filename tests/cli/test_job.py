@@ -1,5 +1,3 @@
-"""``--job``: the command line makes the same job as Python, and is ahead of a file."""
-
 import argparse
 import ast
 import re

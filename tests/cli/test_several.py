@@ -1,5 +1,3 @@
-"""``animate`` of several recordings, through pipes, and with the controls of every output."""
-
 import io
 import json
 import os

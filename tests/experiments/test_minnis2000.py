@@ -1,5 +1,3 @@
-"""The system of Minnis & Breen 2000 beside its variants."""
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

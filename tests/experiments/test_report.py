@@ -1,5 +1,3 @@
-"""The report as a whole: what is run, what is kept, what is written; the experiments are stand-ins, but for one."""
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,5 +1,3 @@
-"""A picture in a corner of a video."""
-
 import numpy as np
 import pytest
 

@@ -79,7 +79,6 @@ def fuzz(options: argparse.Namespace, good: Good) -> int:
 
 
 def replay(options: argparse.Namespace, good: Good) -> int:
-    """Read one input again."""
     name = options.reader[0] if options.reader else options.replay.parent.name
     with Worker(good) as worker:
         result = worker.read_input(name, picked_up(options.replay))

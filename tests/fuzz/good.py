@@ -29,5 +29,4 @@ def make_good(folder: Path) -> Good:
 
 
 def good_in(folder: Path) -> Good:
-    """Return the good corpus and models that ``make_good`` wrote to a folder."""
     return Good(folder / "corpus", tuple(folder / f"{name}.lipmotion" for name in ENGINES))

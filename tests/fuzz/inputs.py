@@ -39,7 +39,6 @@ class Reader:
 
 
 def digest(files: Files) -> bytes:
-    """Return a digest that identifies an input."""
     found = sha256()
     for name, content in sorted(files.items()):
         found.update(f"{len(name)} {name} {len(content)} ".encode("utf-8", "surrogatepass") + content)

@@ -20,7 +20,6 @@ Animate = Callable[..., Generation]
 
 @pytest.fixture(scope="module")
 def move(toy_model: Model, toy_sentence: ToySentence) -> Animate:
-    """Animates the toy sentence with the toy model."""
     return lambda *, constraints=None, **known: animate(
         Request(toy_sentence.audio, **known), model=toy_model, constraints=constraints
     )

@@ -1,5 +1,3 @@
-"""Contact of the lips: the same in all faces, characters and curve sets, at all rates, for all kinds of motion."""
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""A text said by the recordings of a corpus, and the motion that belongs to them."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +15,6 @@ SETTINGS = {"joint_recogniser": False, "articulation": False, "conditions": 0}
 
 @pytest.fixture(scope="module")
 def selection_model(toy_corpus: Corpus) -> Model:
-    """A model of the recordings of the toy corpus."""
     engine = engine_named("selection", SETTINGS)
     small = HmmConfig(mixtures=1, iterations=3)
     return train(toy_corpus, selection=Selection(None), engine=engine, recogniser=small)[0]

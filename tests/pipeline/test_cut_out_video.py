@@ -1,5 +1,3 @@
-"""Pictures of a folder of drawings: every one is that of the cue of its time."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""A job is the same value from Python and from a file; what it cannot be is refused in one sentence."""
-
 import re
 import sys
 from dataclasses import replace

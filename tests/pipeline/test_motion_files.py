@@ -1,5 +1,3 @@
-"""What formats hold: the channels that were asked for, or curves of their own."""
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,3 @@
-"""The whole path on real recordings: a part of GRID speaker s1, from video files to figures."""
-
 from pathlib import Path
 
 import pytest

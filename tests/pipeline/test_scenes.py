@@ -1,5 +1,3 @@
-"""Characters with their animation: what is written, and what other programs read of it."""
-
 from dataclasses import replace
 from functools import partial
 

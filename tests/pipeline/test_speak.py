@@ -1,5 +1,3 @@
-"""Text to sound and motion, with a stand-in for the synthesiser and with real ones where they are installed."""
-
 from itertools import pairwise
 
 import numpy as np

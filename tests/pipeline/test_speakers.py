@@ -1,5 +1,3 @@
-"""Several people in one model, from the corpus to the motion of one of them."""
-
 import logging
 from collections.abc import Iterator
 from dataclasses import replace

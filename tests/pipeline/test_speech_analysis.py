@@ -1,5 +1,3 @@
-"""Who says which phones were spoken, where nobody wrote them down."""
-
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any, ClassVar

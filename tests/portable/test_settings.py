@@ -1,5 +1,3 @@
-"""Kernels that this processor cannot run are left out."""
-
 import numpy as np
 
 from portable import settings

@@ -22,8 +22,6 @@ PATIENCE_S = 120.0
 
 
 class OpenStudio(NamedTuple):
-    """A studio, and the application that shows it."""
-
     folder: ProjectFolder
     studio: Studio
     application: Application
@@ -33,8 +31,6 @@ class OpenStudio(NamedTuple):
         return ask(self.application, path, content, headers=sent)
 
     def ask_together(self, *requests: tuple[str, Any]) -> list[Reply]:
-        """Return the replies to requests that are sent at the same time."""
-
         async def replies() -> list[Reply]:
             sent = (answered(self.application, path, content, headers=SENT) for path, content in requests)
             return list(await asyncio.gather(*sent))
@@ -42,7 +38,6 @@ class OpenStudio(NamedTuple):
         return asyncio.run(replies())
 
     def ready(self, number: int = 1) -> dict[str, Any]:
-        """Return the state of a line once it is understood."""
         ends_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < ends_s:
             state = self.ask(f"/api/lines/{number}").content
@@ -52,7 +47,6 @@ class OpenStudio(NamedTuple):
         raise AssertionError(f"line {number} is not ready after {PATIENCE_S} s")
 
     def row(self, number: int = 1) -> dict[str, Any]:
-        """Return what the list says of a line."""
         return self.studio.row(self.folder.recording(number))
 
     def change(self, what: str, number: int = 1, **content: Any) -> Reply:

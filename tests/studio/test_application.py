@@ -1,5 +1,3 @@
-"""The studio's application: a line from its sound to an export, and whoever asks for something else."""
-
 import io
 import json
 import shutil

@@ -1,5 +1,3 @@
-"""Folders of projects: what is added, dropped and changed is there again; one process at a time."""
-
 import json
 import sys
 from dataclasses import replace

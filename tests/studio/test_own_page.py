@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from children import wait_until
-from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
+from study.browser import BROWSER, DRIVER, MISSING, browser, check_screens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
@@ -47,10 +47,7 @@ def test_a_voice_is_trained_and_used_from_the_page(tmp_path):
         wait_until(lambda: "uses this voice" in window.text("#own-job"), LIMIT_S)
         wait_until(lambda: page.of(motion) not in (None, before), LIMIT_S)
         page.ready()
-        for width, height, scheme in SCREENS:
-            window.show_as(width, height, scheme, mobile=width < 600)
-            check_screen(window, "own", width, scheme)
-        window.show_as(1200, 900)
+        check_screens(window, "own", SCREENS)
         window.run("const used = document.getElementById('own-choice'); used.value = ''; used.onchange()")
         wait_until(lambda: "Use this voice" in window.text("#own-job"), LIMIT_S)
         wait_until(lambda: page.of(motion) == before, LIMIT_S)

@@ -19,7 +19,21 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion_faces.video.mp4 import write_mp4
 from studio.late_sound import shifted
-from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
+from study.browser import (
+    CONTROL,
+    DELETE,
+    ENTER,
+    ESCAPE,
+    RIGHT,
+    SHIFT,
+    SPACE,
+    TAB,
+    UP,
+    WINDOW_S,
+    Browser,
+    check_screen,
+    check_screens,
+)
 from study.firefox import BOTH, Opens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
@@ -85,20 +99,16 @@ class Page:
     project: Path
 
     def of(self, expression: str) -> Any:
-        """Return what an expression of the page gives."""
         return self.window.run(f"return {expression}")
 
     def ready(self) -> None:
-        """Wait until the line is shown, and every edit is on the disk."""
         wait_until(lambda: self.window.run(READY), LIMIT_S)
 
     @property
     def steps(self) -> list[str]:
-        """The edits, as the page shows them."""
         return list(self.of("studio.store.recording.steps"))
 
     def reload(self) -> None:
-        """Load the page anew, and wait until its line is shown."""
         self.window.run("document.documentElement.dataset.old = 'yes'; location.reload()")
         wait_until(lambda: self.of("document.documentElement?.dataset.old === undefined"), LIMIT_S)
         self.ready()
@@ -362,12 +372,7 @@ def test_versions_are_kept_compared_and_gone_back_to(page):
     window.run("studio.player.seek(1.2)")
     window.click("#compare-over")
     wait_until(lambda: page.of(GHOST_PIXELS) > 1000, LIMIT_S)
-    for width, height, scheme in SCREENS:
-        window.show_as(width, height, scheme, mobile=width < 600)
-        window.run("studio.showPlace('panel')")
-        window.run_until_done("setTimeout(arguments[0], 100)")
-        check_screen(window, "versions", width, scheme)
-    window.show_as(1200, 900)
+    check_screens(window, "versions", SCREENS, "studio.showPlace('panel')")
     window.click("#version-1-back")
     page.wait_for_steps(1)
     assert page.steps == ["phone 9 is aa"]

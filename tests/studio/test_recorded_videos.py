@@ -1,5 +1,3 @@
-"""Real videos beside faces: when in them the sound of a line begins, and which are played as they are."""
-
 from pathlib import Path
 
 import numpy as np

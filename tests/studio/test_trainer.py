@@ -1,5 +1,3 @@
-"""Voices that are trained from the page: of toy recordings, in a process of its own, measured, used and taken back."""
-
 import json
 import os
 import signal
@@ -44,7 +42,6 @@ def job(studio: OpenStudio) -> dict[str, Any]:
 
 
 def ended(studio: OpenStudio) -> dict[str, Any]:
-    """Return how what is made has ended, once it has."""
     wait_until(lambda: job(studio)["state"] != "working" and studio.studio.trainer._thread is None)
     return job(studio)
 

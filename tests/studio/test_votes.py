@@ -1,5 +1,3 @@
-"""Votes of blind comparisons: what is compared is told by digests, and old files are read."""
-
 import json
 
 import pytest

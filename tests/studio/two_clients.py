@@ -109,7 +109,6 @@ class TwoClients(RuleBasedStateMachine):
         return reply
 
     def ready(self, line: Shadow) -> dict[str, Any]:
-        """Return the state of a line; it is that of its shadow."""
         state = self.studio.ready(line.number)
         assert (state["name"], state["mark"], state["transcript"] or line.words) == (line.name, line.mark, line.words)
         if line.damage:

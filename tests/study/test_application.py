@@ -1,5 +1,3 @@
-"""The application: a rater from the first page to the last, and whoever asks for something else."""
-
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path

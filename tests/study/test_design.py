@@ -1,5 +1,3 @@
-"""Studies from conditions and sentences: which videos are made, of what, and how they are named."""
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""The folder of a study: what is written is read again, and what was changed is noticed."""
-
 import json
 from collections.abc import Callable
 from typing import Any

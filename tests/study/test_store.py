@@ -1,5 +1,3 @@
-"""The database: an answer is stored once, the first one stands, and what is forgotten is gone."""
-
 import sqlite3
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor

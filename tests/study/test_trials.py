@@ -1,5 +1,3 @@
-"""Which trials a study has, and in which order raters see them."""
-
 from collections import Counter
 from itertools import permutations
 

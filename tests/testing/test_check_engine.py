@@ -1,5 +1,3 @@
-"""The checks of the engine contract: each of them fails for an engine that breaks what it checks."""
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar

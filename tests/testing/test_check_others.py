@@ -1,5 +1,3 @@
-"""The checks of faces and motion formats: each fails for something that breaks it."""
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""The formant synthesiser: exact times, quiet silence, and phones that sound like themselves."""
-
 from itertools import pairwise
 
 import numpy as np

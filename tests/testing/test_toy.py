@@ -1,5 +1,3 @@
-"""The toy corpus: known words, known times, known motion; and videos that can be tracked."""
-
 from itertools import pairwise
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""The toy face: what is drawn is where it should be, in pictures of any scale and in frames."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""Clients that let a server wait: they are closed, and the others are served."""
-
 import socket
 import time
 from collections.abc import Callable, Iterator

@@ -12,46 +12,20 @@ _NAME = r"[\w:-]+(?==)"
 _VALUE = r'(?<==")[^"]*'
 PROLOGUES = (
     *('<?xml version="1.0" encoding="UTF-7"?>', '<?xml version="1.0" encoding="UTF-16"?>', "<?xml version='9'?>"),
-    *(
-        '<?xml version="1.0" encoding="cp037"?>',
-        '<?xml version="1.0" encoding="iso-8859-1"?>',
-        "\ufeff",
-        "\ufeff\ufeff",
-    ),
+    *('<?xml version="1.0" encoding="cp037"?>', '<?xml version="1.0" encoding="iso-8859-1"?>', "\ufeff", "\ufeff" * 2),
     *("<!DOCTYPE svg>", '<!DOCTYPE svg SYSTEM "file:///etc/passwd">', '<!DOCTYPE svg [<!ENTITY a "b">]>', "<!DOCTYPE"),
     *('<!DOCTYPE svg [<!ENTITY % p SYSTEM "p">%p;]>', '<!DOCTYPE svg [<!ATTLIST rect fill CDATA "red">]>', "<!--"),
     *('<?xml-stylesheet href="http://h/s.css"?>', "<![CDATA[", "]]>", "\x00", "<!ENTITY a 'b'>", "<?a?>"),
 )
 ELEMENTS = (
-    *(
-        '<use href="#a"/>',
-        '<image href="data:image/png;base64,AAAA"/>',
-        "<style>*{fill:url(a)}</style>",
-        "<g/>",
-        "<title>",
-    ),
+    *('<use href="#a"/>', '<image href="data:image/png;base64,AAAA"/>', "<style>*{fill:url(a)}</style>"),
+    *("<g/>", "<title>"),
     *("<script>x</script>", "<text>a</text>", "<!-- -- -->", "&a;", "&#0;", "&#x10ffff;", "&#xd800;", "&lt;", "]]>"),
     *('<g id="mouth-x"><rect width="1" height="1"/></g>', '<rect width="-1" height="1e6"/>', "<defs><g/></defs>"),
     *('<svg viewBox="0 0 1 1"/>', '<path d="M0 0A1 1 0 011 1z"/>', '<circle r="1e6"/>', "<metadata>", "</g>", "</svg>"),
 )
 VALUES = (
-    *(
-        "",
-        "nan",
-        "inf",
-        "1e999",
-        "1e6",
-        "-1e6",
-        "1e-400",
-        "1_0",
-        "٣",
-        "50%",
-        "1px",
-        "1em",
-        "url(#a)",
-        "inherit",
-        "none",
-    ),
+    *("", "nan", "inf", "1e999", "1e6", "-1e6", "1e-400", "1_0", "٣", "50%", "1px", "1em", "url(#a)", "inherit", "none"),
     *("#fff", "#ffff", "rgb(999,-1,0)", "hsl(1e9,1%,1%)", "currentColor", "red !important", "var(--a)", "0 0 0 0"),
     *("scale(0)", "scale(1e6)", "matrix(1 2 3 4 5)", "rotate(1 2)", "skewX(90)", "translate()", "scale(1))", "a(1)"),
     *(

@@ -28,7 +28,6 @@ def members_of(content: bytes) -> list[Member]:
 
 
 def zipped(members: list[Member], method: int) -> bytes:
-    """Return the content of a zip file."""
     stream = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(stream, "w", method) as file:
         warnings.simplefilter("ignore")  # names that come twice

@@ -1,5 +1,3 @@
-"""The fuzzed readers by name."""
-
 from fuzz.inputs import Reader
 from fuzz.readers import (
     audio,

@@ -23,7 +23,6 @@ SHORT = slice(6000, 18_000)
 
 
 def require(holds: bool, text: str) -> None:
-    """Raise ImplausibleError unless a condition holds."""
     if not holds:
         raise ImplausibleError(text)
 

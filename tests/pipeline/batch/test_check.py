@@ -1,5 +1,3 @@
-"""The check of recordings against their script: every kind of finding, and none where there is nothing."""
-
 import shutil
 from pathlib import Path
 

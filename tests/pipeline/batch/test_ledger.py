@@ -1,5 +1,3 @@
-"""The ledger: what is known of lines after a kill at any moment."""
-
 import hashlib
 import json
 import os

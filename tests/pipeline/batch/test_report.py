@@ -1,5 +1,3 @@
-"""The report: doubtful lines first, nothing that a name says gets out of its field."""
-
 import csv
 import json
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""The report in a real browser: it plays, keys mark lines, marks are saved, thousands of lines stay quick."""
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +12,7 @@ from lipmotion.pipeline.batch.marks import Mark, read_marks
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
-from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, browser, check_screen
+from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, browser, check_screens
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
 SCREENS = ((1200, 800, "light"), (1200, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
@@ -55,13 +53,6 @@ def report(folder: Path, speech: Path, count: int, *, film: bool) -> Path:
         return write_reports(lines, ledger, out, {"act/line00001": Mark("approve", "before")})[1]
 
 
-def look(window: Browser, name: str) -> None:
-    for width, height, scheme in SCREENS:
-        window.show_as(width, height, scheme, mobile=width < 600)
-        check_screen(window, name, width, scheme)
-    window.show_as(*SCREENS[0])
-
-
 def chosen(window: Browser) -> str:
     return window.text("#name").partition(",")[0]
 
@@ -81,7 +72,7 @@ def test_ten_thousand_lines_are_heard_and_marked(window, toy_speech, tmp_path):
     window.press("a", "j", "a", "j", "r", "j", "j", "k")
     assert chosen(window) == "act/line00003"
     assert "1 approved, 1 to redo" in window.text("#count")
-    look(window, "lines")
+    check_screens(window, "lines", SCREENS)
     window.run("view.scrollTop = body.offsetHeight")
     until(window, "[...list.children].some(row => row.textContent.includes('line09999'))")
     window.open(page.as_uri())  # what is not saved is kept in the browser
@@ -105,5 +96,5 @@ def test_videos_of_lines_are_seen(window, toy_speech, tmp_path):
     assert chosen(window) == "act/line00004"
     window.run("document.getElementById('filter').value = ''; choose()")
     until(window, "[...list.querySelectorAll('video')].every(each => each.readyState >= 2)")
-    look(window, "videos")
+    check_screens(window, "videos", SCREENS)
     assert window.problems() == []

@@ -1,5 +1,3 @@
-"""One long video becomes a corpus; face tracking is replaced, but for the real recordings at the end."""
-
 import shutil
 from fractions import Fraction
 from pathlib import Path

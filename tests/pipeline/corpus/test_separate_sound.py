@@ -1,5 +1,3 @@
-"""Sound from a recorder of its own becomes the sound of the corpus, in step with the motion."""
-
 from dataclasses import replace
 from pathlib import Path
 

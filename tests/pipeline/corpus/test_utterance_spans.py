@@ -1,5 +1,3 @@
-"""Dividing long recordings: every stretch comes once, no word is cut, nothing crosses a cut."""
-
 from itertools import pairwise
 
 import numpy as np

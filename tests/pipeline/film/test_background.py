@@ -1,5 +1,3 @@
-"""Backgrounds: any length of some footage, and where the face is in it."""
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,5 +1,3 @@
-"""Footage in which the face is not seen all the time: what is shown of it, and what is kept."""
-
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise

@@ -1,5 +1,3 @@
-"""Films: any motion of the person, at any rate, of any length, in any background."""
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -116,12 +114,19 @@ def test_the_refinement_as_printed(filmed_face, brief):
 
 @pytest.mark.long
 def test_sound_and_pictures_are_as_long(filmed_face, motion, toy_sentence, tmp_path):
-    write_film(tmp_path / "a.mp4", make_film(filmed_face, motion), toy_sentence.audio)
+    events: list[Progress | Item] = []
+    film = make_film(filmed_face, motion)
+    write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
     frames, rate, _ = pictures(tmp_path / "a.mp4")
     assert rate == 25
     assert len(frames) / 25 == pytest.approx(toy_sentence.audio.duration_s, abs=0.08)
     drawn = list(make_film(filmed_face, motion).frames)
     assert np.abs(np.stack(frames).astype(int) - np.stack(drawn)).mean() < 2
+    shares = [event.share for event in events if isinstance(event, Progress)]
+    assert len(shares) == len(events) > 2
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert {event.steps for event in events} == {film.count} == {len(frames)}
 
 
 def test_the_mark(filmed_face, brief, tmp_path):
@@ -161,19 +166,6 @@ def test_overlays_need_the_video(filmed_face, motion, toy_speech, tmp_path):
             make_film(filmed_face, motion, speech=toy_speech, options=both)
         with pytest.raises(InputError, match="has no pictures, and an overlay shows them; give a video as speech"):
             make_film(filmed_face, motion, speech=toy_speech, options=Outputs(overlay=overlay))
-
-
-@pytest.mark.long
-def test_progress_is_that_of_the_frames(filmed_face, motion, toy_sentence, tmp_path):
-    events: list[Progress | Item] = []
-    film = make_film(filmed_face, motion)
-    write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
-    shares = [event.share for event in events if isinstance(event, Progress)]
-    assert len(shares) == len(events) > 2
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1.0)
-    assert {event.steps for event in events if isinstance(event, Progress)} == {film.count}
-    assert len(pictures(tmp_path / "a.mp4")[0]) == film.count
 
 
 def test_options_of_filmed_faces_alone(tmp_path, toy_speech):

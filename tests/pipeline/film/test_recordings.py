@@ -1,5 +1,3 @@
-"""A face from real recordings: what it says is what was said, to a tracker too."""
-
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +28,6 @@ def clips(recordings: Path) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def some_clips(clips: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Eighteen seconds of one person."""
     folder = tmp_path_factory.mktemp("filmed") / "someone"
     folder.mkdir()
     for clip in clips[:CLIPS]:
@@ -84,10 +81,3 @@ def test_from_sound_to_video(built, clips, here, run):
     assert (done.code, done.out) == (0, ["a.mp4"]), done
     generated = animate(Request(clips[CLIPS], onto=load_face(built))).motion
     assert likeness(opening_in(here / "a.mp4"), np.asarray(generated.resampled(25.0)["opening"])) > 0.8
-
-
-@pytest.mark.parametrize("overlay", ["mouth"])
-def test_an_aid_to_lip_reading(built, clips, here, run, overlay):
-    done = run("animate", clips[CLIPS], "--face", built, "--overlay", overlay, "-o", "a.mp4")
-    assert (done.code, done.out) == (0, ["a.mp4"]), done
-    assert opening_in(here / "a.mp4").shape[0] == pytest.approx(75, abs=1)

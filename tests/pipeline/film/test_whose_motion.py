@@ -1,5 +1,3 @@
-"""Whose motion a model generates, and whose face it is shown on."""
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

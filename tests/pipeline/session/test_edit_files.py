@@ -1,5 +1,3 @@
-"""Edits as sentences, and in files: what is written is read again; what is wrong is named."""
-
 import sys
 from dataclasses import replace
 

@@ -1,5 +1,3 @@
-"""Edits of long recordings: the motion around an edit at once, and the whole when it is asked for."""
-
 from dataclasses import replace
 
 import numpy as np

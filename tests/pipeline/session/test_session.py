@@ -1,5 +1,3 @@
-"""Sessions: the same motion as in one pass, only what changed computed again, edits that hold, threads."""
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from threading import Barrier

@@ -1,5 +1,3 @@
-"""Eigenlips from mouth pictures to figures: learned, trained on, kept in the model, generated, compared."""
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""Many speakers: what they say, what recordings say, and who is kept aside."""
-
 import shutil
 from collections.abc import Iterator
 from itertools import pairwise

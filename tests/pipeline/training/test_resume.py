@@ -1,5 +1,3 @@
-"""A training that is stopped, wherever it is, goes on from there to the same bytes."""
-
 import multiprocessing
 import shutil
 from collections.abc import Callable, Iterator

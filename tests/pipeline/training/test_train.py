@@ -98,17 +98,6 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus, tmp_path):
 
 
 @pytest.mark.long
-def test_one_speaker(toy_corpus, tmp_path):
-    names = ("anna", "ben", "ben", "anna", "anna")
-    corpus = corpus_of([replace(u, speaker=n) for u, n in zip(some(toy_corpus), names, strict=True)], tmp_path)
-    model, report = train(corpus, selection=Selection(speakers=["anna"]), recogniser=SMALL, engine=JOINT)
-    assert report.used == ("toy00", "toy03", "toy04")
-    assert model.about["speakers"] == ["anna"]
-    with pytest.raises(CorpusError, match="no speaker 'carl'"):
-        train(corpus, selection=Selection(speakers=["carl"]))
-
-
-@pytest.mark.long
 def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_path):
     utterances = some(toy_corpus)
     utterances[1] = replace(utterances[1], words=("five",) * 100)

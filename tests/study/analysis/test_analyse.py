@@ -1,5 +1,3 @@
-"""The whole analysis: with and without screening, its tables, and what it refuses."""
-
 import re
 from dataclasses import replace
 

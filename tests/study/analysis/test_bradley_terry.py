@@ -1,5 +1,3 @@
-"""The Bradley–Terry model beside published estimates, and where there are none."""
-
 import numpy as np
 import pytest
 

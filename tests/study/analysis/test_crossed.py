@@ -1,5 +1,3 @@
-"""Means over raters and sentences: their intervals, and what they do where these cannot be known."""
-
 import numpy as np
 import pytest
 from scipy import stats

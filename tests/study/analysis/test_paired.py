@@ -1,5 +1,3 @@
-"""Preferences: their tests, both orders, and what simulated raters are known to prefer."""
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,5 +1,3 @@
-"""How many raters it takes, beside simulated studies of that size."""
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -11,7 +9,6 @@ USUAL = Components(0.16, 0.04, 1.0)
 
 
 def told(components: Components, difference: float, raters: int, sentences: int, studies: int) -> float:
-    """Return in what share of simulated studies a difference is told."""
     draw, found = np.random.default_rng(7), 0
     rater, sentence, rest = np.sqrt(components)
     for _ in range(studies):

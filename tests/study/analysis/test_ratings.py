@@ -1,5 +1,3 @@
-"""Opinion scores and rankings: means, differences, improvement as the paper prints it."""
-
 import numpy as np
 import pytest
 from scipy import stats

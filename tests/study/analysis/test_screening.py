@@ -1,5 +1,3 @@
-"""Who is left out: each rule catches whom it is for, and spares who merely finds conditions alike."""
-
 import re
 from collections.abc import Callable
 from dataclasses import replace
