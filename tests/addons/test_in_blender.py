@@ -9,21 +9,15 @@ from lipmotion import write
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.formats.blender import write_addon
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.types import Audio, Generation, StateTrace
-from meshes.speech import motion, units
+from lipmotion.types import Audio, Generation
+from pipeline.conftest import generation
 from programs import python_with, run_with
 
+__all__ = ["generation"]
 pytestmark = [pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)"), pytest.mark.long]
 ROUNDED = 5e-5
 """The frames that show a closure are chosen among values of five decimals, or of six."""
 RIG = "jaw.master.rotation.x,jawOpen,25\njaw.master[open],opening,1\n[lips],opening,2\n"
-
-
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +38,14 @@ def names(wanted: dict[str, list[float]], tmp_path_factory: pytest.TempPathFacto
 @pytest.fixture(scope="module")
 def sound() -> Audio:
     return Audio(np.zeros(2 * 48_000, np.float32), 48_000)
+
+
+def of_mouth(found: dict[str, Any], wanted: dict[str, list[float]], names: Path) -> float:
+    """Return the largest difference of the mouth in all frames."""
+    listed = json.loads(names.read_text())
+    mouth = [name for name in listed if name.startswith(("jaw", "mouth"))]
+    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
+    return float(np.abs(values - np.array([wanted[name] for name in mouth]).T).max())
 
 
 def compare(found: dict[str, Any], wanted: dict[str, list[float]], names: Path, least: float) -> None:
@@ -76,23 +78,13 @@ def test_the_addon_keys_from_a_take_of_live_link_face(generation, wanted, names,
     write(generation, [tmp_path / "a.livelink.csv", tmp_path / "a.wav"], speech=sound, rate_hz=100.0)
     files = (tmp_path / "addon.zip", tmp_path / "a.livelink.csv", tmp_path / "a.wav", names)
     found = run_with("bpy", "blender_keys.py", "legacy", *files, folder=tmp_path / "user")
-    mouth = [name for name in json.loads(names.read_text()) if name.startswith(("jaw", "mouth"))]
-    listed = json.loads(names.read_text())
-    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
-    assert (
-        np.abs(values - np.array([wanted[name] for name in mouth]).T).max() < 5e-5
-    )  # frames that show a closure are chosen among rounded values
+    assert of_mouth(found, wanted, names) < ROUNDED
 
 
 def test_the_script_keys_a_face(generation, names, sound, wanted, tmp_path):
     write(generation, [tmp_path / "a.blender.py", tmp_path / "a.wav"], speech=sound)
     found = run_with("bpy", "blender_keys.py", "script", tmp_path / "a.blender.py", names)
-    listed = json.loads(names.read_text())
-    mouth = [name for name in listed if name.startswith(("jaw", "mouth"))]
-    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
-    assert (
-        np.abs(values - np.array([wanted[name] for name in mouth]).T).max() < 5e-5
-    )  # frames that show a closure are chosen among rounded values
+    assert of_mouth(found, wanted, names) < ROUNDED
     assert found["strips"] == ["lipmotion sound"] * found["plays_sound"]
 
 

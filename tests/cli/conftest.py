@@ -60,6 +60,11 @@ def run_outside() -> RunCommand:
     return run
 
 
+@pytest.fixture
+def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
+    return ("animate", toy_speech, "--model", toy_model_file)
+
+
 @pytest.fixture(scope="session")
 def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model file of a later version."""

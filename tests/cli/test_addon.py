@@ -1,14 +1,8 @@
 import zipfile
-from pathlib import Path
 
 import pytest
 
 from cli.conftest import is_one_error
-
-
-@pytest.fixture
-def basics(toy_model_file: Path, toy_speech: Path) -> tuple[object, ...]:
-    return ("animate", toy_speech, "--model", toy_model_file)
 
 
 def test_the_addon_is_written_or_one_line_says_why_not(run, here):

@@ -8,11 +8,6 @@ from cli.conftest import check_refused, is_one_error
 from lipmotion import animate, load_model, read_motion, write
 
 
-@pytest.fixture
-def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
-    return ("animate", toy_speech, "--model", toy_model_file)
-
-
 def test_motion_files(run, basics, here):
     done = run(*basics, "-o", "a.json", "a.csv", "-o", "a.npz", "--rate", "50")
     assert done == (0, ["a.json", "a.csv", "a.npz"], [])

@@ -18,11 +18,6 @@ def glb(here: Path) -> Path:
     return here / "head.glb"
 
 
-@pytest.fixture
-def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
-    return ("animate", toy_speech, "--model", toy_model_file)
-
-
 def test_what_is_in_a_file_is_printed(run, glb):
     done = run("character", glb, "--write-points", "points.csv", "--picture", "head.png")
     assert done.code == 0

@@ -21,12 +21,9 @@ from lipmotion.types import Item, Progress
 from lipmotion_lab.verbs import evaluate
 
 EVENTS = (
-    Progress("first", 0, 2, 0.0),
-    Item("a", "prepared"),
-    Progress("first", 1, 2, 0.25, -61.5),
-    Item("b", "skipped", "no face\nanywhere"),
-    Progress("second", 2, 2, 1.0),
-)
+    Progress("first", 0, 2, 0.0), Item("a", "prepared"), Progress("first", 1, 2, 0.25, -61.5),
+    Item("b", "skipped", "no face\nanywhere"), Progress("second", 2, 2, 1.0),
+)  # fmt: skip
 
 
 def objects(done: Done) -> list[dict[str, object]]:

@@ -17,13 +17,10 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training import train as train_module
 
 TESTED = {
-    "README": "test_readme.py",
-    "docs/start": "test_readme.py",
-    "docs/your-face": "docs/test_your_face.py",
-    "docs/api": "docs/test_api_page.py",
-    "docs/extend/": "docs/test_extend.py",
+    "README": "test_readme.py", "docs/start": "test_readme.py", "docs/your-face": "docs/test_your_face.py",
+    "docs/api": "docs/test_api_page.py", "docs/extend/": "docs/test_extend.py",
     "recipes/": "docs/test_corpus_recipes.py",
-}
+}  # fmt: skip
 """Pages, or folders of pages, with a test of their own."""
 RESULTS = "docs/results/"
 """Pages that are the output of the commands on them: their sheets have commit and date."""

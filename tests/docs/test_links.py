@@ -21,15 +21,10 @@ PAGES = sorted(
 CODE_ROOTS = (ROOT, ROOT / "src" / "lipmotion", ROOT / "src", ROOT / "tests")
 
 
-def without_code(text: str) -> str:
-    """Return Markdown without its blocks and spans of code, whose brackets are no links."""
-    text = re.sub(r"^( *)```.*?^\1```", "", text, flags=re.MULTILINE | re.DOTALL)
-    return re.sub(r"`[^`\n]*`", "", text)
-
-
 def links(text: str) -> Iterator[str]:
-    """Give the targets of all links and pictures of a page."""
-    yield from re.findall(r"\]\(([^()\s]+)\)", without_code(text))
+    """Give the targets of all links and pictures of a page; brackets in code are no links."""
+    text = re.sub(r"^( *)```.*?^\1```", "", text, flags=re.MULTILINE | re.DOTALL)
+    yield from re.findall(r"\]\(([^()\s]+)\)", re.sub(r"`[^`\n]*`", "", text))
 
 
 def anchors(page: Path) -> set[str]:

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.copies import partly_valid
 from lipmotion.errors import CorpusError
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.testing.examples import CHANNELS
-from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, silent_monitor
 from lipmotion_lab.baselines import REACH, ContextRidge, LoudnessRegression, MeanPose
 
@@ -15,14 +15,7 @@ BASELINES: list[type] = [MeanPose, LoudnessRegression, ContextRidge]
 
 @pytest.fixture(scope="module")
 def examples() -> list[Example]:
-    """Six sentences whose last frames are not valid, and have wrong values."""
-    made = []
-    for one in sentences(6):
-        valid = one.valid.copy()
-        valid[-5:] = False
-        one.motion.values[-5:] = 9
-        made.append(replace(one, valid=valid))
-    return made
+    return partly_valid(6, 5)
 
 
 def valid_motion(examples: list[Example]) -> np.ndarray:

@@ -1,8 +1,7 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from experiments.copies import partly_valid
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, Progress
@@ -14,14 +13,7 @@ pytest.importorskip("torch", reason="the extra 'network' is not installed")
 
 @pytest.fixture(scope="module")
 def examples() -> list[Example]:
-    """Sentences whose last frames are not valid, and have wrong values."""
-    made = []
-    for one in sentences(12):
-        valid = one.valid.copy()
-        valid[-8:] = False
-        one.motion.values[-8:] = 9
-        made.append(replace(one, valid=valid))
-    return made
+    return partly_valid(12, 8)
 
 
 @pytest.fixture(scope="module")

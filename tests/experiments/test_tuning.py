@@ -110,8 +110,5 @@ def test_options_are_told_where_they_are_not_those_printed():
     for system, options in SYSTEMS.items():
         changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 0.0}))
         assert changed == {
-            "structure": options["structure"],
-            "chains": options["chains"],
-            "audio_weight": 0.3,
-            "unseen_loss": 0.0,
-        }, system
+            "structure": options["structure"], "chains": options["chains"], "audio_weight": 0.3, "unseen_loss": 0.0,
+        }, system  # fmt: skip

@@ -4,7 +4,6 @@ import json
 import sys
 import warnings
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -105,13 +104,9 @@ def read_with(error: Exception, folder: Path) -> Result:
 
 def test_a_message_that_is_no_short_printable_line(tmp_path, monkeypatch):
     for line, kind in {"short": REFUSED, "x" * 5000: ERROR, "a\nb": ERROR, "\x1b[2J": ERROR, "\x9b2J": ERROR}.items():
-        monkeypatch.setattr(judge, "outcome", partial(_told, line))
+        monkeypatch.setattr(judge, "outcome", lambda _, line=line: (3, line))
         assert read_with(InputError("anything"), tmp_path).kind == kind
     assert list(tmp_path.iterdir()) == []
-
-
-def _told(line: str, _: object) -> tuple[int, str]:
-    return 3, line
 
 
 def test_messages_are_alike_whatever_they_quote(tmp_path):

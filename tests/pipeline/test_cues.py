@@ -1,44 +1,37 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Model
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.testing.toy import toy_sentences
-from lipmotion.types import Audio, Generation, Timeline
+from lipmotion.types import Audio, Timeline
 
 
-@pytest.fixture(scope="module")
-def generation(toy_speech: Path, toy_model: Model) -> Generation:
-    return lipmotion.animate(toy_speech, model=toy_model)
-
-
-def test_several_files_at_once(generation, tmp_path):
-    sheet = lipmotion.cues(generation)
+def test_several_files_at_once(result, tmp_path):
+    sheet = lipmotion.cues(result)
     paths = [tmp_path / f"é.{form}" for form in CUE_FORMATS]
     lipmotion.write_cues(sheet, paths, speech="é.wav")
     for path, form in zip(paths, CUE_FORMATS, strict=True):
         assert path.read_text() == cue_text(sheet, speech="é.wav", form=form)
 
 
-def test_results_that_have_no_cues(generation):
+def test_results_that_have_no_cues(result):
     with pytest.raises(ExportError, match="has no phones"):
-        lipmotion.cues(replace(generation, units=Timeline(())))
-    broken = generation.motion.values.copy()
+        lipmotion.cues(replace(result, units=Timeline(())))
+    broken = result.motion.values.copy()
     broken[3, 0] = np.nan
     with pytest.raises(ExportError, match="not finite"):
-        lipmotion.cues(replace(generation, motion=replace(generation.motion, values=broken)))
+        lipmotion.cues(replace(result, motion=replace(result.motion, values=broken)))
 
 
-def test_all_outputs_are_checked_before_the_first_is_written(generation, tmp_path):
+def test_all_outputs_are_checked_before_the_first_is_written(result, tmp_path):
     (tmp_path / "speech.dat").touch()
-    sheet = lipmotion.cues(generation)
+    sheet = lipmotion.cues(result)
     for names, form, words in (
         (["a.tsv", "b.txt"], None, "unknown cue format '.txt'; required one of: .tsv .xml .json .dat"),
         (["a.tsv", "missing/b.dat"], None, "the folder .*missing does not exist"),

@@ -1,10 +1,9 @@
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from lipmotion import Model, animate, cues, write, write_cues
+from lipmotion import cues, write, write_cues
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.pipeline.outputs import output
@@ -13,7 +12,6 @@ from lipmotion.pipeline.outputs.motion_files import MotionOutput
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, create_outputs, plan
 from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput
 from lipmotion.pipeline.request import Outputs
-from lipmotion.types import Generation
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion_faces.outputs.scenes import SceneOutput
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -36,11 +34,6 @@ class WordOutput(Output):
 @pytest.fixture
 def settings() -> OutputSettings:
     return OutputSettings(shown_face("portrait"), sounded=True)
-
-
-@pytest.fixture(scope="module")
-def result(toy_model: Model, toy_speech: Path) -> Generation:
-    return animate(toy_speech, model=toy_model)
 
 
 @pytest.mark.parametrize(

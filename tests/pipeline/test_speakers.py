@@ -1,5 +1,4 @@
 import logging
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,32 +16,15 @@ from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
-from pipeline.made import corpus_of
+from pipeline import made
+from pipeline.made import GAIN, OFFSET, corpus_of
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
-GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
-"""How ben's opening, width and outer differ from anna's."""
-
-
-def with_motion(utterance: Utterance, values: np.ndarray, channels: tuple[Channel, ...] | None = None) -> Utterance:
-    motion = utterance.track.motion
-    track = replace(utterance.track, motion=Motion(values, motion.rate_hz, channels or motion.channels))
-    return replace(utterance, track=track)
-
-
-def two_people(count: int = 12) -> Iterator[Utterance]:
-    """Every other sentence is ben's, who has a narrower mouth that never closes wholly."""
-    for number, utterance in enumerate(toy_utterances(count)):
-        if number % 2:
-            values = OFFSET + GAIN * utterance.track.motion.values
-            yield replace(with_motion(utterance, values), speaker="ben")
-        else:
-            yield replace(utterance, speaker="anna")
 
 
 @pytest.fixture(scope="module")
 def people(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
-    return corpus_of(tmp_path_factory.mktemp("people") / "corpus", list(two_people()))
+    return corpus_of(tmp_path_factory.mktemp("people") / "corpus", made.people())
 
 
 @pytest.fixture(scope="module")
@@ -190,8 +172,9 @@ def test_other_engines(people, toy_sentence, engine):
 
 
 def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
-    values = utterance.track.motion.values[:, : len(channels)]
-    return replace(with_motion(utterance, values, channels), speaker="captured")
+    motion = utterance.track.motion
+    motion = Motion(motion.values[:, : len(channels)], motion.rate_hz, channels)
+    return replace(utterance, track=replace(utterance.track, motion=motion), speaker="captured")
 
 
 @pytest.mark.long

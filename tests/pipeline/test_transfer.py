@@ -13,18 +13,9 @@ from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
-from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
+from lipmotion.types import Audio, Channel, Constraints, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
-from pipeline.made import corpus_of
-
-GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
-"""How ben's opening, width and outer differ from those of the toy."""
-
-
-def of_ben(utterance: Utterance, speaker: str = "ben") -> Utterance:
-    motion = utterance.track.motion
-    changed = Motion(OFFSET + GAIN * motion.values, motion.rate_hz, motion.channels)
-    return replace(utterance, track=replace(utterance.track, motion=changed), speaker=speaker)
+from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
 
 
 @pytest.fixture(scope="module")
@@ -34,11 +25,7 @@ def ben(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
 
 @pytest.fixture(scope="module")
 def of_two(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
-    utterances = [
-        replace(each, speaker="anna") if number % 2 else of_ben(each)
-        for number, each in enumerate(toy_utterances(12, seed=1))
-    ]
-    return corpus_of(tmp_path_factory.mktemp("two") / "corpus", utterances)
+    return corpus_of(tmp_path_factory.mktemp("two") / "corpus", people(seed=1))
 
 
 @pytest.fixture(scope="module")

@@ -1,25 +1,19 @@
 import json
 import shutil
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
 
-from lipmotion import Model, animate, read_motion, write
+from lipmotion import read_motion, write
 from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.types import Generation
 from lipmotion_faces import Staging
-
-
-@pytest.fixture(scope="module")
-def result(toy_model: Model, toy_speech: Path) -> Generation:
-    return animate(toy_speech, model=toy_model)
 
 
 def test_several_files_at_once(result, toy_model, toy_speech, tmp_path):

@@ -99,16 +99,11 @@ def test_two_tabs_do_not_overwrite_one_another(studio):
 @pytest.mark.parametrize(
     ("content", "status"),
     [
-        ({"revision": None, "steps": ["phone 3 is p"]}, 422),
-        ({"steps": ["phone 99 is p"]}, 422),
-        ({"steps": ["jump"]}, 422),
-        ({"steps": "phone 3 is p"}, 422),
-        ({"steps": [], "instead": 1}, 422),
-        ([], 422),
-        (b"{", 400),
-        (b" " * (1 << 21), 413),
+        ({"revision": None, "steps": ["phone 3 is p"]}, 422), ({"steps": ["phone 99 is p"]}, 422),
+        ({"steps": ["jump"]}, 422), ({"steps": "phone 3 is p"}, 422), ({"steps": [], "instead": 1}, 422), ([], 422),
+        (b"{", 400), (b" " * (1 << 21), 413),
     ],
-)
+)  # fmt: skip
 def test_edits_that_are_refused_change_nothing(studio, content, status):
     before = studio.ready()
     if isinstance(content, dict):
@@ -121,11 +116,8 @@ def test_edits_that_are_refused_change_nothing(studio, content, status):
 def test_words_are_corrected_where_they_are_said(studio):
     word = studio.ready()["words"][0]
     content = {
-        "text": " mama ",
-        "start_s": word["start_s"],
-        "end_s": word["end_s"],
-        "revision": studio.ready()["revision"],
-    }
+        "text": " mama ", "start_s": word["start_s"], "end_s": word["end_s"], "revision": studio.ready()["revision"],
+    }  # fmt: skip
     state = studio.ask("/api/lines/1/transcript", content).content
     assert "mama" in [found["label"] for found in state["words"]]
     assert state["words"][1:] == studio.ready()["words"][1:]
@@ -205,11 +197,8 @@ def test_a_line_is_marked_exported_and_then_changed(studio):
     studio.edit("phone 3 is m")
     assert studio.row()["exported"] == "changed"
     wrongs: tuple[dict[str, object], ...] = (
-        {"files": ["/../x.csv"]},
-        {"files": []},
-        {"preset": "x"},
-        {"preset": "arkit", "only": "some"},
-    )
+        {"files": ["/../x.csv"]}, {"files": []}, {"preset": "x"}, {"preset": "arkit", "only": "some"},
+    )  # fmt: skip
     for wrong in wrongs:
         assert studio.ask("/api/export", wrong).status == 422
 

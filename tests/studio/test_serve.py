@@ -13,6 +13,7 @@ pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
 from studio.attack import attacked
 from studio.served import edits_of_all_kinds, lost_edits, served, undone_edits
+from study.small_study import small_study
 
 
 @pytest.fixture
@@ -58,11 +59,14 @@ def test_random_edits_are_of_all_kinds():
 
 
 @pytest.mark.long
-def test_without_the_extra_the_error_says_what_to_install(line, tmp_path):
+@pytest.mark.parametrize("command", [("studio",), ("study", "serve")])
+def test_without_the_extra_the_error_says_what_to_install(line, tmp_path, command):
+    small_study(tmp_path / "study")
     (tmp_path / "without").mkdir()
     (tmp_path / "without" / "uvicorn.py").write_text("raise ImportError('no uvicorn here')", encoding="utf-8")
     variables = environment()
     variables["PYTHONPATH"] = f"{tmp_path / 'without'}:{variables.get('PYTHONPATH', '')}"
-    done = run_child([*LIPMOTION, "studio", line], variables=variables)
+    given = line if command == ("studio",) else tmp_path / "study"
+    done = run_child([*LIPMOTION, *command, given], variables=variables)
     assert done.returncode == 8
-    assert "[studio]" in done.stderr
+    assert f"[{command[0]}]" in done.stderr

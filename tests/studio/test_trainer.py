@@ -161,12 +161,9 @@ def test_videos_of_the_project_are_gathered_with_their_words(tmp_path):
     with gather_recordings(order) as place:
         found = {path.name: path.read_text(encoding="utf-8") for path in place.iterdir()}
     assert found == {
-        "a-take.mp4": "take.mp4",
-        "a-take.srt": "take.srt",
-        "a-take-2.mp4": "take.mp4",
-        "a-take-2.txt": "so typed",
+        "a-take.mp4": "take.mp4", "a-take.srt": "take.srt", "a-take-2.mp4": "take.mp4", "a-take-2.txt": "so typed",
         "other.mp4": "other.mp4",
-    }
+    }  # fmt: skip
     told: list[Any] = []
     run_training(order, told.append)
     assert list(told[-1]) == ["error"]
@@ -226,12 +223,9 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path, monkeypatch):
 
 
 DAMAGES = (
-    "",
-    "[]",
-    "{}",
-    '{"format": "lipmotion.training", "version": 2}',
+    "", "[]", "{}", '{"format": "lipmotion.training", "version": 2}',
     '{"format": "lipmotion.training", "version": 1}',
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("damage", DAMAGES)

@@ -33,19 +33,13 @@ NAMES = {
 }
 """What WebDriver's addresses are called here."""
 PREFERENCES = {
-    "app.update.disabledForTesting": True,
-    "browser.shell.checkDefaultBrowser": False,
-    "browser.startup.homepage_override.mstone": "ignore",
-    "browser.tabs.remote.unloadOnLowMemory": False,
-    "datareporting.policy.dataSubmissionEnabled": False,
-    "marionette.port": 0,
-    "media.autoplay.blocking_policy": 0,
-    "media.autoplay.default": 0,
-    "network.captive-portal-service.enabled": False,
-    "network.connectivity-service.enabled": False,
-    "toolkit.telemetry.reportingpolicy.firstRun": False,
+    "app.update.disabledForTesting": True, "browser.shell.checkDefaultBrowser": False,
+    "browser.startup.homepage_override.mstone": "ignore", "browser.tabs.remote.unloadOnLowMemory": False,
+    "datareporting.policy.dataSubmissionEnabled": False, "marionette.port": 0, "media.autoplay.blocking_policy": 0,
+    "media.autoplay.default": 0, "network.captive-portal-service.enabled": False,
+    "network.connectivity-service.enabled": False, "toolkit.telemetry.reportingpolicy.firstRun": False,
     "webgl.force-enabled": True,
-}
+}  # fmt: skip
 SCHEMES = {"dark": 0, "light": 1}
 SHOW_AS = """const [width, height, scheme] = arguments, { style } = gBrowser.selectedBrowser;
 Services.prefs.setIntPref("layout.css.prefers-color-scheme.content-override", scheme);

@@ -101,14 +101,10 @@ def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place):
 @pytest.mark.parametrize(
     ("content", "headers", "status"),
     [
-        (b"{", {}, 400),
-        (b"\xff", {}, 400),
-        (b"[" * 10_000, {}, 400),
-        (b" " * 20_000, {}, 413),
-        ({"trial": 0}, {}, 422),
-        ({"trial": 0}, {"content-type": "text/plain"}, 415),
+        (b"{", {}, 400), (b"\xff", {}, 400), (b"[" * 10_000, {}, 400), (b" " * 20_000, {}, 413),
+        ({"trial": 0}, {}, 422), ({"trial": 0}, {"content-type": "text/plain"}, 415),
     ],
-)
+)  # fmt: skip
 def test_bodies_that_are_refused(place, content, headers, status):
     token = place.join()["token"]
     reply = ask(place.application, "/api/answers", content, token=token, headers=headers)

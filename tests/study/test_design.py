@@ -140,14 +140,11 @@ def test_only_the_region_is_shown(here):
 @pytest.mark.parametrize(
     ("conditions", "says"),
     [
-        (["recording"], "at least 2"),
-        (["recording", "recording"], "two conditions are called"),
-        (["recording", "ours"], "required NAME=SOURCE"),
-        (["recording", "=ours"], "required NAME=SOURCE"),
-        (["anchor=x", "recording"], "no other"),
-        (["real=recording", "recording"], "no other"),
+        (["recording"], "at least 2"), (["recording", "recording"], "two conditions are called"),
+        (["recording", "ours"], "required NAME=SOURCE"), (["recording", "=ours"], "required NAME=SOURCE"),
+        (["anchor=x", "recording"], "no other"), (["real=recording", "recording"], "no other"),
     ],
-)
+)  # fmt: skip
 def test_conditions_that_are_refused(conditions, says):
     with pytest.raises(InputError, match=says):
         parse_conditions(conditions)

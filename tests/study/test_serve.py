@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing
 
 import pytest
 
-from children import LIPMOTION, environment, run_child, wait_until
+from children import wait_until
 from lipmotion.errors import InputError
 from lipmotion_studio.study.conduct import collect_answers, serve_study
 from lipmotion_studio.study.manifest import VIDEOS
@@ -110,15 +110,3 @@ def test_a_port_that_is_taken_is_said(tmp_path):
         serve_study(tmp_path / "study", port=taken.getsockname()[1])
     with pytest.raises(InputError, match="another --port"):
         serve_study(tmp_path / "study", port=70_000)
-
-
-@pytest.mark.long
-def test_without_the_extra_the_error_says_what_to_install(tmp_path):
-    small_study(tmp_path / "study")
-    (tmp_path / "without").mkdir()
-    (tmp_path / "without" / "uvicorn.py").write_text("raise ImportError('no uvicorn here')", encoding="utf-8")
-    variables = environment()
-    variables["PYTHONPATH"] = f"{tmp_path / 'without'}:{variables.get('PYTHONPATH', '')}"
-    done = run_child([*LIPMOTION, "study", "serve", tmp_path / "study"], variables=variables)
-    assert done.returncode == 8
-    assert "[study]" in done.stderr

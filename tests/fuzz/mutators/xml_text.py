@@ -25,12 +25,12 @@ ELEMENTS = (
     *('<svg viewBox="0 0 1 1"/>', '<path d="M0 0A1 1 0 011 1z"/>', '<circle r="1e6"/>', "<metadata>", "</g>", "</svg>"),
 )
 VALUES = (
-    *("", "nan", "inf", "1e999", "1e6", "-1e6", "1e-400", "1_0", "٣", "50%", "1px", "1em", "url(#a)", "inherit", "none"),
+    *("", "nan", "1e999", "1e6", "-1e6", "1e-400", "1_0", "٣", "50%", "1px", "1em", "url(#a)", "inherit", "none"),
     *("#fff", "#ffff", "rgb(999,-1,0)", "hsl(1e9,1%,1%)", "currentColor", "red !important", "var(--a)", "0 0 0 0"),
     *("scale(0)", "scale(1e6)", "matrix(1 2 3 4 5)", "rotate(1 2)", "skewX(90)", "translate()", "scale(1))", "a(1)"),
     *(
         "M0 0", "M0 0z1", "M1e6 1e6L-1e6-1e6", "m1 1a0 0 0 000 0", "M0 0A1e6 1e-9 9 1 0 1 1", "M0,0,,1",
-        "0 0 1e-300 1", "\x00",
+        "0 0 1e-300 1", "\x00", "inf",
     ),
     *("javascript:x()", "&a;", "&#x9;", "mouth-", "mouth-aa", "head", "pupils", "fill:red;fill:", "a:b:c;;", "evenodd"),
 )  # fmt: skip

@@ -55,8 +55,8 @@ def check_generation(result: Generation) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.json"
         write(result, [path])
-        json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse)
+        json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse_constant)
 
 
-def _refuse(name: str) -> Any:
-    raise ImplausibleError(f"{name} in a file that was written")
+def refuse_constant(name: str) -> Any:
+    raise ImplausibleError(f"{name} in what was written")

@@ -183,14 +183,6 @@ def test_files_that_refer_to_the_sound(sounds, settings, tmp_path):
     assert [path.name for path in (out / "deep").iterdir()] == ["two.usda"]
 
 
-def test_what_a_killed_run_left_is_removed(sounds, settings, tmp_path):
-    out = tmp_path / "out"
-    (out / "deep").mkdir(parents=True)
-    (out / "deep" / ".part-batch-0123-4567.json").touch()
-    batch(sounds, out, settings, jobs=1)
-    assert [path.name for path in (out / "deep").iterdir()] == ["two.json"]
-
-
 class DyingPool:
     """A pool whose worker dies at one line, every time or once."""
 
@@ -317,19 +309,19 @@ def test_lines_that_would_wait_or_lead_elsewhere_fail_and_the_others_go_on(toy_s
     assert not (out / "two.json").is_symlink()  # replaced, not what it points to
 
 
-def test_what_a_killed_process_was_writing_is_deleted(toy_speech, settings, tmp_path):
+def test_what_a_killed_process_was_writing_is_deleted(sounds, settings, tmp_path):
     """A process that ends within a write leaves a file of a name that no other run would write to."""
-    sounds, out = many(tmp_path / "sounds", toy_speech, 1), tmp_path / "out"
-    out.mkdir()
-    staged = Place(str(out), "of an earlier run").staged("line000", "json")
+    out = tmp_path / "out"
+    (out / "deep").mkdir(parents=True)
+    staged = Place(str(out), "of an earlier run").staged("deep/two", "json")
     write = (
         "import os, sys; from pathlib import Path; from lipmotion.storage.files import atomic_file\n"
         "with atomic_file(Path(sys.argv[1])) as path:\n    path.write_text('half'); os._exit(9)"
     )
     assert run_child([sys.executable, "-c", write, staged]).returncode == 9
-    assert len(list(out.iterdir())) == 1
+    assert len(list((out / "deep").iterdir())) == 1
     batch(sounds, out, settings, jobs=1)
-    assert set(contents(out)) == {"line000.json"}
+    assert set(contents(out)) == {"one.json", "three.json", "deep/two.json"}
 
 
 def command(*words: object) -> list[str]:

@@ -93,12 +93,9 @@ def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
 
 def test_they_are_read_as_they_were_written(tmp_path):
     marks = {
-        "a": Mark("approve", "2026-01-01"),
-        "=1+1": Mark("redo"),
-        'b, "c"': Mark("redo", "-2"),
-        "'d": Mark(""),
+        "a": Mark("approve", "2026-01-01"), "=1+1": Mark("redo"), 'b, "c"': Mark("redo", "-2"), "'d": Mark(""),
         "'=e ": Mark(""),
-    }
+    }  # fmt: skip
     write_marks(tmp_path / "marks.csv", marks)
     assert "'=1+1," in (tmp_path / "marks.csv").read_text()
     assert read_marks(tmp_path / "marks.csv") == marks

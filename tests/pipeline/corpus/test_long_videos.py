@@ -1,4 +1,5 @@
 import shutil
+from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,21 +24,15 @@ SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]
 DURATION_S = 46.0
 
 
-def write_talk(path: Path, sentences: list[tuple[float, float]] | None = None) -> Path:
-    """Write a video with bursts of noise for sentences, in pictures of one grey."""
+def write_video(path: Path, images: Iterable, size: tuple[int, int], samples: np.ndarray, **how) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
-    draw = np.random.default_rng(0)
-    samples = 1e-3 * draw.normal(size=round(DURATION_S * RATE))
-    for start_s, end_s in SENTENCES if sentences is None else sentences:
-        part = slice(round(start_s * RATE), round(end_s * RATE))
-        samples[part] += 0.1 * draw.normal(size=len(samples[part]))
     with av.open(str(path), "w") as container:
-        pictures = container.add_stream("libx264", rate=25, options={"g": "50"})
-        pictures.width, pictures.height, pictures.pix_fmt = 64, 48, "yuv420p"
+        pictures = container.add_stream("libx264", rate=25, options=how)
+        pictures.width, pictures.height, pictures.pix_fmt = *size, "yuv420p"
         sound = container.add_stream("flac", rate=RATE)
         sound.layout = "mono"
-        for n in range(round(DURATION_S * 25)):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 90, np.uint8), format="rgb24")
+        for n, image in enumerate(images):
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
             frame.pts, frame.time_base = n, Fraction(1, 25)
             container.mux(pictures.encode(frame))
         whole = np.round(samples * 32767).astype(np.int16)
@@ -48,6 +43,17 @@ def write_talk(path: Path, sentences: list[tuple[float, float]] | None = None) -
         container.mux(pictures.encode())
         container.mux(sound.encode())
     return path
+
+
+def write_talk(path: Path, sentences: list[tuple[float, float]] | None = None) -> Path:
+    """Write a video with bursts of noise for sentences, in pictures of one grey."""
+    draw = np.random.default_rng(0)
+    samples = 1e-3 * draw.normal(size=round(DURATION_S * RATE))
+    for start_s, end_s in SENTENCES if sentences is None else sentences:
+        part = slice(round(start_s * RATE), round(end_s * RATE))
+        samples[part] += 0.1 * draw.normal(size=len(samples[part]))
+    grey = (np.full((48, 64, 3), 90, np.uint8) for _ in range(round(DURATION_S * 25)))
+    return write_video(path, grey, (64, 48), samples, g="50")
 
 
 @pytest.fixture(scope="module")
@@ -212,22 +218,9 @@ def joined(clips: list[Path], path: Path) -> None:
     """Write clips of 75 frames one after the other, with their sound."""
     from vision.variants import frames_of
 
-    with av.open(str(path), "w") as container:
-        pictures = container.add_stream("libx264", rate=25, options={"crf": "8"})
-        pictures.width, pictures.height, pictures.pix_fmt = 360, 288, "yuv420p"
-        sound = container.add_stream("flac", rate=RATE)
-        sound.layout = "mono"
-        for number, clip in enumerate(clips):
-            frames = frames_of(clip)[:75]
-            for n, image in enumerate(frames + frames[-1:] * (75 - len(frames))):
-                frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-                frame.pts, frame.time_base = 75 * number + n, Fraction(1, 25)
-                container.mux(pictures.encode(frame))
-            samples = np.round(read_audio(clip).samples[: 3 * RATE] * 32767).astype(np.int16)
-            samples = np.pad(samples, (0, 3 * RATE - len(samples)))
-            for at in range(0, len(samples), 4000):
-                block = av.AudioFrame.from_ndarray(samples[None, at : at + 4000], format="s16", layout="mono")
-                block.sample_rate, block.pts, block.time_base = RATE, 3 * RATE * number + at, Fraction(1, RATE)
-                container.mux(sound.encode(block))
-        container.mux(pictures.encode())
-        container.mux(sound.encode())
+    images, samples = [], np.zeros(3 * RATE * len(clips))
+    for number, clip in enumerate(clips):
+        frames, sound = frames_of(clip)[:75], read_audio(clip).samples[: 3 * RATE]
+        images += frames + frames[-1:] * (75 - len(frames))
+        samples[3 * RATE * number :][: len(sound)] = sound
+    write_video(path, images, (360, 288), samples, crf="8")

@@ -6,14 +6,10 @@ import pytest
 from lipmotion_faces.corpus.long_videos import LEAST_S, LONGEST_S, MARGIN_S, SHORTEST_S, SpokenPart, utterance_spans
 
 
-def middle(low_s: float, high_s: float) -> float:
-    return (low_s + high_s) / 2
-
-
 def spans(
     stretches: list[SpokenPart], cuts_s: list[float] | None = None, duration_s: float = 100.0
 ) -> list[SpokenPart]:
-    return utterance_spans(stretches, cuts_s or [], duration_s, middle)
+    return utterance_spans(stretches, cuts_s or [], duration_s, lambda low_s, high_s: (low_s + high_s) / 2)
 
 
 def edges(found: list[SpokenPart]) -> list[tuple[float, float]]:

@@ -17,7 +17,7 @@ from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generation import generate_for
 from lipmotion.speech.recognition.recogniser import NO_WEIGHT_SCORE, OWN_VOICE_SCORE, cached_recogniser
 from lipmotion.testing.toy import toy_motion, toy_sentences
-from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
+from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
 from lipmotion_lab.evaluation.evaluate import _was_trained_on, figures_of
@@ -241,12 +241,6 @@ def renamed_utterance(utterance: Utterance) -> Utterance:
     return replace(utterance, track=replace(utterance.track, motion=renamed(utterance.track.motion)))
 
 
-def labelled(utterance: Utterance, names: dict[str, str]) -> Timeline[Unit]:
-    """The true phones of a toy utterance, some of them under other names."""
-    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
-    return Timeline(tuple(replace(s, label=Unit(names.get(s.label.phone, s.label.phone))) for s in units))
-
-
 def test_other_channels_than_lip_distances(toy_model, toy_corpus, known, tmp_path):
     """Every channel that moves is compared, and what only an opening can tell is left out."""
     faces = corpus_of([renamed_utterance(u) for u in held_out(toy_corpus)], tmp_path)
@@ -296,7 +290,8 @@ def test_one_speaker(toy_model, toy_corpus, tmp_path):
 
 def test_labelled_phones_are_the_reference(toy_model, toy_corpus, tmp_path):
     """Labels that call the p, b and m something else: then there is nothing to close in."""
-    untold = [replace(u, words=None, phones=labelled(u, {"p": "t", "b": "d", "m": "n"})) for u in held_out(toy_corpus)]
+    names = {"p": "t", "b": "d", "m": "n"}
+    untold = [replace(u, words=None, phones=made.true_phones(u, names)) for u in held_out(toy_corpus)]
     figures = evaluate(toy_model, corpus_of(untold, tmp_path))
     assert list(figures["conditions"]) == CONDITIONS
     for condition in figures["conditions"].values():

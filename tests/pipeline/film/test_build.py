@@ -59,12 +59,9 @@ def test_what_was_built(built, videos, tmp_path):
     face, _ = built
     frames = sum(len(video.motion.values) for video in videos.values())
     assert face.about == {
-        "name": "Anna",
-        "corpus": ["/".join(folder_of(videos).parts[-2:])],
-        "speaker": "",
-        "footage_s": round(frames / 25, 1),
-        "recordings": SENTENCES,
-    }
+        "name": "Anna", "corpus": ["/".join(folder_of(videos).parts[-2:])], "speaker": "",
+        "footage_s": round(frames / 25, 1), "recordings": SENTENCES,
+    }  # fmt: skip
     assert face.appearance.scale == 1
     assert set(face.appearance.from_motion.names) == {"opening", "width", "outer", "y_152"}  # no depth
     assert face.background.video.size == (288, 224)

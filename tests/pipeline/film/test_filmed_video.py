@@ -155,19 +155,6 @@ def test_motion_that_the_face_cannot_show(filmed_face, motion, toy_sentence, tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_overlays_need_the_video(filmed_face, motion, toy_speech, tmp_path):
-    words = "an overlay shows the video of the speech: give a video as speech, and no background"
-    for overlay in ("inset", "mouth"):
-        with pytest.raises(InputError, match=words):
-            make_film(filmed_face, motion, options=Outputs(overlay=overlay))
-        (tmp_path / "b.mp4").write_text("video")
-        both = Outputs(overlay=overlay, background=tmp_path / "b.mp4")
-        with pytest.raises(InputError, match=words):
-            make_film(filmed_face, motion, speech=toy_speech, options=both)
-        with pytest.raises(InputError, match="has no pictures, and an overlay shows them; give a video as speech"):
-            make_film(filmed_face, motion, speech=toy_speech, options=Outputs(overlay=overlay))
-
-
 def test_options_of_filmed_faces_alone(tmp_path, toy_speech):
     drawn = shown_face("portrait")
     video = tmp_path / "a.mp4"

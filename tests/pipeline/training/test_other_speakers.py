@@ -49,11 +49,8 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_text_in_every_voice():
     sentences = list(synthesise_sentences(TEXTS))
     assert [sentence.name for sentence in sentences] == [
-        "flite-low-001",
-        "flite-low-002",
-        "flite-high-001",
-        "flite-high-002",
-    ]
+        "flite-low-001", "flite-low-002", "flite-high-001", "flite-high-002",
+    ]  # fmt: skip
     assert [sentence.speaker for sentence in sentences] == ["anna", "anna", "bert", "bert"]
     assert [s.name for s in synthesise_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
 

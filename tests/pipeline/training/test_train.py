@@ -16,7 +16,7 @@ from lipmotion.pipeline.training.train import describe_training, label_phones
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
-from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
+from lipmotion.types import Channel, Motion, Track, Utterance
 from lipmotion.units import Lexicon
 from pipeline import made
 
@@ -65,10 +65,7 @@ def test_untranscribed_utterances_are_recognised_and_used(toy_corpus, tmp_path, 
 
 
 def labelled(utterance: Utterance) -> Utterance:
-    """The true phones instead of the words."""
-    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
-    phones = Timeline(tuple(replace(s, label=Unit(s.label.phone)) for s in units))
-    return replace(utterance, words=None, phones=phones)
+    return replace(utterance, words=None, phones=made.true_phones(utterance))
 
 
 @pytest.mark.long
