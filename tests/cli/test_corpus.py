@@ -1,3 +1,4 @@
+import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,9 +8,11 @@ import numpy as np
 from cli.conftest import check_refused, is_one_error
 from lipmotion.errors import MissingDependencyError
 from lipmotion.formats.sound import write_sound
+from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.types import Item, Progress
 from lipmotion_faces.corpus import prepare
 from lipmotion_faces.corpus import sync as offset
+from lipmotion_faces.corpus.coverage import coverage
 from lipmotion_faces.corpus.prepare import PrepareReport
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
@@ -62,9 +65,16 @@ def test_prepare_prints_the_counts(run, monkeypatch):
     }  # fmt: skip
 
 
-def test_what_cannot_be_used(run, here):
+def test_what_cannot_be_used(run, here, toy_corpus):
     (here / "empty").mkdir()
     for arguments, code, words in (
+        (["coverage", toy_corpus.path, "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
+        (["coverage", "missing"], 4, "missing: no such corpus"),
+        (["coverage", toy_corpus.path, "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+        (["prompts", "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
+        (["prompts", "--have", "missing"], 4, "missing: no such corpus"),
+        (["prompts", "--count", "0"], 3, "0 prompts asked for, required at least 1"),
+        (["prompts", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
         (["info", "missing"], 4, "missing: no such corpus"),
         (["info", "x" * 300], 3, "File name too long"),
         (["prepare", "empty", "-o", "mine"], 4, "empty: no videos in it"),
@@ -82,6 +92,48 @@ def test_without_the_packages_for_video(run, here, monkeypatch):
     (here / "videos" / "a.mp4").touch()
     assert is_one_error(run("corpus", "prepare", "videos", "-o", "mine"), 8)
     assert not (here / "mine").exists()
+
+
+def test_coverage(run, toy_corpus):
+    done = run("corpus", "coverage", toy_corpus.path, "--count", "3")
+    assert (done.code, done.err) == (0, [])
+    found = coverage(toy_corpus)
+    assert done.out[0] == f"{len(toy_corpus)} of {len(toy_corpus)} utterances, {found.sentences} sentences"
+    for line, kind in zip(done.out[1:4], found.kinds, strict=True):
+        assert line.split()[:4] == [kind.kind, str(kind.covered), "of", str(kind.needed)]
+    assert f"and {len(found.kinds[1].missing) - 3} more diphones" in done.out
+
+
+def test_prompts(run, here, toy_corpus):
+    done = run("corpus", "prompts", "--count", "3")
+    found = prompts(count=3)
+    assert (done.code, done.err) == (0, [])
+    assert [line.split(None, 5)[5] for line in done.out[:3]] == [prompt.text for prompt in found.chosen]
+    last = found.chosen[-1]
+    assert f"phones {last.phones}/{found.phones}  diphones {last.diphones:4}/{found.diphones}" in done.out[2]
+    share = last.diphones / found.diphones
+    assert done.out[3].startswith(f"3 of {found.sentences} sentences: {share:.0%} of all their diphones")
+    (here / "mine.txt").write_text(" ".join(toy_corpus.utterance("toy00").words or ()))
+    done = run("corpus", "prompts", "--text", "mine.txt", "--have", toy_corpus.path)
+    assert (done.code, done.out) == (0, ["0 of 1 sentences: they add nothing"])
+
+
+def test_texts_and_lexicons_of_ones_own(run, here, toy_corpus):
+    (here / "mine.txt").write_text("Two qwrtzx.\nFive.\nPapa vxvx.\n")
+    (here / "lexicon.txt").write_text("qwrtzx zh oy\n")
+    own = ("--text", "mine.txt", "--lexicon", "lexicon.txt")
+    done = run("corpus", "prompts", *own, "--have", toy_corpus.path)
+    assert done.out[0].endswith("Two qwrtzx.")
+    assert done.err == ["lipmotion: warning: left out 1 sentences for their words: vxvx"]
+    given = ["corpus", "coverage", toy_corpus.path, *own]
+    done = run(*given)
+    assert done.err == ["lipmotion: warning: left out 1 sentences for their words (--json has them)"]
+    assert [line for line in done.out if line.startswith("zh ")]
+    done = run(*given, "--json")
+    assert done.err == []
+    (document,) = map(json.loads, done.out)
+    assert document["left_out"] == {"Papa vxvx.": "vxvx"}
+    assert [kind["kind"] for kind in document["kinds"]] == ["phones", "diphones", "triphones"]
 
 
 def test_offset_of_two_recordings(run, here):

@@ -1,10 +1,12 @@
+import shutil
 import sys
 from functools import partial
+from pathlib import Path
 
 import pytest
 
 from children import PIPE, child, run_child
-from cli.conftest import check_refused
+from cli.conftest import check_refused, is_one_error
 from lipmotion.cli import main
 from lipmotion.cli.verbs import info
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
@@ -113,3 +115,58 @@ def test_a_reader_that_has_gone_is_no_error(arguments):
         process.stdin.close()  # now it may begin
         assert process.stderr.read() == ""
         assert process.wait() == 0
+
+
+def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_model_file, here):
+    line = ("animate", toy_speech, "--model", toy_model_file, "-o", "ä.json", "--transcript", "see bimab papa mama")
+    done = run_outside(*line, encoding="ascii")
+    (warning,) = done.err
+    assert warning.startswith("lipmotion: warning: 'bimab' is not in the dictionary; read as 'b ")
+    assert (done.code, done.out) == (0, ["\\xe4.json"])
+    assert [path.name for path in here.iterdir()] == ["ä.json"]
+
+
+@pytest.mark.usefixtures("here")
+def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, bad_speech):
+    """FFmpeg's own messages are not printed."""
+    assert is_one_error(run_outside("animate", bad_speech["text"], "-o", "a.json"), 3)
+    assert is_one_error(run_outside("animate", "a.wav", "-o", "missing/a.json"), 7)
+    assert run_outside("animate", "a.wav").code == 2
+
+
+def test_the_console_script(run_outside):
+    script = shutil.which("lipmotion", path=str(Path(sys.executable).parent))
+    if script is None:
+        pytest.skip("the package is not installed")
+    assert is_one_error(run_outside("info", "missing", program=(script,)), 3)
+
+
+BLENDER, WORD = b"BLENDER-v402REND", b"PK\x03\x04" + bytes(40) + b"word/document.xml"
+
+
+@pytest.mark.parametrize(
+    ("line", "content", "named"),
+    [
+        ("cues FILE.wav", b"my mother moved the baby boat\n", "is text"),
+        ("words FILE.wav", b"MThd\0\0\0\6" + bytes(90), "MIDI"),
+        ("animate FILE.wav -o out.json", WORD, "a Word document"),
+        ("cues SPEECH --transcript FILE.txt", WORD, "a Word document"),
+        ("animate SPEECH -o out.json --units FILE.json", BLENDER, "a Blender file"),
+        ("render FILE.csv -o out.json", BLENDER, "a Blender file"),
+        ("render FILE.fbx -o out.json", b"Kaydara FBX Binary  \0", "an FBX file"),
+        ("character FILE.glb", BLENDER, "a Blender file"),
+        ("animate SPEECH -o out.mp4 --face FILE.blend", BLENDER, "a Blender file"),
+        ("speak --text FILE.txt -o out.wav", b"%PDF-1.7", "a PDF"),
+        ("batch FILE.csv --out out", WORD, "a Word document"),
+        ("face build FILE.mp4 -o out.face", b"8BPS\0\1", "a Photoshop file"),
+        ("animate SPEECH -o out.json --lexicon FILE.dict", WORD, "a Word document"),
+    ],
+)
+def test_it_is_named(line, content, named, run, here, toy_speech):
+    words = line.split()
+    file = next(word for word in words if word.startswith("FILE"))
+    (here / file).write_bytes(content)
+    done = run(*(toy_speech if word == "SPEECH" else word for word in words))
+    check_refused(done, 3, f"{file}: is ")
+    assert named in done.err[0]
+    assert ", required a" in done.err[0]

@@ -18,7 +18,7 @@ from lipmotion.pipeline.model import shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion_faces.video.mp4 import write_mp4
-from studio.late_sound import shifted
+from studio.test_recorded_videos import shifted
 from study.browser import (
     CONTROL,
     DELETE,

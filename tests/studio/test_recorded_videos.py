@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 
@@ -8,7 +9,6 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
-from studio.late_sound import shifted
 
 LATE_S = 0.3
 
@@ -41,3 +41,16 @@ def test_what_begins_later_than_0_is_written_anew(video, tmp_path):
     assert media_type(later) is None
     write_playable(later, later, tmp_path / "playable.mp4")
     assert media_type(tmp_path / "playable.mp4") == MP4
+
+
+def shifted(video: Path, path: Path, *, sound_s: float = 0.0, all_s: float = 0.0) -> Path:
+    """Write a video with its sound so much later, or all of it [s]; return where."""
+    with av.open(str(video)) as source, av.open(str(path), "w") as target:
+        streams = {stream.index: target.add_stream_from_template(stream) for stream in source.streams}
+        for packet in source.demux():
+            if packet.dts is None:
+                continue
+            late = round((all_s + (sound_s if packet.stream.type == "audio" else 0.0)) / packet.time_base)
+            packet.pts, packet.dts, packet.stream = packet.pts + late, packet.dts + late, streams[packet.stream.index]
+            target.mux(packet)
+    return path

@@ -1,4 +1,6 @@
+import asyncio
 import socket
+import sqlite3
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -7,6 +9,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+
+from lipmotion.errors import ExportError, InputError
 
 uvicorn = pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
@@ -17,6 +21,7 @@ from starlette.routing import Route  # noqa: E402
 
 from lipmotion_studio.web import connections  # noqa: E402
 from lipmotion_studio.web.listening import open_socket  # noqa: E402
+from lipmotion_studio.web.replies import ERRORS  # noqa: E402
 
 LARGE, SMALL = 1 << 26, b"small"
 PATIENCE_S = 60.0
@@ -180,3 +185,11 @@ def test_who_takes_a_reply_drop_by_drop_is_closed(bytes_s, is_served, monkeypatc
         if not is_paused:
             client.resume_writing()
     assert bool(ended) != is_served
+
+
+@pytest.mark.parametrize("kind", [ExportError, OSError, MemoryError, sqlite3.OperationalError, InputError])
+def test_a_full_disk_or_memory_is_a_refusal_that_says_nothing_of_the_machine(kind):
+    handler = next(ERRORS[each] for each in kind.__mro__ if each in ERRORS)
+    reply = asyncio.run(handler(None, kind("/home/ann: no space left")))  # type: ignore[arg-type]
+    assert reply.status_code == (422 if kind is InputError else 503)
+    assert (b"/home" in reply.body) == (kind is InputError)
