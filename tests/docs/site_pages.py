@@ -23,7 +23,7 @@ COMMAND = re.compile(r"(?:lipmotion|python|make|pip|ffmpeg|dask|export) ")
 def settings() -> ModuleType:
     """Return the settings of the site, which do not need Sphinx."""
     spec = importlib.util.spec_from_file_location("site_settings", ROOT / "docs" / "conf.py")
-    module = importlib.util.module_from_spec(spec)
+    module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
     spec.loader.exec_module(module)
     return module
 
