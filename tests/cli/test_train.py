@@ -117,15 +117,6 @@ def test_other_voices_are_learned_from_but_those_for_judging(run, toy_model, toy
     assert speakers == [["friend", "rms"], ["rms"], []]
 
 
-def test_an_engine_without_a_use_for_voices(run, toy_corpus, here, monkeypatch):
-    sentence = toy_sentences(3)[0]
-    one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
-    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthesise_sentences", lambda **_: iter([one]))
-    refused = run("train", toy_corpus.path, "-o", "other", "--voices")
-    check_refused(refused, 3, "the engine 'trajectory' does not learn from other voices without motion")
-    assert list(here.iterdir()) == []
-
-
 UNUSABLE = [
     ("missing -o m", 4, "missing: no such corpus; make one"),
     ("folder -o m", 4, "folder: not a corpus"),

@@ -69,12 +69,6 @@ def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
     assert low <= row["acc"] <= high
 
 
-def test_counts_that_cannot_be(toy_corpus):
-    for count in (-1, 1, 9):
-        with pytest.raises(InputError, match=f"{count} folds; required: from 2 to 8, which is how many"):
-            folds(toy_corpus, count=count)
-
-
 def test_corpora_that_cannot_be(toy_corpus, tmp_path):
     with pytest.raises(CorpusError, match="no utterances of split 'train'"):
         folds(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))

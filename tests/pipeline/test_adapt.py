@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, adapt, animate, load_model, save_model
-from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.errors import InputError
 from lipmotion.pipeline.model import read_header
 from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
-from pipeline.test_model import npy, rewritten
 
 
 @pytest.fixture(scope="module")
@@ -61,13 +60,6 @@ def test_an_earlier_adaptation_is_forgotten(adapted, toy_model, toy_speech):
     again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
     assert np.array_equal(again.adaptation.own, fresh.adaptation.own)
     assert again.about == fresh.about
-
-
-def test_a_damaged_adaptation(adapted_file, tmp_path):
-    for changes in ({"adaptation/own.npy": None}, {"adaptation/numbers.npy": npy(np.array([np.nan, 1.0]))}):
-        path = rewritten(adapted_file, tmp_path / "m.lipmotion", changes)
-        with pytest.raises(ModelFormatError, match=r"m.lipmotion: the adaptation is damaged .+ adapt the model again"):
-            load_model(path)
 
 
 def test_a_list_of_recordings_is_required(toy_model):

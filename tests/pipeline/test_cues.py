@@ -29,20 +29,6 @@ def test_results_that_have_no_cues(result):
         lipmotion.cues(replace(result, motion=replace(result.motion, values=broken)))
 
 
-def test_all_outputs_are_checked_before_the_first_is_written(result, tmp_path):
-    (tmp_path / "speech.dat").touch()
-    sheet = lipmotion.cues(result)
-    for names, form, words in (
-        (["a.tsv", "b.txt"], None, "unknown cue format '.txt'; required one of: .tsv .xml .json .dat"),
-        (["a.tsv", "missing/b.dat"], None, "the folder .*missing does not exist"),
-        (["a.tsv"], "csv", "unknown cue format 'csv'; required one of: tsv xml json dat"),
-        (["a.tsv", "speech.dat"], None, "is the recording itself"),
-    ):
-        with pytest.raises(ExportError, match=words):
-            lipmotion.write_cues(sheet, [tmp_path / name for name in names], speech=tmp_path / "speech.dat", form=form)
-        assert [path.name for path in tmp_path.iterdir()] == ["speech.dat"]
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("late", [0, 37])
 def test_each_line_of_a_stem_has_the_motion_and_the_cues_of_the_line_alone(toy_model, late):

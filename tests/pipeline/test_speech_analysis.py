@@ -147,13 +147,6 @@ def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other():
         as_request(Request("a.wav", "mama"), "papa")
 
 
-def test_every_recogniser_is_named(toy_model, toy_sentence):
-    with pytest.raises(InputError) as refused:
-        analyse(toy_model, Request(toy_sentence.audio, recogniser="best"))
-    required = "required one of: auto, words, fast, own, general, whisper, vosk"
-    assert str(refused.value) == f"unknown recogniser 'best'; {required}"
-
-
 @pytest.mark.parametrize("kind", ["own", "auto"])
 def test_a_recording_without_speech(toy_model, kind, caplog):
     request = Request(Audio(np.zeros(16_000, np.float32), 16_000), recogniser=kind)

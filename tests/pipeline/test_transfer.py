@@ -7,7 +7,7 @@ import pytest
 import lipmotion
 from lipmotion import Corpus, Model, animate, explain, load_model, map_onto, save_model, train, with_person
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.request import Onto, Request
@@ -175,19 +175,6 @@ def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
         animate(request(toy_sentence, corpus), model=toy_model)
     with pytest.raises(InputError, match="the corpus is empty"):
         animate(request(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
-
-
-def test_what_is_no_person(toy_model, toy_sentence, tmp_path):
-    (tmp_path / "empty.mp4").touch()
-    for onto, error, message in (
-        (tmp_path, CorpusError, "not a corpus"),
-        (tmp_path / "missing.mp4", InputError, "no such file"),
-        (tmp_path / "empty.mp4", InputError, "the file is empty; give a video"),
-    ):
-        with pytest.raises(error, match=message):
-            animate(request(toy_sentence, onto), model=toy_model)
-    with pytest.raises(InputError, match="onto the speaker 'ben', but of what"):
-        animate(request(toy_sentence, onto_speaker="ben"), model=toy_model)
 
 
 @pytest.mark.recordings

@@ -1,5 +1,4 @@
 import json
-import shutil
 from dataclasses import replace
 from typing import Any
 
@@ -85,16 +84,6 @@ def test_nothing_is_written_unless_everything_can_be(result, toy_model, toy_spee
         with pytest.raises(error, match=message):
             write(given, [tmp_path / "good.csv", tmp_path / bad], **(plain | options))
         assert [path.name for path in tmp_path.iterdir()] == ["folder.json"]
-
-
-def test_the_recording_is_not_overwritten(result, toy_speech, tmp_path):
-    recording = tmp_path / "speech.mp4"
-    shutil.copy(toy_speech, recording)
-    (tmp_path / "link.mp4").symlink_to(recording)
-    for name in ("speech.mp4", "link.mp4"):
-        with pytest.raises(ExportError, match="is the recording itself; give another name"):
-            write(result, [tmp_path / name], speech=recording)
-    assert recording.read_bytes() == toy_speech.read_bytes()
 
 
 def test_some_channels_to_one_file(result, toy_model, tmp_path):

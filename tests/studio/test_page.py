@@ -501,26 +501,6 @@ def test_every_screen(page):
 
 
 @pytest.mark.parametrize("opens", BOTH)
-def test_a_killed_studio_has_every_edit(opens, tmp_path):
-    (tmp_path / "home").mkdir()
-    with opens(tmp_path / "home", *WEBGL) as window:
-        page = Page(window, tmp_path / "project")
-        with served(tmp_path / "project", WELCOME) as address:
-            window.open(address)
-            page.ready()
-            page.choose(3)
-            page.edit(lambda: window.press("s"), r"split phone 3 at \S+")
-            steps = page.steps
-        window.open("about:blank")
-        with served(tmp_path / "project") as address:
-            window.open(address)
-            page.ready()
-            assert page.steps == steps
-            window.press_together(CONTROL, "z")
-            wait_until(lambda: page.steps == [], LIMIT_S)
-
-
-@pytest.mark.parametrize("opens", BOTH)
 def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file):
     (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))

@@ -1,10 +1,8 @@
 from itertools import pairwise
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from lipmotion import Lexicon
 from lipmotion.errors import ExportError, InputError
@@ -12,6 +10,7 @@ from lipmotion.testing.toy import LIP_LEAD_S, LIPS_TOUCH, WORDS, ToySentence, to
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units.phones import SILENCE
 from lipmotion_faces.testing import write_toy_recordings
+from lipmotion_faces.tracking.track import track
 
 FPS = 25.0
 
@@ -122,11 +121,6 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return write_toy_recordings(tmp_path_factory.mktemp("toy") / "new", sentences=3)
 
 
-def pictures(video: Path) -> list[NDArray[np.uint8]]:
-    with av.open(str(video)) as container:
-        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
-
-
 def test_recordings_come_with_transcripts_and_lists(recordings):
     folder = recordings[0].parent
     sentences = toy_sentences(3)
@@ -151,28 +145,13 @@ def test_recordings_say_what_is_wrong(tmp_path):
         write_toy_recordings(tmp_path / "file", sentences=3)
 
 
-def tracked_opening(video: Path) -> NDArray[np.float64]:
-    """Return |13 − 14| / |33 − 263| per frame, in pixels; NaN where no face is found."""
-    mediapipe = pytest.importorskip("mediapipe")
-    openings = []
-    with mediapipe.solutions.face_mesh.FaceMesh(max_num_faces=1, refine_landmarks=True) as mesh:
-        for picture in pictures(video):
-            found = mesh.process(picture).multi_face_landmarks
-            height, width, _ = picture.shape
-            points = (
-                {i: np.array([p.x * width, p.y * height]) for i, p in enumerate(found[0].landmark)} if found else {}
-            )
-            openings.append(
-                np.linalg.norm(points[13] - points[14]) / np.linalg.norm(points[33] - points[263]) if found else np.nan
-            )
-    return np.array(openings)
-
-
 @pytest.mark.long
 @pytest.mark.video
 def test_toy_faces_can_be_tracked(recordings):
+    pytest.importorskip("mediapipe")
     for path, sentence in zip(recordings, toy_sentences(3), strict=True):
-        opening, known = tracked_opening(path), toy_motion(sentence.units, FPS)["opening"]
-        assert np.isfinite(opening).all()
+        tracked, known = track(path, crops=False), toy_motion(sentence.units, FPS)["opening"]
+        opening = tracked.motion["opening"]
+        assert tracked.seen.all()
         assert np.corrcoef(opening, known)[0, 1] > 0.9
         assert np.median(opening[known == 0]) < 0.3 * np.percentile(opening, 95)

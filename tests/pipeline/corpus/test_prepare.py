@@ -11,7 +11,7 @@ import pytest
 from children import NOWHERE, child
 from lipmotion import Corpus, prepare
 from lipmotion.corpora.entry import read_entry
-from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.storage.files import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Track
 from lipmotion_faces.corpus import prepare as module
@@ -149,13 +149,6 @@ def test_utterances_of_recordings_that_are_gone_are_named(studio, tmp_path, capl
     assert (
         "2 utterances are from recordings that are no longer there, or cannot be used any longer: a, c;" in caplog.text
     )
-
-
-@pytest.mark.usefixtures("tracked")
-def test_nothing_usable(tmp_path):
-    write_noise(tmp_path / "studio" / "broken.mp4", seed=5)
-    with pytest.raises(CorpusError, match=r"none of 1 recordings is usable; the first, broken: .*no face in 25"):
-        prepare(tmp_path / "studio", tmp_path / "corpus", workers=1)
 
 
 def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):

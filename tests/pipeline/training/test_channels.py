@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion import Corpus, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
+from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network
@@ -101,13 +101,6 @@ def test_what_is_missing_is_reported(utterances, space, tmp_path):
         train(corpus, visual="lips")
 
 
-def test_pictures_of_two_sizes_are_refused(utterances):
-    track = utterances[1].track
-    small = replace(utterances[1], track=replace(track, crops=np.asarray(track.crops)[:, ::2]))
-    with pytest.raises(CorpusError, match="mouth pictures of 2 sizes"):
-        train_eigenlips([utterances[0], small])
-
-
 @pytest.mark.long
 def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models, toy_corpus):
     """Saved, loaded, and asked for the mouth of a sentence of the test list."""
@@ -176,14 +169,6 @@ def test_the_joint_engine_learns_pictures_too(toy_corpus):
     assert (
         evaluate(model, toy_corpus)["conditions"]["with transcript"]["eigenlips"]["channels"]["lips_r_01"]["acc"] > 0.5
     )
-
-
-def test_a_model_without_the_eigenlips_it_names_is_damaged(models, tmp_path):
-    model = load_model(models[BOTH])
-    assert model.visual == BOTH
-    save_model(replace(model, eigenlips=None), tmp_path / "without")
-    with pytest.raises(ModelFormatError, match="the model says visual 'both', which its eigenlips do not fit"):
-        load_model(tmp_path / "without")
 
 
 def test_motion_files_hold_the_coefficients_and_videos_need_an_opening(models, toy_speech, tmp_path):

@@ -108,13 +108,6 @@ def test_raters_who_prefer_one_side_have_a_share_of_one_half_and_no_interval():
     assert np.isnan(figures["bradley_terry"]["order"]["low"])
 
 
-def test_conditions_that_nothing_links_have_no_strengths():
-    answers = [pair_answer((f"r{r}", "s"), shown, bool(r % 2)) for r in range(4) for shown in (("a", "b"), ("c", "d"))]
-    figures = paired_figures(pair_table(answers))
-    assert figures["bradley_terry"] == {"missing": "no comparison links the groups a, b; c, d"}
-    assert len(figures["pairs"]) == 2
-
-
 @pytest.mark.parametrize("size", [(1, 6), (8, 1), (1, 1)])
 def test_one_rater_or_one_sentence(size):
     table = comparisons(np.random.default_rng(6), np.array([0, 0.2, 0.4]), size, USUAL)
