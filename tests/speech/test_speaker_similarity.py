@@ -1,11 +1,20 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lipmotion import Model
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.speaker_similarity import WARPS, speaker_similarity
+from lipmotion.speech.features.speaker_similarity import (
+    WARPS,
+    mean_speaker_vector,
+    speaker_similarity,
+    speaker_vector,
+    voice_knowledge,
+)
+from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 
@@ -45,3 +54,26 @@ def test_a_recording_is_judged_by_its_longest_passage(toy_model: Model) -> None:
         assert found.warp == alone.warp
         assert found.score == pytest.approx(alone.score, abs=1e-3)
     assert speaker_similarity(toy_model.phones, analysed(Audio(short.astype(np.float32), 16_000))).score != alone.score
+
+
+def test_a_known_voice_in_noise_is_not_a_stranger(toy_model: Model) -> None:
+    """Noise makes it dissimilar to its training; its speaker vector says more, and never less."""
+    sounds = [analysed(sentence.audio) for sentence in toy_sentences(6)]
+    old, known = (replace(toy_model.phones, speaker=speaker) for speaker in (None, mean_speaker_vector(sounds[:5])))
+    noisy = analysed(noisy_audio(sounds[5], "white", 15))
+    assert voice_knowledge(old, sounds[5]) == voice_knowledge(known, sounds[5]) > 0.9
+    assert voice_knowledge(known, noisy) > voice_knowledge(old, noisy) + 0.3
+    opposite = replace(known, speaker=-known.speaker)
+    assert voice_knowledge(opposite, noisy) == voice_knowledge(old, noisy)
+
+
+def test_a_speaker_vector_is_that_of_sound_alone() -> None:
+    sound = toy_sentences(3)[0].audio.samples
+    line = sound[: len(sound) // 320 * 320]
+    alone, longer, louder = (
+        speaker_vector(analysed(Audio((samples).astype(np.float32), 16_000)))
+        for samples in (line, np.pad(line, 32_000), line / 8)
+    )
+    assert longer == pytest.approx(alone, abs=0.2)
+    assert louder == pytest.approx(alone, abs=0.05)
+    assert not speaker_vector(analysed(Audio(np.zeros(16_000, np.float32), 16_000))).any()
