@@ -9,8 +9,7 @@ import pytest
 from cli.conftest import check_refused, is_one_error
 from lipmotion.storage.files import lock_folder
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion_studio.study.analysis.analyse import analyse_study
-from lipmotion_studio.study.analysis.analysis_table import analysis_table
+from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
 from lipmotion_studio.study.answers import read_answers, write_answers
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
 from study.analysis.simulated import Effects, comparisons, paired_answers, rated_answers, ratings

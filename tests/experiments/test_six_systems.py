@@ -17,8 +17,15 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser, cached_recogniser
 from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.storage.archive import read_archive
-from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out
-from lipmotion_lab.noise import LONGEST_S, NoiseConditions, add_noise, read_talkers
+from lipmotion_lab.evaluation.held_out import (
+    LONGEST_S,
+    HeldOutRecordings,
+    NoiseConditions,
+    add_noise,
+    generate_clips,
+    load_held_out,
+    read_talkers,
+)
 from lipmotion_lab.runner import ExperimentSettings
 from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_FILES

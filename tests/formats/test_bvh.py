@@ -14,7 +14,7 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.formats import write_motion
 from lipmotion.formats.bvh import CENTIMETRES
-from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 FRAMES = 60

@@ -14,7 +14,7 @@ from lipmotion import read_motion
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import write_motion
 from lipmotion.meshes.files.gltf_document import read_gltf_document
-from lipmotion.meshes.model.bones import ANGLES, head_quaternions
+from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
 from lipmotion.types import Generation
 
 NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES)

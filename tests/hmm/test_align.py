@@ -10,7 +10,7 @@ from lipmotion.hmm.align import (
     place_words,
     spread_windows,
 )
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.kernels.paths import Windows
 from oracles import sequences
 

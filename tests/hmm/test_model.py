@@ -4,8 +4,8 @@ import pytest
 from hmm.synthetic import random_hmm
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.align import align_units
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import hmm_from_arrays, hmm_to_arrays, make_plain_states
+from lipmotion.hmm.network import compute_log_likelihoods
 
 TABLE = make_plain_states(("sil", "sp", "b", "ih"), (3, 1, 3, 3), free=("sil", "sp")).extend(("b.0<ih", "b.2>sil"))
 

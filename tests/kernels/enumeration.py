@@ -16,8 +16,7 @@ from lipmotion.kernels import forward_backward
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_loops import factorial_best_path
 from lipmotion.kernels.network import ForwardBackwardNetwork
-from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, sample_paths
-from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, cheapest_arrivals, sample_paths, trace_back
 from oracles import chains, networks, paths, trellis
 from oracles import factorial as factorial_oracle
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.trellis import best_segments
+from lipmotion.kernels.paths import best_segments
 from oracles import segments
 
 

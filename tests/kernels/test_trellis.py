@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import cheapest_arrivals, trace_back
 from oracles import trellis
 
 SEEDS = st.integers(0, 2**32 - 1)

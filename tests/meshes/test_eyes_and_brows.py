@@ -10,7 +10,7 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights
-from lipmotion.meshes.model.bones import ANGLES
+from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline
 from lipmotion.types.moods import parse_moods
 from lipmotion.types.motion import RADIAN

@@ -11,8 +11,12 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import FADE_S, crossfade_phones
 from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
-from lipmotion.meshes.fitting.oculus_visemes import MAX_CLOSED_WEIGHT, VISEME_OF_PHONE, weigh_visemes
-from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
+from lipmotion.meshes.fitting.shape_weights import (
+    MAX_CLOSED_WEIGHT,
+    VISEME_OF_PHONE,
+    solve_shape_weights,
+    weigh_visemes,
+)
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import PHONES

@@ -4,7 +4,7 @@ from itertools import permutations
 import pytest
 
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion_studio.study.trials import (
+from lipmotion_studio.study.manifest import (
     anchor_trials,
     attention_trials,
     list_questions,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion_faces.base import rotate_head
-from lipmotion_faces.head.forms import MOUTH_Y, head
+from lipmotion_faces.head.part import MOUTH_Y, head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import REST
 from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh

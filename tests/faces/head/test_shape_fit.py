@@ -8,9 +8,8 @@ import pytest
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.shape_fit import mouth_weights
 from lipmotion_faces.head.skin import REST
-from lipmotion_faces.head.stage import POSES, figure, head_mesh
+from lipmotion_faces.head.stage import POSES, figure, head_mesh, mouth_weights
 
 SAID = {
     "rest": REST,

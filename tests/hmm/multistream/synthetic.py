@@ -5,8 +5,14 @@ from itertools import product
 import numpy as np
 
 from lipmotion.hmm.multistream.densities import GaussianStatistics, StreamScale, TiedDensities
-from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest
-from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
+from lipmotion.hmm.multistream.model import (
+    JointConfig,
+    JointHmm,
+    StreamModel,
+    TreeCosts,
+    context_questions,
+    grow_forest,
+)
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance
 from lipmotion.hmm.multistream.streams import (
     F0_STREAMS,

@@ -10,13 +10,15 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream import densities
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.model import MOTION_ONLY
-from lipmotion.hmm.multistream.multistream_baum_welch import (
+from lipmotion.hmm.multistream.multistream_training import (
+    TrainingUtterance,
     accumulate_statistics,
     iterate_posteriors,
+    mean_log_likelihood,
     prepare_utterances,
     reestimate_hmm,
+    train_joint,
 )
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, mean_log_likelihood, train_joint
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, Stream, StreamObservations, StreamWeights
 from lipmotion.types import Progress

@@ -7,11 +7,11 @@ from hmm.multistream.synthetic import observed, random_joint, utterances
 from kernels.networks import network_posteriors
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import build_unit_loop, decode_units
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm
 from lipmotion.hmm.multistream.recognise import JointRecogniser, build_context_loop
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import expand_triphones
+from lipmotion.hmm.network import compute_log_likelihoods
 from oracles import joint as slow
 from oracles.sequences import sequences
 

@@ -16,15 +16,11 @@ SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
 STREAMS = (SPEECH, *F0_STREAMS, MOTION)
 ACOUSTIC_STREAMS = (SPEECH, *F0_STREAMS)
-"""The streams that are computed from sound."""
 
 
 @dataclass(frozen=True)
 class StreamWeights:
-    """Factors of the streams' log densities; 0 switches a stream off.
-
-    Raises InputError: a weight is negative or not finite.
-    """
+    """Factors of the streams' log densities; 0: off. Raises InputError: a weight is negative or not finite."""
 
     speech: float = 1.0
     f0: float = 1.0
@@ -48,11 +44,7 @@ class StreamWeights:
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """One kind of data of an utterance.
-
-    values : [shape=(T, D)], any finite number where they are not known
-    known  : [shape=(T,)], whether a frame has a value; for F0, whether it is voiced
-    """
+    """One kind of data of an utterance [shape=(T, D)], and which frames have a value, or are voiced [shape=(T,)]."""
 
     values: NDArray[np.floating[Any]]
     known: NDArray[np.bool_]

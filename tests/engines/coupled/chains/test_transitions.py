@@ -1,8 +1,8 @@
 import numpy as np
 
 from engines.coupled.tiny import THREE, TWO, chains, structure
+from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM
-from lipmotion.engines.coupled.chains.transitions import Transitions
 
 
 def expected_log_likelihood(transitions: Transitions, counts) -> float:
