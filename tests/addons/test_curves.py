@@ -1,9 +1,3 @@
-"""What the add-on for Blender does without Blender: files, names, frames."""
-
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -23,7 +17,7 @@ def generation() -> Generation:
 
 
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".livelink.csv"])
-def test_files_of_lipmotion_are_read(tmp_path: Path, generation: Generation, suffix: str) -> None:
+def test_files_of_lipmotion_are_read(tmp_path, generation, suffix):
     path = tmp_path / f"a{suffix}"
     write_motion(path, generation, source={}, model={})
     curves, times = read_motion(str(path))
@@ -33,7 +27,7 @@ def test_files_of_lipmotion_are_read(tmp_path: Path, generation: Generation, suf
         assert spelt[spelling(name)] == pytest.approx(generation.motion[name].tolist(), abs=1e-5)
 
 
-def test_a_take_at_30_frames_keeps_its_time(tmp_path: Path) -> None:
+def test_a_take_at_30_frames_keeps_its_time(tmp_path):
     codes = [f"01:59:59:{frame:02d}.500" for frame in (50, 52, 54, 56, 58)] + ["02:00:00:00.500"]
     rows = "".join(f"{code},61,0.5\n" for code in codes) + "02:00:00:02.500,0\n"
     (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
@@ -60,7 +54,7 @@ def _drop_frame(number: int) -> str:
     ids=["30 a second", "24 a second", "midnight", "drop-frame", "parts of a second", "less than a second"],
 )
 @pytest.mark.parametrize("head", ["Timecode,BlendShapeCount,JawOpen,TongueOut", "Timecode,JawOpen,TongueOut"])
-def test_a_take_is_read_as_the_library_reads_it(tmp_path: Path, codes: list[str], head: str) -> None:
+def test_a_take_is_read_as_the_library_reads_it(tmp_path, codes, head):
     """Also with a row without a face, empty or of the count 0, which is bridged by a straight line."""
     count = "61," if "Count" in head else ""
     lines = [f"{code},{count}{number / 100},{number % 2}" for number, code in enumerate(codes)]
@@ -74,7 +68,7 @@ def test_a_take_is_read_as_the_library_reads_it(tmp_path: Path, codes: list[str]
         assert np.interp(library.time_s, times, curves[name]) == pytest.approx(library[other], abs=1e-3)
 
 
-def test_a_take_that_is_damaged_and_other_files_are_refused(tmp_path: Path) -> None:
+def test_a_take_that_is_damaged_and_other_files_are_refused(tmp_path):
     for line, message in (
         ("soon,61,0.5", "'soon' is no timecode"),
         ("10:00:00:02.000,61", "no rows with values"),
@@ -92,24 +86,24 @@ def test_a_take_that_is_damaged_and_other_files_are_refused(tmp_path: Path) -> N
                 read_motion(str(tmp_path / name))
 
 
-def test_a_row_of_the_time_before_is_left_out(tmp_path: Path) -> None:
+def test_a_row_of_the_time_before_is_left_out(tmp_path):
     rows = "".join(f"10:00:00:{frame:02d}.000,61,{n / 10}\n" for n, frame in enumerate((10, 12, 12, 11, 14)))
     (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
     assert read_motion(str(tmp_path / "take.csv"))[0] == {"JawOpen": [0.0, 0.1, 0.4]}
 
 
-def test_spellings_of_one_name() -> None:
+def test_spellings_of_one_name():
     names = ("mouthSmile_L", "mouthSmileLeft", "MouthSmileLeft", "head.mouthSmile_L", "Mouth Smile l")
     assert {spelling(name) for name in names} == {"mouthsmileleft"}
 
 
-def test_curves_find_their_shape_keys() -> None:
+def test_curves_find_their_shape_keys():
     keys = ["Basis", "head.jawOpen", "mouthSmile_R", "mouthSmileLeft", "mouthSmile_L"]
     found = matched(["jawOpen", "mouthSmileLeft", "mouthSmileRight", "tongueOut"], keys)
     assert found == {"jawOpen": "head.jawOpen", "mouthSmileLeft": "mouthSmileLeft", "mouthSmileRight": "mouthSmile_R"}
 
 
-def test_controls_are_told_from_shapes() -> None:
+def test_controls_are_told_from_shapes():
     assert control("jaw.master.rotation.x") == ("jaw.master", "rotation", "x")
     assert control("rig bone[open]") == ("rig bone", "property", "open")
     assert control("[lips]") == ("", "property", "lips")
@@ -117,7 +111,7 @@ def test_controls_are_told_from_shapes() -> None:
     assert control("Jaw.rotateX") is None
 
 
-def test_frames_lie_on_straight_lines_between_values() -> None:
+def test_frames_lie_on_straight_lines_between_values():
     times = [number / 100 for number in range(101)]
     curves = {"tongueOut": [float(number**2) for number in range(101)]}
     frames = at_frames(curves, times, 24.0)["tongueOut"]
@@ -125,7 +119,7 @@ def test_frames_lie_on_straight_lines_between_values() -> None:
     assert frames == pytest.approx(np.interp(np.arange(25) / 24, times, curves["tongueOut"]).tolist())
 
 
-def test_lips_that_close_between_two_frames_are_closed_at_the_nearer_one() -> None:
+def test_lips_that_close_between_two_frames_are_closed_at_the_nearer_one():
     times = [number / 100 for number in range(101)]
     jaw = [0.3 + 0.0 * time_s for time_s in times]
     close = [0.0 if number != 52 else 0.3 for number in range(101)]
@@ -140,19 +134,19 @@ def test_lips_that_close_between_two_frames_are_closed_at_the_nearer_one() -> No
     assert late["mouthClose"][13] == pytest.approx(0.3)
 
 
-def test_curves_that_are_no_blendshapes_have_no_closures() -> None:
+def test_curves_that_are_no_blendshapes_have_no_closures():
     assert closures({"opening": [0.0, 0.1, 0.0]}, 3) == []
     assert at_frames({"a": []}, [], 24.0) == {"a": []}
 
 
-def test_held_curves_are_not_interpolated() -> None:
+def test_held_curves_are_not_interpolated():
     curves = {"browInnerUp": [0.0, 1.0, 0.0], "a": [0.0, 1.0, 0.0]}
     found = at_frames(curves, [0.0, 0.1, 0.2], 20.0, ("a",))
     assert found["browInnerUp"] == pytest.approx([0, 0.5, 1, 0.5, 0])
     assert found["a"] == pytest.approx([0, 0, 1, 1, 0])
 
 
-def test_held_poses_last_as_long_at_other_frames() -> None:
+def test_held_poses_last_as_long_at_other_frames():
     jaw = np.repeat([0.3, 0.0, 0.4], [10, 10, 10]).tolist()
     found = at_frames({"jawOpen": jaw}, (np.arange(30) / 100).tolist(), 24.0, ("jawOpen",))
     assert found["jawOpen"] == pytest.approx([0.3, 0.3, 0.3, 0.0, 0.0, 0.4, 0.4])

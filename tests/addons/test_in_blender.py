@@ -1,7 +1,3 @@
-"""The add-on and the script in Blender itself: what is evaluated at frames is the motion."""
-
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -13,24 +9,15 @@ from lipmotion import write
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.formats.blender import write_addon
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.types import Audio, Generation, StateTrace
-from meshes.speech import motion, units
+from lipmotion.types import Audio, Generation
+from pipeline.conftest import generation
 from programs import python_with, run_with
 
-pytestmark = [
-    pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)"),
-    pytest.mark.long,
-]
+__all__ = ["generation"]
+pytestmark = [pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)"), pytest.mark.long]
 ROUNDED = 5e-5
 """The frames that show a closure are chosen among values of five decimals, or of six."""
 RIG = "jaw.master.rotation.x,jawOpen,25\njaw.master[open],opening,1\n[lips],opening,2\n"
-
-
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +40,14 @@ def sound() -> Audio:
     return Audio(np.zeros(2 * 48_000, np.float32), 48_000)
 
 
+def of_mouth(found: dict[str, Any], wanted: dict[str, list[float]], names: Path) -> float:
+    """Return the largest difference of the mouth in all frames."""
+    listed = json.loads(names.read_text())
+    mouth = [name for name in listed if name.startswith(("jaw", "mouth"))]
+    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
+    return float(np.abs(values - np.array([wanted[name] for name in mouth]).T).max())
+
+
 def compare(found: dict[str, Any], wanted: dict[str, list[float]], names: Path, least: float) -> None:
     """Compare all frames of both faces; the earlier keys at frames 2 and 500 are gone."""
     listed = json.loads(names.read_text())
@@ -68,9 +63,7 @@ def compare(found: dict[str, Any], wanted: dict[str, list[float]], names: Path, 
 
 
 @pytest.mark.parametrize("kind", ["legacy", "extension"])
-def test_the_addon_keys_a_face(
-    kind: str, generation: Generation, wanted: dict[str, list[float]], names: Path, sound: Audio, tmp_path: Path
-) -> None:
+def test_the_addon_keys_a_face(kind, generation, wanted, names, sound, tmp_path):
     write_addon("blender", tmp_path / "addon.zip")
     curves, chosen = with_curves(generation, "face")
     write(curves, [tmp_path / "a.json", tmp_path / "a.wav"], speech=sound, channels=chosen)
@@ -80,38 +73,22 @@ def test_the_addon_keys_a_face(
     compare(found, wanted, names, 1e-5)
 
 
-def test_the_addon_keys_from_a_take_of_live_link_face(
-    generation: Generation, wanted: dict[str, list[float]], names: Path, sound: Audio, tmp_path: Path
-) -> None:
+def test_the_addon_keys_from_a_take_of_live_link_face(generation, wanted, names, sound, tmp_path):
     write_addon("blender", tmp_path / "addon.zip")
     write(generation, [tmp_path / "a.livelink.csv", tmp_path / "a.wav"], speech=sound, rate_hz=100.0)
     files = (tmp_path / "addon.zip", tmp_path / "a.livelink.csv", tmp_path / "a.wav", names)
     found = run_with("bpy", "blender_keys.py", "legacy", *files, folder=tmp_path / "user")
-    mouth = [name for name in json.loads(names.read_text()) if name.startswith(("jaw", "mouth"))]
-    listed = json.loads(names.read_text())
-    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
-    assert (
-        np.abs(values - np.array([wanted[name] for name in mouth]).T).max() < 5e-5
-    )  # frames that show a closure are chosen among rounded values
+    assert of_mouth(found, wanted, names) < ROUNDED
 
 
-def test_the_script_keys_a_face(
-    generation: Generation, names: Path, sound: Audio, wanted: dict[str, list[float]], tmp_path: Path
-) -> None:
+def test_the_script_keys_a_face(generation, names, sound, wanted, tmp_path):
     write(generation, [tmp_path / "a.blender.py", tmp_path / "a.wav"], speech=sound)
     found = run_with("bpy", "blender_keys.py", "script", tmp_path / "a.blender.py", names)
-    listed = json.loads(names.read_text())
-    mouth = [name for name in listed if name.startswith(("jaw", "mouth"))]
-    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
-    assert (
-        np.abs(values - np.array([wanted[name] for name in mouth]).T).max() < 5e-5
-    )  # frames that show a closure are chosen among rounded values
+    assert of_mouth(found, wanted, names) < ROUNDED
     assert found["strips"] == ["lipmotion sound"] * found["plays_sound"]
 
 
-def test_the_script_keys_bones_and_properties(
-    generation: Generation, names: Path, sound: Audio, tmp_path: Path
-) -> None:
+def test_the_script_keys_bones_and_properties(generation, names, sound, tmp_path):
     (tmp_path / "rig.csv").write_text("control,source,gain\n" + RIG)
     curves, chosen = with_curves(generation, tmp_path / "rig.csv")
     write(curves, tmp_path / "a.blender.py", speech=sound, channels=chosen)

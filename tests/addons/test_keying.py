@@ -1,9 +1,6 @@
-"""What the add-on does with a scene, with a stand-in for Blender's."""
-
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,7 +20,7 @@ class Strips(list[Any]):
 @pytest.mark.parametrize(
     ("sound_s", "start", "played_from"), [(0.0, 10, 10), (0.5, 22, 22), (-0.5, -2, 10)]
 )  # fmt: skip
-def test_the_sound_is_where_the_motion_is(sound_s: float, start: int, played_from: int, tmp_path: Path) -> None:
+def test_the_sound_is_where_the_motion_is(sound_s, start, played_from, tmp_path):
     path = tmp_path / "a.wav"
     path.write_bytes(b"")
     strips = Strips()
@@ -51,13 +48,13 @@ def keyed(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Curve]]:
     return key
 
 
-def test_held_curves_are_held_between_keys(keyed: Callable[..., list[Curve]]) -> None:
+def test_held_curves_are_held_between_keys(keyed):
     curves = keyed([0.0, 1.0], 1.0, stepped=("jawOpen",))
     kinds = [{point.interpolation for point in curve.keyframe_points} for curve in curves]
     assert kinds == [{"CONSTANT"}, {"LINEAR"}]
 
 
-def test_keys_beside_those_of_a_take_are_kept_where_that_is_asked(keyed: Callable[..., list[Curve]]) -> None:
+def test_keys_beside_those_of_a_take_are_kept_where_that_is_asked(keyed):
     keyed([0.5] * 5, 1.0)
     curve, _ = keyed([1.0, 1.0, 1.0], 2.0, replace=False)
     assert [point.co for point in curve.keyframe_points] == [(1, 0.5), (2, 1.0), (3, 1.0), (4, 1.0), (5, 0.5)]

@@ -1,13 +1,12 @@
-from __future__ import annotations
-
 import json
-import wave
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from children import LIPMOTION, environment, run_child
 from lipmotion.cli.main import main
@@ -28,7 +27,6 @@ RunCommand = Callable[..., Done]
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty current folder."""
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -62,6 +60,11 @@ def run_outside() -> RunCommand:
     return run
 
 
+@pytest.fixture
+def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
+    return ("animate", toy_speech, "--model", toy_model_file)
+
+
 @pytest.fixture(scope="session")
 def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model file of a later version."""
@@ -85,11 +88,7 @@ def bad_speech(here: Path) -> dict[str, Path]:
     (folder / "empty.wav").touch()
     (folder / "text.wav").write_text("words, not sound\n" * 50)
     write_pictures(folder / "mute.mp4")
-    with wave.open(str(folder / "short.wav"), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(16_000)
-        file.writeframes(bytes(1000))
+    wavfile.write(folder / "short.wav", 16_000, np.zeros(500, "<i2"))
     names = {"missing": "nothing.wav", "empty": "empty.wav", "text": "text.wav", "mute": "mute.mp4"}
     names |= {"short": "short.wav", "folder": "folder", "long name": "x" * 300 + ".wav"}
     return {what: folder / name for what, name in names.items()}
@@ -98,3 +97,9 @@ def bad_speech(here: Path) -> dict[str, Path]:
 def is_one_error(done: Done, code: int) -> bool:
     """Return whether a command printed one error line, and nothing else."""
     return done.code == code and done.out == [] and len(done.err) == 1 and done.err[0].startswith("lipmotion: error: ")
+
+
+def check_refused(done: Done, code: int, words: str) -> None:
+    """Raise AssertionError unless a command printed one error line with some words, and nothing else."""
+    assert is_one_error(done, code), done
+    assert words in done.err[0]

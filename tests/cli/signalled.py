@@ -6,8 +6,6 @@ modules, at the very end); and the arguments of ``lipmotion``. Without a signal 
 file ``steps``.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -1,14 +1,8 @@
-"""``lipmotion batch`` as a command."""
-
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
 
 import pytest
-
-from cli.conftest import RunCommand
 
 
 @pytest.fixture
@@ -20,7 +14,7 @@ def sounds(here: Path, toy_speech: Path) -> Path:
     return folder
 
 
-def test_a_folder(run: RunCommand, sounds: Path, toy_model_file: Path, here: Path) -> None:
+def test_a_folder(run, sounds, toy_model_file, here):
     words = ["batch", sounds, "--out", "out", "--to", "csv,cues.tsv", "--model", toy_model_file, "--jobs", "1"]
     words += ["--channels", "opening,width", "--rate", "25"]
     done = run(*words)
@@ -32,7 +26,7 @@ def test_a_folder(run: RunCommand, sounds: Path, toy_model_file: Path, here: Pat
     }  # fmt: skip
 
 
-def test_the_frame_rate_is_that_of_animate(run: RunCommand, sounds: Path, toy_model_file: Path, here: Path) -> None:
+def test_the_frame_rate_is_that_of_animate(run, sounds, toy_model_file, here):
     (sounds / "b.wav").unlink()
     basics = ["--model", toy_model_file, "--fps", "30", "--recogniser", "own"]
     assert run("batch", sounds, "--out", "out", *basics, "--jobs", "1").code == 0
@@ -40,9 +34,7 @@ def test_the_frame_rate_is_that_of_animate(run: RunCommand, sounds: Path, toy_mo
     assert (here / "out" / "a.json").read_bytes() == (here / "a.json").read_bytes()
 
 
-def test_a_line_that_fails_is_told_by_the_exit_code(
-    run: RunCommand, sounds: Path, toy_model_file: Path, here: Path
-) -> None:
+def test_a_line_that_fails_is_told_by_the_exit_code(run, sounds, toy_model_file, here):
     (sounds / "b.wav").write_text("no sound")
     done = run("batch", sounds, "--out", "out", "--model", toy_model_file, "--jobs", "1", "--machine-readable")
     events = [json.loads(line) for line in done.out]
@@ -55,7 +47,7 @@ def test_a_line_that_fails_is_told_by_the_exit_code(
     assert (here / "out" / "a.json").is_file()
 
 
-def test_what_it_refuses(run: RunCommand, sounds: Path, toy_model_file: Path, here: Path) -> None:
+def test_what_it_refuses(run, sounds, toy_model_file, here):
     for words, code in [
         ((sounds, "--out", sounds / "out"), 7),
         ((sounds, "--out", "out", "--to", "wav"), 7),
@@ -66,7 +58,7 @@ def test_what_it_refuses(run: RunCommand, sounds: Path, toy_model_file: Path, he
         assert (done.code, len(done.err)) == (code, 1), done
 
 
-def test_a_check_writes_nothing(run: RunCommand, sounds: Path, here: Path) -> None:
+def test_a_check_writes_nothing(run, sounds, here):
     done = run("batch", "--check", sounds, "--jobs", "1")
     assert done.code == 3
     assert done.out == ["problem\tline\tfound", "same sound\tb\tas of a"]

@@ -1,16 +1,11 @@
-"""Characters on the command line: looked into, animated, and driven elsewhere."""
-
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import av
-import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused
 from lipmotion import read_motion
 from lipmotion.meshes.files.character_files import read_character
 from meshes.heads import head, lip_points, write_glb
@@ -23,12 +18,7 @@ def glb(here: Path) -> Path:
     return here / "head.glb"
 
 
-@pytest.fixture
-def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
-    return ("animate", toy_speech, "--model", toy_model_file)
-
-
-def test_what_is_in_a_file_is_printed(run: RunCommand, glb: Path) -> None:
+def test_what_is_in_a_file_is_printed(run, glb):
     done = run("character", glb, "--write-points", "points.csv", "--picture", "head.png")
     assert done.code == 0
     assert done.out[0].startswith("vertices")
@@ -38,7 +28,7 @@ def test_what_is_in_a_file_is_printed(run: RunCommand, glb: Path) -> None:
     assert Path("head.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_table_is_written_calibrated_and_found(run: RunCommand, glb: Path, here: Path) -> None:
+def test_a_table_is_written_calibrated_and_found(run, glb, here):
     assert run("character", glb, "--write-table").out[-1].endswith("head.glb.character.csv")
     assert (here / "head.glb.character.csv").read_text(encoding="utf-8-sig").startswith("control,source,gain,offset,")
     done = run("character", glb, "--open", "jawOpen=0.3", "--closed", "jawOpen=0.02")
@@ -51,12 +41,10 @@ def test_a_table_is_written_calibrated_and_found(run: RunCommand, glb: Path, her
         (("character", glb, "--open", "0.3"), "--open: '0.3' names no control, required NAME=X"),
         (("character", "rig.csv"), "state values of its controls"),
     ):
-        done = run(*arguments)
-        assert is_one_error(done, 3)
-        assert message in done.err[0]
+        check_refused(run(*arguments), 3, message)
 
 
-def test_the_table_of_a_mouth_that_is_not_found_is_written_to_be_filled_in(run: RunCommand, here: Path) -> None:
+def test_the_table_of_a_mouth_that_is_not_found_is_written_to_be_filled_in(run, here):
     named = tuple(replace(shape, name=f"no {number}") for number, shape in enumerate(head().shapes))
     write_glb(here / "odd.glb", replace(head(), shapes=named))
     done = run("character", "odd.glb", "--write-table")
@@ -65,7 +53,7 @@ def test_the_table_of_a_mouth_that_is_not_found_is_written_to_be_filled_in(run: 
     assert (here / "odd.glb.character.csv").read_text(encoding="utf-8-sig").splitlines()[1] == "no 0,,1,0,0,1"
 
 
-def test_a_mesh_without_blendshapes_is_bound_once(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
+def test_a_mesh_without_blendshapes_is_bound_once(run, here, basics):
     plain = head(shapes=False)
     write_obj(here / "head.obj", plain)
     rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
@@ -79,7 +67,7 @@ def test_a_mesh_without_blendshapes_is_bound_once(run: RunCommand, here: Path, b
     assert done == (0, ["said.mp4"], [])
 
 
-def test_a_character_speaks(run: RunCommand, glb: Path, basics: tuple[object, ...], here: Path) -> None:
+def test_a_character_speaks(run, glb, basics, here):
     done = run(*basics, "--character", glb, "-o", "said.mp4", "said.json", "said.glb", "--fps", "3")
     assert done == (0, ["said.mp4", "said.json", "said.glb"], [])
     with av.open(str(here / "said.mp4")) as video:
@@ -94,33 +82,11 @@ def test_a_character_speaks(run: RunCommand, glb: Path, basics: tuple[object, ..
     assert stored["animations"][0]["name"] == "speech"
 
 
-def test_curves_without_a_mesh(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
-    for curves, first in (("arkit", "jawForward"), ("visemes", "viseme_sil"), ("fap", "fap3_open_jaw")):
-        assert run(*basics, "--curves", curves, "-o", "curves.csv").code == 0
-        assert (here / "curves.csv").read_text().startswith(f"time_s,{first},")
-
-
-def test_a_rig_of_the_users_own(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
-    (here / "rig.csv").write_text("control,source,gain\nJaw,jawOpen,-25\nDrop,opening,1\nOh,viseme_oh,1\n")
-    assert run(*basics, "--curves", "rig.csv", "-o", "rig.json", "--rate", "25").code == 0
-    motion, _ = read_motion(here / "rig.json")
-    assert motion.names == ("Jaw", "Drop", "Oh")
-    assert motion["Jaw"].min() < 0
-    assert np.abs(motion.values[0]).max() < 1
-
-
-def test_some_channels_of_a_set(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
-    assert run(*basics, "--curves", "arkit", "--channels", "opening,jawOpen", "-o", "two.csv").code == 0
-    assert (here / "two.csv").read_text().startswith("time_s,opening,jawOpen\n")
-
-
-def test_what_is_wrong_is_said_in_one_line(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
+def test_what_is_wrong_is_said_in_one_line(run, here, basics):
     for arguments, message in (
         (("--curves", "visems", "-o", "a.csv"), "no set of curves 'visems', required one of arkit, face, "),
         (("--control-points", "-o", "a.csv"), "belong to a character"),
         (("--character", "nothing.glb", "-o", "a.mp4"), "no such file"),
     ):
-        done = run(*basics, *arguments)
-        assert is_one_error(done, 3)
-        assert message in done.err[0]
+        check_refused(run(*basics, *arguments), 3, message)
         assert list(here.iterdir()) == []

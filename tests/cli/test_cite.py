@@ -1,10 +1,8 @@
-from __future__ import annotations
-
 import re
 from importlib.metadata import version
 from pathlib import Path
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused
 from lipmotion.citations import ENGINE_KEYS, bibliography, engine_citations, model_citations
 from lipmotion.engines import ENGINES
 from lipmotion.pipeline.model import shipped_path
@@ -13,24 +11,23 @@ ROOT = Path(__file__).parents[2]
 
 
 def keys(lines: list[str]) -> list[str]:
-    """Return the citation keys of BibTeX entries."""
     return re.findall(r"^@\w+\{(\w+),$", "\n".join(lines), flags=re.MULTILINE)
 
 
-def test_the_shipped_model_is_the_default(run: RunCommand) -> None:
+def test_the_shipped_model_is_the_default(run):
     done = run("cite")
     assert (done.code, done.err) == (0, [])
     assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"]
     assert done.out == run("cite", shipped_path()).out
 
 
-def test_a_model_of_other_recordings(run: RunCommand, coupled_model_file: Path) -> None:
+def test_a_model_of_other_recordings(run, coupled_model_file):
     done = run("cite", coupled_model_file)
     assert (done.code, done.err) == (0, [])
     assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["coupled"]]
 
 
-def test_engines_and_keys(run: RunCommand) -> None:
+def test_engines_and_keys(run):
     for name in sorted(ENGINE_KEYS):
         assert keys(run("cite", name).out) == ["lipmotion", *ENGINE_KEYS[name]]
     for key in set(bibliography()) - {"lipmotion"}:
@@ -38,24 +35,22 @@ def test_engines_and_keys(run: RunCommand) -> None:
         assert (done.code, done.err, keys(done.out)) == (0, [], [key])
 
 
-def test_what_cannot_be_cited(run: RunCommand, here: Path) -> None:
+def test_what_cannot_be_cited(run, here):
     (here / "text").write_text("words")
     for name, code, words in (
         ("hofer", 3, "nothing to cite is called 'hofer'; give a model file, or one of: trajectory, coupled, joint, "),
         ("text", 6, "text: not a lipmotion model"),
         (".", 3, ".: no such model"),
     ):
-        done = run("cite", name)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("cite", name), code, words)
 
 
-def test_every_built_in_engine_names_its_papers() -> None:
+def test_every_built_in_engine_names_its_papers():
     assert set(ENGINE_KEYS) == set(ENGINES.built_in)
     assert {key for named in ENGINE_KEYS.values() for key in named} <= set(bibliography())
 
 
-def test_what_a_header_adds() -> None:
+def test_what_a_header_adds():
     header = {"engine": "joint", "visual": "both", "adapted": {}, "attribution": ["GRID corpus, CC BY 4.0", "a; b"]}
     text = model_citations(header)
     assert keys(text.splitlines()) == ["lipmotion", *ENGINE_KEYS["joint"], "xieliu2007", "gales1998", "cooke2006"]
@@ -64,13 +59,13 @@ def test_what_a_header_adds() -> None:
     assert keys(model_citations({"engine": "ridge"}).splitlines()) == ["lipmotion"]
 
 
-def test_every_entry_is_whole() -> None:
+def test_the_version_is_this_one():
+    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
+    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_every_entry_is_whole():
     for entry in bibliography().values():
         assert entry.count("{") == entry.count("}")
         assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
         assert entry.endswith("\n}")
-
-
-def test_the_version_is_this_one() -> None:
-    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
-    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")

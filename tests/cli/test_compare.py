@@ -1,9 +1,6 @@
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion import compare
 from lipmotion.measures.evaluation_table import comparison_table
 
@@ -16,7 +13,7 @@ def table(factor: float) -> str:
 WAVE = table(1.0)
 
 
-def test_the_figures_are_those_of_the_function(run: RunCommand, here: Path) -> None:
+def test_the_figures_are_those_of_the_function(run, here):
     (here / "a.csv").write_text(WAVE)
     (here / "b.csv").write_text(table(0.5))
     done = run("compare", "a.csv", "b.csv", "a.csv", "-o", "figures.json")
@@ -31,7 +28,7 @@ def test_the_figures_are_those_of_the_function(run: RunCommand, here: Path) -> N
     ]
 
 
-def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+def test_what_cannot_be_used(run, here):
     (here / "a.csv").write_text(WAVE)
     (here / "b.csv").write_text(WAVE.replace("opening,width", "jawOpen,mouthClose"))
     (here / "nothing.csv").write_text("")
@@ -40,14 +37,12 @@ def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
         ("b.csv", "no channel of a.csv"),
         ("c.csv", "c.csv: cannot"),
     ):
-        done = run("compare", "a.csv", other, "-o", "figures.json")
-        assert is_one_error(done, 3)
-        assert words in done.err[0]
+        check_refused(run("compare", "a.csv", other, "-o", "figures.json"), 3, words)
     assert is_one_error(run("compare", "a.csv", "a.csv", "-o", "a.csv"), 7)
     assert not (here / "figures.json").exists()
 
 
-def test_programs_read_lines_of_json(run: RunCommand, here: Path) -> None:
+def test_programs_read_lines_of_json(run, here):
     (here / "a.csv").write_text(WAVE)
     done = run("compare", "a.csv", "a.csv", "--machine-readable")
     assert (done.code, done.err) == (0, [])

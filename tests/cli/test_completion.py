@@ -1,33 +1,23 @@
-"""``completion``: what the scripts offer, asked of the shells themselves where they are installed."""
-
-from __future__ import annotations
-
 import shutil
 import sys
-from pathlib import Path
 
 import pytest
 
 from children import run_child
-from cli.conftest import RunCommand
 from lipmotion.cli.verbs.completion import SHELLS
 
 ASKED: dict[tuple[str, ...], set[str]] = {
-    ("cue",): {"cues"},
-    ("corpus", "pre"): {"prepare"},
-    ("corpus", "prepare", "--no"): {"--no-crops"},
-    ("face", "info", "--struc"): set(),
-    ("info", "--struc"): {"--structure"},
-    ("animate", "--pauses", ""): {"rest", "natural"},
-    ("animate", "a.wav", "-o", "ou"): {"out.json"},
+    ("cue",): {"cues"}, ("corpus", "pre"): {"prepare"}, ("corpus", "prepare", "--no"): {"--no-crops"},
+    ("face", "info", "--struc"): set(), ("info", "--struc"): {"--structure"},
+    ("animate", "--pauses", ""): {"rest", "natural"}, ("animate", "a.wav", "-o", "ou"): {"out.json"},
     ("completion", ""): set(SHELLS),
-}
+}  # fmt: skip
 """The words of a command line, and what may stand for the last of them."""
 BASH = 'source "$1"; shift; COMP_WORDS=(lipmotion "$@"); COMP_CWORD=$#; _shtab_lipmotion'
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_a_script_offers_verbs_and_options(run: RunCommand, shell: str) -> None:
+def test_a_script_offers_verbs_and_options(run, shell):
     done = run("completion", shell)
     assert (done.code, done.err) == (0, [])
     text = "\n".join(done.out)
@@ -35,7 +25,7 @@ def test_a_script_offers_verbs_and_options(run: RunCommand, shell: str) -> None:
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
-def test_bash_completes(run: RunCommand, here: Path) -> None:
+def test_bash_completes(run, here):
     (here / "script").write_text("\n".join(run("completion", "bash").out) + "\n")
     (here / "out.json").touch()
     program = f"{BASH}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
@@ -46,14 +36,8 @@ def test_bash_completes(run: RunCommand, here: Path) -> None:
     assert offered == ASKED
 
 
-def test_it_loads_no_numpy() -> None:
+def test_it_loads_no_numpy():
     """A shell asks for it whenever it starts."""
     asked = "main(['completion', 'bash']); sys.exit('numpy' in sys.modules)"
     program = f"import sys; from lipmotion.cli.main import main; {asked}"
     assert run_child([sys.executable, "-c", program]).returncode == 0
-
-
-def test_an_unknown_shell(run: RunCommand) -> None:
-    done = run("completion", "csh")
-    assert (done.code, done.out) == (2, [])
-    assert "invalid choice: 'csh'" in done.err[-1]

@@ -1,25 +1,23 @@
-from __future__ import annotations
-
+import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
-from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus
+from cli.conftest import check_refused, is_one_error
 from lipmotion.errors import MissingDependencyError
 from lipmotion.formats.sound import write_sound
-from lipmotion.types import Audio, Item, Progress
+from lipmotion.pipeline.training.prompts import prompts
+from lipmotion.types import Item, Progress
 from lipmotion_faces.corpus import prepare
 from lipmotion_faces.corpus import sync as offset
+from lipmotion_faces.corpus.coverage import coverage
 from lipmotion_faces.corpus.prepare import PrepareReport
-from lipmotion_faces.video.mp4 import write_mp4
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 
-def test_info(run: RunCommand, toy_corpus: Corpus) -> None:
+def test_info(run, toy_corpus):
     done = run("corpus", "info", toy_corpus.path)
     assert (done.code, done.err) == (0, [])
     summary = dict(line.split(maxsplit=1) for line in done.out)
@@ -28,7 +26,7 @@ def test_info(run: RunCommand, toy_corpus: Corpus) -> None:
     assert summary["offset"].startswith("toy: ") or summary["offset"].startswith("corpus: ")
 
 
-def test_sync(run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sync(run, toy_corpus, here, monkeypatch):
     shutil.copytree(toy_corpus.path, here / "mine")
     monkeypatch.setattr(offset, "sync", lambda _corpus: {"studio": 0.12})
     assert run("corpus", "sync", "mine") == (0, ["studio: sound moved by -120 ms"], [])
@@ -42,7 +40,7 @@ def test_sync(run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pyte
 EVENTS = (Item("a", "prepared"), Progress("preparing recordings", 1, 2, 0.5), Item("d", "skipped", "no face"))
 
 
-def test_prepare_prints_the_counts(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_prepare_prints_the_counts(run, monkeypatch):
     asked: dict[str, object] = {}
 
     def done(directory: Path, output: Path, **options: object) -> PrepareReport:
@@ -63,28 +61,29 @@ def test_prepare_prints_the_counts(run: RunCommand, monkeypatch: pytest.MonkeyPa
         ["lipmotion: warning: skipped d: no face"],
     )
     assert asked == {
-        "directory": Path("videos"),
-        "output": Path("mine"),
-        "workers": 2,
-        "crops": False,
-        "offset_ms": -40.0,
-    }
+        "directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False, "offset_ms": -40.0,
+    }  # fmt: skip
 
 
-def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+def test_what_cannot_be_used(run, here, toy_corpus):
     (here / "empty").mkdir()
     for arguments, code, words in (
+        (["coverage", toy_corpus.path, "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
+        (["coverage", "missing"], 4, "missing: no such corpus"),
+        (["coverage", toy_corpus.path, "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+        (["prompts", "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
+        (["prompts", "--have", "missing"], 4, "missing: no such corpus"),
+        (["prompts", "--count", "0"], 3, "0 prompts asked for, required at least 1"),
+        (["prompts", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
         (["info", "missing"], 4, "missing: no such corpus"),
         (["info", "x" * 300], 3, "File name too long"),
         (["prepare", "empty", "-o", "mine"], 4, "empty: no videos in it"),
     ):
-        done = run("corpus", *arguments)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("corpus", *arguments), code, words)
         assert [path.name for path in here.rglob("*")] == ["empty"]
 
 
-def test_without_the_packages_for_video(run: RunCommand, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_packages_for_video(run, here, monkeypatch):
     def missing() -> dict[str, str]:
         raise MissingDependencyError('face tracking needs MediaPipe; pip install "lipmotion[video]"')
 
@@ -95,35 +94,49 @@ def test_without_the_packages_for_video(run: RunCommand, here: Path, monkeypatch
     assert not (here / "mine").exists()
 
 
-def faceless(path: Path) -> None:
-    """Write a second of grey with sound."""
-    sound = Audio(np.random.default_rng(0).normal(0, 0.1, 16_000).astype(np.float32), 16_000)
-    write_mp4(path, [np.full((120, 160, 3), 128, np.uint8)] * 25, fps=25, audio=sound)
+def test_coverage(run, toy_corpus):
+    done = run("corpus", "coverage", toy_corpus.path, "--count", "3")
+    assert (done.code, done.err) == (0, [])
+    found = coverage(toy_corpus)
+    assert done.out[0] == f"{len(toy_corpus)} of {len(toy_corpus)} utterances, {found.sentences} sentences"
+    for line, kind in zip(done.out[1:4], found.kinds, strict=True):
+        assert line.split()[:4] == [kind.kind, str(kind.covered), "of", str(kind.needed)]
+    assert f"and {len(found.kinds[1].missing) - 3} more diphones" in done.out
 
 
-@pytest.mark.long
-@pytest.mark.video
-def test_videos_that_cannot_be_used(run_outside: RunCommand, here: Path, bad_speech: dict[str, Path]) -> None:
-    """Videos without a face, without sound, or empty: each is named, and no corpus is made of them."""
-    pytest.importorskip("mediapipe")
-    (here / "videos").mkdir()
-    faceless(here / "videos" / "faceless.mp4")
-    done = run_outside("corpus", "prepare", "videos", "-o", "mine")
-    assert (done.code, done.out, len(done.err)) == (4, [], 2)
-    assert done.err[0].startswith("lipmotion: warning: skipped faceless: ")
-    assert "lipmotion: error: " in done.err[1]
-    assert "none of 1 recordings is usable; the first, faceless: " in done.err[1]
-    assert "no face" in done.err[1]
-    assert [path.name for path in here.iterdir()] == ["videos"]
-
-    shutil.copy(bad_speech["mute"], here / "videos" / "mute.mp4")
-    (here / "videos" / "empty.mkv").touch()
-    done = run_outside("corpus", "prepare", "videos", "-o", "mine", "--workers", "1")
-    assert (done.code, done.out, len(done.err)) == (4, [], 4)
-    assert [path.name for path in here.iterdir()] == ["videos"]
+def test_prompts(run, here, toy_corpus):
+    done = run("corpus", "prompts", "--count", "3")
+    found = prompts(count=3)
+    assert (done.code, done.err) == (0, [])
+    assert [line.split(None, 5)[5] for line in done.out[:3]] == [prompt.text for prompt in found.chosen]
+    last = found.chosen[-1]
+    assert f"phones {last.phones}/{found.phones}  diphones {last.diphones:4}/{found.diphones}" in done.out[2]
+    share = last.diphones / found.diphones
+    assert done.out[3].startswith(f"3 of {found.sentences} sentences: {share:.0%} of all their diphones")
+    (here / "mine.txt").write_text(" ".join(toy_corpus.utterance("toy00").words or ()))
+    done = run("corpus", "prompts", "--text", "mine.txt", "--have", toy_corpus.path)
+    assert (done.code, done.out) == (0, ["0 of 1 sentences: they add nothing"])
 
 
-def test_offset_of_two_recordings(run: RunCommand, here: Path) -> None:
+def test_texts_and_lexicons_of_ones_own(run, here, toy_corpus):
+    (here / "mine.txt").write_text("Two qwrtzx.\nFive.\nPapa vxvx.\n")
+    (here / "lexicon.txt").write_text("qwrtzx zh oy\n")
+    own = ("--text", "mine.txt", "--lexicon", "lexicon.txt")
+    done = run("corpus", "prompts", *own, "--have", toy_corpus.path)
+    assert done.out[0].endswith("Two qwrtzx.")
+    assert done.err == ["lipmotion: warning: left out 1 sentences for their words: vxvx"]
+    given = ["corpus", "coverage", toy_corpus.path, *own]
+    done = run(*given)
+    assert done.err == ["lipmotion: warning: left out 1 sentences for their words (--json has them)"]
+    assert [line for line in done.out if line.startswith("zh ")]
+    done = run(*given, "--json")
+    assert done.err == []
+    (document,) = map(json.loads, done.out)
+    assert document["left_out"] == {"Papa vxvx.": "vxvx"}
+    assert [kind["kind"] for kind in document["kinds"]] == ["phones", "diphones", "triphones"]
+
+
+def test_offset_of_two_recordings(run, here):
     chance = np.random.default_rng(5)
     scene = np.concatenate([np.zeros(RATE_HZ), speech_like(chance, 3.0)])
     made = clap(chance)

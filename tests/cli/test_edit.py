@@ -1,14 +1,8 @@
-"""``edit`` writes down what is changed; ``animate``, ``render`` and ``cues`` say it again."""
-
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
 
 import pytest
-
-from cli.conftest import RunCommand
 
 
 @pytest.fixture
@@ -17,9 +11,7 @@ def speech(toy_speech: Path, tmp_path: Path) -> Path:
     return tmp_path / "speech.wav"
 
 
-def test_what_is_edited_is_replayed_by_all_verbs(
-    run: RunCommand, speech: Path, toy_model_file: Path, tmp_path: Path
-) -> None:
+def test_what_is_edited_is_replayed_by_all_verbs(run, speech, toy_model_file, tmp_path):
     """The same bytes, from the recording and from the file alone."""
     file = tmp_path / "a.edits.json"
     of = ("--of", speech, "--model", toy_model_file, "--recogniser", "own")
@@ -45,7 +37,7 @@ def test_what_is_edited_is_replayed_by_all_verbs(
     assert run("cues", speech, *how, "--edits", file, "-o", tmp_path / "a.tsv").code == 0
 
 
-def test_what_edit_refuses(run: RunCommand, speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_what_edit_refuses(run, speech, toy_model_file, tmp_path):
     file = tmp_path / "a.edits.json"
     for words, message in (
         (["edit", file, "phone 3 is p"], "no such file; begin one: lipmotion edit"),

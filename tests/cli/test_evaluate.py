@@ -1,13 +1,10 @@
-from __future__ import annotations
-
 import json
 from functools import partial
-from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
-from lipmotion import Corpus, evaluate, load_model
+from cli.conftest import check_refused
+from lipmotion import evaluate, load_model
 from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.model import VERSION
@@ -20,9 +17,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
 
 
-def test_the_figures_are_those_of_the_function(
-    run: RunCommand, toy_corpus: Corpus, toy_model_file: Path, here: Path
-) -> None:
+def test_the_figures_are_those_of_the_function(run, toy_corpus, toy_model_file, here):
     done = run("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json")
     assert (done.code, done.err) == (0, [])
     figures = evaluate(load_model(toy_model_file), toy_corpus)
@@ -31,14 +26,7 @@ def test_the_figures_are_those_of_the_function(
     assert [path.name for path in here.iterdir()] == ["figures.json"]
 
 
-@pytest.mark.long
-def test_other_lists(run: RunCommand, toy_corpus: Corpus, toy_model_file: Path) -> None:
-    assert run("evaluate", toy_model_file, toy_corpus.path, "--split", "val").out[0].startswith("split val: 2 clips")
-
-
-def test_what_cannot_be_used(
-    run: RunCommand, toy_corpus: Corpus, toy_model_file: Path, newer_model: Path, here: Path
-) -> None:
+def test_what_cannot_be_used(run, toy_corpus, toy_model_file, newer_model, here):
     corpus, model = toy_corpus.path, toy_model_file
     for arguments, code, words in (
         (["missing", corpus], 3, "missing: no such model"),
@@ -48,7 +36,5 @@ def test_what_cannot_be_used(
         ([model, corpus, "-o", "missing/a.json"], 7, "the folder missing does not exist"),
         ([model, corpus, "-o", "a.json", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
     ):
-        done = run("evaluate", *arguments)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("evaluate", *arguments), code, words)
     assert list(here.iterdir()) == []

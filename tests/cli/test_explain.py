@@ -1,23 +1,13 @@
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused
 
 pytestmark = pytest.mark.usefixtures("here")
 
 
-def test_a_frame_of_a_coupled_model(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
-    done = run("explain", coupled_model_file, toy_speech, "--at", "0.8", "--transcript", "See Bob, papa & mama!")
-    assert (done.code, done.err) == (0, [])
-    assert done.out[0] == "0.80 s (frame 80)"
-    assert [line for line in done.out if line.startswith("  asynchrony ")]
-
-
-def test_several_times_and_any_engine(run: RunCommand, toy_model_file: Path, toy_speech: Path) -> None:
+def test_several_times_and_any_engine(run, toy_model_file, toy_speech):
     done = run("explain", toy_model_file, toy_speech, "--at", "0.8", "--at", "0.5")
     assert [line for line in done.out if line and not line.startswith(" ")] == [
         "0.80 s (frame 80)",
@@ -25,12 +15,12 @@ def test_several_times_and_any_engine(run: RunCommand, toy_model_file: Path, toy
     ]
 
 
-def test_for_machines(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
+def test_for_machines(run, coupled_model_file, toy_speech):
     done = run("explain", coupled_model_file, toy_speech, "--at", "0.8", "--at", "0.5", "--json")
     assert [json.loads(line)["frame"] for line in done.out] == [80, 50]
 
 
-def test_what_cannot_be_explained(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
+def test_what_cannot_be_explained(run, coupled_model_file, toy_speech):
     for options, code, words in (
         ([coupled_model_file, toy_speech, "--at=-1"], 3, "-1.0 s lies outside the recording (0 to "),
         ([coupled_model_file, toy_speech, "--at", "nan"], 3, "nan s lies outside the recording"),
@@ -38,12 +28,10 @@ def test_what_cannot_be_explained(run: RunCommand, coupled_model_file: Path, toy
         ([coupled_model_file, "missing.wav", "--at", "1"], 3, "missing.wav: no such file"),
         ([toy_speech, coupled_model_file, "--at", "1"], 6, "not a lipmotion model"),
     ):
-        done = run("explain", *options)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("explain", *options), code, words)
 
 
-def test_without_a_time_all_states_are_listed(run: RunCommand, toy_model_file: Path, toy_speech: Path) -> None:
+def test_without_a_time_all_states_are_listed(run, toy_model_file, toy_speech):
     listed = run("explain", toy_model_file, toy_speech)
     documents = [json.loads(line) for line in run("explain", toy_model_file, toy_speech, "--json").out]
     assert (listed.code, listed.err) == (0, [])
@@ -55,9 +43,7 @@ def test_without_a_time_all_states_are_listed(run: RunCommand, toy_model_file: P
     assert few.out[3] == f"and {len(documents) - 2} more (--count N prints N, --json all)"
 
 
-def test_without_a_model_it_is_the_shipped_one_and_the_former_order_is_understood(
-    run: RunCommand, toy_model_file: Path, toy_speech: Path
-) -> None:
+def test_without_a_model_it_is_the_shipped_one_and_the_former_order_is_understood(run, toy_model_file, toy_speech):
     shipped, named, former = (
         run("explain", *order, "--at", "0.5")
         for order in ([toy_speech], [toy_speech, "--model", toy_model_file], [toy_model_file, toy_speech])

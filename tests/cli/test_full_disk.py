@@ -1,15 +1,10 @@
 """A full disk, simulated by a limit on the size of files: one error line, and no partial file."""
 
-from __future__ import annotations
-
 import sys
-from pathlib import Path
 
 import pytest
 
 from children import run_child
-from cli.conftest import RunCommand
-from lipmotion import Corpus
 
 resource = pytest.importorskip("resource")
 LIMIT = 3000
@@ -29,7 +24,7 @@ def run_limited(*arguments: object, limit: int = LIMIT) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("name", ["a.json", "a.mp4"])
-def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) -> None:
+def test_animate(toy_speech, toy_model_file, here, name):
     code, line = run_limited("animate", toy_speech, "--model", toy_model_file, "-o", name, "--size", "64")
     assert (code, line.startswith(f"lipmotion: error: {name}: cannot be written: ")) == (7, True)
     assert line.endswith("; make room, then run it again")
@@ -37,14 +32,14 @@ def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) 
 
 
 @pytest.mark.long
-def test_a_film(toy_speech: Path, toy_model_file: Path, filmed_face_file: Path, here: Path) -> None:
+def test_a_film(toy_speech, toy_model_file, filmed_face_file, here):
     basics = ("animate", toy_speech, "--model", toy_model_file, "--face", filmed_face_file)
     code, line = run_limited(*basics, "-o", "a.mp4", limit=20_000)
     assert (code, line.startswith("lipmotion: error: a.mp4: cannot be written: ")) == (7, True)
     assert list(here.iterdir()) == []
 
 
-def test_a_face(filmed_face_file: Path, here: Path) -> None:
+def test_a_face(filmed_face_file, here):
     code = (
         "import resource, sys\n"
         "from lipmotion.errors import ExportError\n"
@@ -63,7 +58,7 @@ def test_a_face(filmed_face_file: Path, here: Path) -> None:
 
 
 @pytest.mark.long
-def test_train_says_what_is_kept_and_goes_on(run_outside: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_train_says_what_is_kept_and_goes_on(run_outside, toy_corpus, here):
     train = ("train", toy_corpus.path, "--engine", "joint", "--set", "mixtures=1")
     code, line = run_limited(*train, "-o", "m.lipmotion", limit=30_000)  # phones, not the model
     assert (code, "cannot be written: " in line) == (7, True)
@@ -76,7 +71,7 @@ def test_train_says_what_is_kept_and_goes_on(run_outside: RunCommand, toy_corpus
 
 
 @pytest.mark.long
-def test_a_report_says_so_before_the_work(toy_corpus: Corpus, here: Path) -> None:
+def test_a_report_says_so_before_the_work(toy_corpus, here):
     code, line = run_limited("experiment", "all", toy_corpus.path, "-o", "r", "--quick")
     assert (code, line.startswith("lipmotion: error: r/index.html: cannot be written: ")) == (7, True)
     assert line.endswith("; make room, then run it again")

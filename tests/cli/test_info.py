@@ -1,14 +1,11 @@
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused
 from lipmotion import load_model, save_model
 from lipmotion.pipeline.model import VERSION, read_header, shipped_path
 
 
-def test_a_model_says_whose_recordings_it_comes_from(run: RunCommand, toy_model_file: Path) -> None:
+def test_a_model_says_whose_recordings_it_comes_from(run, toy_model_file):
     done = run("info", toy_model_file)
     assert (done.code, done.err) == (0, [])
     assert done.out[0].split() == ["file", str(toy_model_file), "(1.1", "MB)"]
@@ -20,7 +17,7 @@ def test_a_model_says_whose_recordings_it_comes_from(run: RunCommand, toy_model_
     assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
 
 
-def test_the_model_inside_is_named_with_its_rights(run: RunCommand, toy_model_file: Path, here: Path) -> None:
+def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
     model = load_model(toy_model_file)
     about = {**model.about, "licence": [], "attribution": []}
     save_model(replace(model, about=about, prior=load_model()), here / "on.lipmotion")
@@ -34,19 +31,19 @@ def test_the_model_inside_is_named_with_its_rights(run: RunCommand, toy_model_fi
     assert prior["attribution"].startswith("GRID corpus")
 
 
-def test_its_trees_can_be_printed(run: RunCommand, toy_model_file: Path) -> None:
+def test_its_trees_can_be_printed(run, toy_model_file):
     done = run("info", toy_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "speech.0"
     assert sum("leaf (" in line for line in done.out) >= 18
 
 
-def test_the_former_name_of_the_option_still_works(run: RunCommand, toy_model_file: Path) -> None:
+def test_the_former_name_of_the_option_still_works(run, toy_model_file):
     assert run("info", toy_model_file, "--trees") == run("info", toy_model_file, "--structure")
     assert not any("--trees" in line for line in run("info", "--help").out)
 
 
-def test_the_chains_of_a_coupled_model(run: RunCommand, coupled_model_file: Path) -> None:
+def test_the_chains_of_a_coupled_model(run, coupled_model_file):
     done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("coupled: chains whose transitions depend on all chains")
@@ -56,13 +53,13 @@ def test_the_chains_of_a_coupled_model(run: RunCommand, coupled_model_file: Path
     assert any(line.startswith("means of geometry: ") for line in done.out)
 
 
-def test_the_shipped_model_is_the_default(run: RunCommand) -> None:
+def test_the_shipped_model_is_the_default(run):
     done = run("info")
     assert done.out == run("info", shipped_path()).out
     assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
 
 
-def test_what_is_no_model(run: RunCommand, newer_model: Path, here: Path) -> None:
+def test_what_is_no_model(run, newer_model, here):
     (here / "text").write_text("words")
     for name, code, words in (
         ("missing", 3, "missing: no such model"),
@@ -70,6 +67,4 @@ def test_what_is_no_model(run: RunCommand, newer_model: Path, here: Path) -> Non
         (".", 3, ".: no such model"),
         (newer_model, 6, f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
     ):
-        done = run("info", name)
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("info", name), code, words)

@@ -1,17 +1,17 @@
-from __future__ import annotations
-
 import json
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from packaging.markers import default_environment
 
-from cli.conftest import RunCommand
 from lipmotion.cli import doctor as doctor_module
-from lipmotion.cli.doctor import InstalledPart, Requirement, doctor
+from lipmotion.cli.doctor import EXTRAS, InstalledPart, Requirement, declared_requirements, doctor, requirement
 from lipmotion.errors import LipMotionError
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
@@ -32,7 +32,7 @@ def declared(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Install
     return found
 
 
-def test_packages(declared: Callable[..., dict[str, InstalledPart]]) -> None:
+def test_packages(declared):
     found = declared(
         Requirement("numpy", ">=2"),
         Requirement("pytest", "<1"),
@@ -52,11 +52,11 @@ def test_packages(declared: Callable[..., dict[str, InstalledPart]]) -> None:
     assert "not for this Python or system (required: sys_platform == 'none')" in found["[video]"].text
 
 
-def test_without_metadata(declared: Callable[..., dict[str, InstalledPart]]) -> None:
+def test_without_metadata(declared):
     assert declared()["packages"].state == "absent"
 
 
-def test_voices(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_voices(monkeypatch):
     from lipmotion.speech.voices.installed import SYNTHESISERS
 
     def fails() -> tuple[()]:
@@ -74,7 +74,7 @@ def test_voices(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "no speech synthesiser is installed; install one: pip install" in found.text
 
 
-def test_folders_that_cannot_be_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_folders_that_cannot_be_written(monkeypatch, tmp_path):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     monkeypatch.setattr("os.access", lambda *_: False)
     monkeypatch.setattr("lipmotion.kernels.compiler.cache_folder", lambda: None)
@@ -85,7 +85,7 @@ def test_folders_that_cannot_be_written(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert (kernels.state, "NUMBA_CACHE_DIR" in kernels.text) == ("absent", True)
 
 
-def test_whatever_a_part_raises(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_whatever_a_part_raises(monkeypatch):
     def fails() -> str:
         raise OSError("libfoo.so: cannot open")
 
@@ -97,7 +97,7 @@ def test_whatever_a_part_raises(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(("version", "told"), [("4.10.0", "4.10.0, MediaPipe"), ("5.1.0", "another OpenCV lies over")])
-def test_face_tracking(monkeypatch: pytest.MonkeyPatch, version: str, told: str) -> None:
+def test_face_tracking(monkeypatch, version, told):
     monkeypatch.setattr("lipmotion_faces.tracking.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
     monkeypatch.setattr("lipmotion_faces.tracking.packages.import_face_mesh", lambda: None)
     monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
@@ -106,7 +106,7 @@ def test_face_tracking(monkeypatch: pytest.MonkeyPatch, version: str, told: str)
     assert told in found.text
 
 
-def test_no_face_tracking(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_face_tracking(monkeypatch):
     def fails() -> None:
         raise missing("OpenCV", ImportError("libGL.so.1"))
 
@@ -116,7 +116,7 @@ def test_no_face_tracking(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "libGL.so.1" in found.text
 
 
-def test_a_damaged_model(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_damaged_model(monkeypatch, tmp_path):
     (tmp_path / "grid.lipmotion").write_bytes(b"damaged")
     monkeypatch.setattr("lipmotion.pipeline.model.shipped_path", lambda: tmp_path / "grid.lipmotion")
     found = doctor_module.look_at("model that ships")
@@ -125,14 +125,14 @@ def test_a_damaged_model(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Non
 
 
 @pytest.mark.long
-def test_the_main_path() -> None:
+def test_the_main_path():
     found = doctor_module.look_at("main path")
     assert found.state == "works"
     assert "1.0 s of made-up speech → json, cues.tsv, mp4; the lips open by 0." in found.text
 
 
 @pytest.mark.long
-def test_without_numpy(run_outside: RunCommand, tmp_path: Path) -> None:
+def test_without_numpy(run_outside, tmp_path):
     """What most needs a doctor: nothing of it is imported before it is looked at."""
     for module in ("numpy", "av"):
         (tmp_path / f"{module}.py").write_text(f"raise ImportError('no {module}')")
@@ -151,13 +151,12 @@ BROKEN = InstalledPart("main path", "broken", "no model")
 
 @pytest.fixture
 def found(monkeypatch: pytest.MonkeyPatch) -> list[InstalledPart]:
-    """What is found, which a test may change."""
     findings = list(GOOD)
     monkeypatch.setattr("lipmotion.cli.doctor.doctor", lambda: iter(findings))
     return findings
 
 
-def test_what_is_absent_is_no_failure(run: RunCommand, found: list[InstalledPart]) -> None:
+def test_what_is_absent_is_no_failure(run, found):
     done = run("doctor")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].split() == ["works", "numpy", "2.4"]
@@ -165,7 +164,7 @@ def test_what_is_absent_is_no_failure(run: RunCommand, found: list[InstalledPart
     assert len(done.out) == len(found) + 1
 
 
-def test_what_is_broken_is_exit_code_1(run: RunCommand, found: list[InstalledPart]) -> None:
+def test_what_is_broken_is_exit_code_1(run, found):
     found.append(BROKEN)
     done = run("doctor")
     assert done.code == 1
@@ -173,7 +172,7 @@ def test_what_is_broken_is_exit_code_1(run: RunCommand, found: list[InstalledPar
     assert done.err == ["lipmotion: error: broken: main path; what to do is said above"]
 
 
-def test_for_programs(run: RunCommand, found: list[InstalledPart]) -> None:
+def test_for_programs(run, found):
     done = run("doctor", "--machine-readable")
     start, *items, success = map(json.loads, done.out)
     assert (done.code, start["type"], success) == (0, "start", {"type": "success", "broken": []})
@@ -182,3 +181,64 @@ def test_for_programs(run: RunCommand, found: list[InstalledPart]) -> None:
     done = run("doctor", "--machine-readable")
     assert done.code == 1
     assert json.loads(done.out[-1])["type"] == "failure"
+
+
+PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("av>=14", Requirement("av", ">=14")),
+        ("torch>=2.4; extra == 'network'", Requirement("torch", ">=2.4", "", "network")),
+        ("opencv-python-headless (<5,>=4.10)", Requirement("opencv-python-headless", "<5,>=4.10")),
+        (
+            "mediapipe==0.10.14; (python_version < '3.13') and extra == 'video'",
+            Requirement("mediapipe", "==0.10.14", 'python_version < "3.13"', "video"),
+        ),
+    ],
+)
+def test_requirements_are_read(text, expected):
+    assert requirement(text) == expected
+
+
+def test_markers(monkeypatch):
+    machine = {"sys_platform": "darwin", "platform_machine": "arm64", "python_version": "3.9"}
+    monkeypatch.setattr("packaging.markers.default_environment", lambda: default_environment() | machine)
+    for marker, expected in (
+        ("", True),
+        ("python_version < '3.13'", True),
+        ("python_version >= '3.10'", False),
+        ("(sys_platform == 'linux' and platform_machine == 'arm64') or (sys_platform == 'darwin')", True),
+        ("sys_platform != 'darwin' or platform_machine != 'arm64'", False),
+    ):
+        assert Requirement("a", "", marker).applies is expected, marker
+
+
+def test_versions(monkeypatch):
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
+    for versions, expected in (
+        ("", True),
+        (">=4.9", True),
+        (">=4.10,<5", True),
+        ("<4.9", False),
+        ("==4.10.0.84.0", True),
+        ("!=4.10.0.84", False),
+        (">4.10.0.84", False),
+    ):
+        assert Requirement("a", versions).is_met is expected, versions
+
+
+def test_what_is_not_installed(monkeypatch):
+    def missing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.version", missing)
+    monkeypatch.setattr("importlib.metadata.requires", missing)
+    assert not Requirement("a", "").is_met
+    assert declared_requirements() == ()
+
+
+def test_every_extra_is_explained():
+    table = PYPROJECT.read_text(encoding="utf-8").split("[project.optional-dependencies]")[1].split("\n[")[0]
+    assert set(re.findall(r"^([\w-]+) = \[", table, re.MULTILINE)) == set(EXTRAS)

@@ -1,7 +1,3 @@
-"""``--job``: the command line makes the same job as Python, and is ahead of a file."""
-
-from __future__ import annotations
-
 import argparse
 import ast
 import re
@@ -11,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion import Job, Outputs, Request
 from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import part_of
@@ -73,13 +69,13 @@ def parsed(*words: str) -> Job:
     return part_of(options, options.start, request=request)
 
 
-def test_the_command_line_makes_the_same_job() -> None:
+def test_the_command_line_makes_the_same_job():
     assert parsed(*LINE.split()) == SAME
     assert parsed("animate", "a.wav", "-o", "a.json") == Job(Request(Path("a.wav")), Outputs(("a.json",)))
 
 
 @needs_toml
-def test_a_file_is_behind_the_command_line(here: Path) -> None:
+def test_a_file_is_behind_the_command_line(here):
     (here / "scene.toml").write_text(FILE)
     assert parsed("animate", "--job", "scene.toml") == Job.from_file("scene.toml") == SAME
     line = "animate b.wav --job scene.toml --face portrait -o d.json --face-seed 0 --still gaze -o e.json --offset-ms 0"
@@ -90,7 +86,7 @@ def test_a_file_is_behind_the_command_line(here: Path) -> None:
     assert job.delivery == Delivery(stepped=True)
 
 
-def test_a_level_of_detail_is_behind_the_command_line() -> None:
+def test_a_level_of_detail_is_behind_the_command_line():
     job = parsed("animate", "a.wav", "-o", "a.json", "--detail", "mobile")
     assert (job.outputs.rate_hz, job.delivery, job.staging) == (
         30,
@@ -102,7 +98,7 @@ def test_a_level_of_detail_is_behind_the_command_line() -> None:
     assert parsed("animate", "a.wav", "-o", "a.json", "--detail", "film") == parsed("animate", "a.wav", "-o", "a.json")
 
 
-def test_each_option_is_declared_once() -> None:
+def test_each_option_is_declared_once():
     """No flag stands twice in the parts of a job, and none of them in a module of the command line."""
     parts = (Request, Outputs, Delivery, Staging)
     told = [each for part in parts for each in fields(part) if "help" in each.metadata and "still" not in each.metadata]
@@ -118,7 +114,7 @@ def test_each_option_is_declared_once() -> None:
 
 
 @pytest.mark.usefixtures("here")
-def test_only_files_that_are_read_are_declared_as_inputs() -> None:
+def test_only_files_that_are_read_are_declared_as_inputs():
     options = command_line.parse_words(LINE.split(), argparse.Namespace())
     read = {one.name for one in options.reads}
     assert {"speech", "transcript", "lexicon", "units", "model", "onto", "face", "background", "job"} <= read
@@ -126,7 +122,7 @@ def test_only_files_that_are_read_are_declared_as_inputs() -> None:
 
 
 @needs_toml
-def test_a_job_is_done(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_job_is_done(run, here, toy_speech, toy_model_file):
     (here / "scene.toml").write_text(
         f"[request]\nrecording = {str(toy_speech)!r}\nmodel = {str(toy_model_file)!r}\nrecogniser = 'own'\n"
         "[outputs]\nfiles = ['a.json']\nrate_hz = 25\n"
@@ -142,7 +138,7 @@ def test_a_job_is_done(run: RunCommand, here: Path, toy_speech: Path, toy_model_
 
 
 @needs_toml
-def test_a_batch_takes_a_job(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_batch_takes_a_job(run, here, toy_speech, toy_model_file):
     (here / "sounds").mkdir()
     (here / "sounds" / "a.wav").write_bytes(toy_speech.read_bytes())
     (here / "scene.toml").write_text(
@@ -154,13 +150,11 @@ def test_a_batch_takes_a_job(run: RunCommand, here: Path, toy_speech: Path, toy_
     rows = (here / "out" / "a.csv").read_text().splitlines()
     assert (rows[0], re.split(",", rows[2])[0]) == ("time_s,width", "0.04")
     (here / "scene.toml").write_text("[request]\nrecording = 'a.wav'\n")
-    done = run(*line)
-    assert is_one_error(done, 3)
-    assert "the job of a batch has 'recording'" in done.err[0]
+    check_refused(run(*line), 3, "the job of a batch has 'recording'")
 
 
 @needs_toml
-def test_what_is_wrong_with_a_file(run: RunCommand, here: Path) -> None:
+def test_what_is_wrong_with_a_file(run, here):
     (here / "half.toml").write_text("[request]\nrecording = 'a.wav'\n")
     (here / "wrong.toml").write_text("[staging]\nface-seed = 3\n")
     done = run("animate", "--job", "half.toml")
@@ -172,6 +166,4 @@ def test_what_is_wrong_with_a_file(run: RunCommand, here: Path) -> None:
         ("wrong.toml", "wrong.toml: in [staging]: no option 'face-seed'; here it is called 'seed'"),
         ("missing.toml", "missing.toml: no such job file"),
     ):
-        done = run("animate", "--job", words)
-        assert is_one_error(done, 3)
-        assert message in done.err[0]
+        check_refused(run("animate", "--job", words), 3, message)

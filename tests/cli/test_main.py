@@ -1,12 +1,12 @@
-from __future__ import annotations
-
+import shutil
 import sys
 from functools import partial
+from pathlib import Path
 
 import pytest
 
 from children import PIPE, child, run_child
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion.cli import main
 from lipmotion.cli.verbs import info
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
@@ -15,7 +15,7 @@ STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
 
 
-def test_help_lists_verbs_and_exit_codes(run: RunCommand) -> None:
+def test_help_lists_verbs_and_exit_codes(run):
     done = run("--help")
     assert (done.code, done.err) == (0, [])
     text = " ".join(" ".join(done.out).split())
@@ -24,36 +24,34 @@ def test_help_lists_verbs_and_exit_codes(run: RunCommand) -> None:
     assert "0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus, 5 align" in text
 
 
-def test_every_verb_has_help(run: RunCommand) -> None:
+def test_every_verb_has_help(run):
     for verb in (*VERBS, "corpus prepare", "corpus info"):
         done = run(*verb.split(), "--help")
         assert (done.code, done.err) == (0, [])
         assert done.out[0].startswith(f"usage: lipmotion {verb} ")
 
 
-def test_the_version(run: RunCommand) -> None:
+def test_the_version(run):
     from importlib.metadata import version
 
     assert run("--version") == (0, [f"lipmotion {version('lipmotion')}"], [])
 
 
-def test_the_package_is_a_program() -> None:
+def test_the_package_is_a_program():
     done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
     assert done.stdout.startswith("usage: lipmotion info ")
 
 
-def test_a_wrong_command_line(run: RunCommand) -> None:
+def test_a_wrong_command_line(run):
     for arguments in (["bogus"], ["corpus"], ["corpus", "bogus"], ["--bogus"], ["train"], ["cues", "a.wav", "b.wav"]):
-        done = run(*arguments)
-        assert is_one_error(done, 2)
-        assert " --help" in done.err[0]
+        check_refused(run(*arguments), 2, " --help")
 
 
-def test_without_a_word_there_is_help(run: RunCommand) -> None:
+def test_without_a_word_there_is_help(run):
     assert run() == run("--help")
 
 
-def test_a_misspelt_option(run: RunCommand) -> None:
+def test_a_misspelt_option(run):
     for misspelt, hint in (
         (["animate", "a.wav", "-o", "a.json", "--fase", "woman"], "did you mean --face? see: lipmotion animate --help"),
         (["animate", "a.wav", "--otput", "a.json"], "did you mean --output?"),
@@ -63,12 +61,10 @@ def test_a_misspelt_option(run: RunCommand) -> None:
         (["cues", "a.wav", "--text", "hello"], "did you mean --transcript?"),
         (["info", "--zzz"], "--zzz; see: lipmotion info --help"),
     ):
-        done = run(*misspelt)
-        assert is_one_error(done, 2)
-        assert hint in done.err[0]
+        check_refused(run(*misspelt), 2, hint)
 
 
-def test_words_of_other_tools_are_answered_with_a_verb(run: RunCommand) -> None:
+def test_words_of_other_tools_are_answered_with_a_verb(run):
     for words, hint in (
         (["convert", "a.vmd", "b.mp4"], "no verb 'convert'; did you mean: lipmotion render IN -o OUT"),
         (["animat", "a.wav"], "no verb 'animat'; did you mean: lipmotion animate"),
@@ -81,7 +77,7 @@ def test_words_of_other_tools_are_answered_with_a_verb(run: RunCommand) -> None:
         assert done.err[-1].startswith(f"lipmotion: error: {hint}")
 
 
-def test_an_error_is_one_line(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_is_one_line(run, monkeypatch):
     errors: list[tuple[BaseException, int, str]] = [
         (LipMotionError("what"), 1, "lipmotion: error: what"),
         (AlignmentError("two\n  lines"), 5, "lipmotion: error: two\\n  lines"),
@@ -100,14 +96,14 @@ def _fail(error: BaseException, _: object) -> None:
     raise error
 
 
-def test_a_bug_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_is_not_hidden(monkeypatch):
     monkeypatch.setattr(info, "run", partial(_fail, ZeroDivisionError()))
     with pytest.raises(ZeroDivisionError):
         main.main(["info"])
 
 
 @pytest.mark.parametrize("arguments", [["info"], ["--help"]])
-def test_a_reader_that_has_gone_is_no_error(arguments: list[str]) -> None:
+def test_a_reader_that_has_gone_is_no_error(arguments):
     """As in ``lipmotion info | head -0``: the output is buffered, so it is found at the very end."""
     program = [
         sys.executable,
@@ -115,10 +111,62 @@ def test_a_reader_that_has_gone_is_no_error(arguments: list[str]) -> None:
         "import sys; sys.stdin.read(); from lipmotion.cli.main import main; sys.exit(main())",
     ]
     with child([*program, *arguments], stdin=PIPE, stderr=PIPE) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        assert process.stderr is not None
         process.stdout.close()
         process.stdin.close()  # now it may begin
         assert process.stderr.read() == ""
         assert process.wait() == 0
+
+
+def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_model_file, here):
+    line = ("animate", toy_speech, "--model", toy_model_file, "-o", "ä.json", "--transcript", "see bimab papa mama")
+    done = run_outside(*line, encoding="ascii")
+    (warning,) = done.err
+    assert warning.startswith("lipmotion: warning: 'bimab' is not in the dictionary; read as 'b ")
+    assert (done.code, done.out) == (0, ["\\xe4.json"])
+    assert [path.name for path in here.iterdir()] == ["ä.json"]
+
+
+@pytest.mark.usefixtures("here")
+def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, bad_speech):
+    """FFmpeg's own messages are not printed."""
+    assert is_one_error(run_outside("animate", bad_speech["text"], "-o", "a.json"), 3)
+    assert is_one_error(run_outside("animate", "a.wav", "-o", "missing/a.json"), 7)
+    assert run_outside("animate", "a.wav").code == 2
+
+
+def test_the_console_script(run_outside):
+    script = shutil.which("lipmotion", path=str(Path(sys.executable).parent))
+    if script is None:
+        pytest.skip("the package is not installed")
+    assert is_one_error(run_outside("info", "missing", program=(script,)), 3)
+
+
+BLENDER, WORD = b"BLENDER-v402REND", b"PK\x03\x04" + bytes(40) + b"word/document.xml"
+
+
+@pytest.mark.parametrize(
+    ("line", "content", "named"),
+    [
+        ("cues FILE.wav", b"my mother moved the baby boat\n", "is text"),
+        ("words FILE.wav", b"MThd\0\0\0\6" + bytes(90), "MIDI"),
+        ("animate FILE.wav -o out.json", WORD, "a Word document"),
+        ("cues SPEECH --transcript FILE.txt", WORD, "a Word document"),
+        ("animate SPEECH -o out.json --units FILE.json", BLENDER, "a Blender file"),
+        ("render FILE.csv -o out.json", BLENDER, "a Blender file"),
+        ("render FILE.fbx -o out.json", b"Kaydara FBX Binary  \0", "an FBX file"),
+        ("character FILE.glb", BLENDER, "a Blender file"),
+        ("animate SPEECH -o out.mp4 --face FILE.blend", BLENDER, "a Blender file"),
+        ("speak --text FILE.txt -o out.wav", b"%PDF-1.7", "a PDF"),
+        ("batch FILE.csv --out out", WORD, "a Word document"),
+        ("face build FILE.mp4 -o out.face", b"8BPS\0\1", "a Photoshop file"),
+        ("animate SPEECH -o out.json --lexicon FILE.dict", WORD, "a Word document"),
+    ],
+)
+def test_it_is_named(line, content, named, run, here, toy_speech):
+    words = line.split()
+    file = next(word for word in words if word.startswith("FILE"))
+    (here / file).write_bytes(content)
+    done = run(*(toy_speech if word == "SPEECH" else word for word in words))
+    check_refused(done, 3, f"{file}: is ")
+    assert named in done.err[0]
+    assert ", required a" in done.err[0]

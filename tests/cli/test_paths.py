@@ -1,7 +1,5 @@
 """Every output of every verb is kept apart from every input of the same call."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil
@@ -10,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion import Corpus, Run, animate, cues, load_model, prepare, train, write, write_cues
 from lipmotion.cli.command_line import parser
 from lipmotion.errors import ExportError
@@ -63,44 +61,39 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_an_output_that_is_an_input(run: RunCommand, laid: Path) -> None:
+def test_an_output_that_is_an_input(run, laid):
     before = content(laid)
     for what, line in REFUSED:
         done = run(*line.split())
-        assert is_one_error(done, 7), (line, done)
-        assert f" {what}; give another name" in done.err[0]
+        check_refused(done, 7, f" {what}; give another name")
         assert content(laid) == before
 
 
-def test_however_it_is_spelled(run: RunCommand, laid: Path) -> None:
+def test_however_it_is_spelled(run, laid):
     (laid / "soft").symlink_to("t.txt")
     os.link(laid / "t.txt", laid / "hard")
     before = content(laid)
     for spelled in ("./t.txt", "../here/t.txt", "soft", "hard"):
         done = run("animate", *TALKING.split(), "-o", spelled)
-        assert is_one_error(done, 7)
-        assert "the transcript itself; give another name" in done.err[0]
+        check_refused(done, 7, "the transcript itself; give another name")
         assert content(laid) == before
 
 
-def test_the_model_that_ships_is_an_input_too(run: RunCommand, laid: Path) -> None:
+def test_the_model_that_ships_is_an_input_too(run, laid):
     before = shipped_path().read_bytes()
     done = run("adapt", laid / "a.wav", "-o", shipped_path())
-    assert is_one_error(done, 7)
-    assert "is the model itself" in done.err[0]
+    check_refused(done, 7, "is the model itself")
     assert shipped_path().read_bytes() == before
 
 
 @pytest.mark.usefixtures("laid")
-def test_a_program_is_told(run: RunCommand) -> None:
+def test_a_program_is_told(run):
     done = run("train", "c", "-o", "c/corpus.json", "--machine-readable", "--force")
     assert done.code == 7
     assert '"exit_code": 7' in done.out[-1]
 
 
-def test_units_are_replaced_where_that_is_meant(
-    run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path
-) -> None:
+def test_units_are_replaced_where_that_is_meant(run, here, toy_speech, toy_model_file):
     line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "-o", "u.json"]
     assert run(*line).code == 0
     before = (here / "u.json").read_bytes()
@@ -109,13 +102,13 @@ def test_units_are_replaced_where_that_is_meant(
     assert (here / "u.json").read_bytes() != before
 
 
-def test_a_model_is_adapted_in_its_place(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_model_is_adapted_in_its_place(run, here, toy_speech, toy_model_file):
     shutil.copy(toy_model_file, here / "m.lipmotion")
     assert run("adapt", toy_speech, "--model", "m.lipmotion", "-o", "m.lipmotion", "--force").code == 0
     assert load_model(here / "m.lipmotion").adaptation is not None
 
 
-def test_a_recording_is_never_replaced(run: RunCommand, laid: Path) -> None:
+def test_a_recording_is_never_replaced(run, laid):
     for line in ("animate a.wav -o a.wav --force", "adapt a.wav -o a.wav --force"):
         done = run(*line.split())
         assert is_one_error(done, 7)
@@ -124,15 +117,13 @@ def test_a_recording_is_never_replaced(run: RunCommand, laid: Path) -> None:
 
 
 @pytest.mark.usefixtures("here")
-def test_a_transcript_may_have_the_name_of_a_folder(
-    run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path
-) -> None:
+def test_a_transcript_may_have_the_name_of_a_folder(run, here, toy_speech, toy_model_file):
     (here / "papa").mkdir()
     line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "--transcript", "papa"]
     assert run(*line, "-o", "papa/a.json").code == 0
 
 
-def test_a_link_is_written_through(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_link_is_written_through(run, here, toy_speech, toy_model_file):
     (here / "there").mkdir()
     (here / "a.json").symlink_to("there/b.json")
     line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "-o", "a.json"]
@@ -143,7 +134,7 @@ def test_a_link_is_written_through(run: RunCommand, here: Path, toy_speech: Path
     assert is_one_error(run(*line, "there/b.json"), 7)
 
 
-def test_every_path_is_declared() -> None:
+def test_every_path_is_declared():
     """Every argument of the type Path is declared as input or as output."""
     seen = 0
     for verb in _verbs(parser()):
@@ -163,7 +154,7 @@ def _verbs(found: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
                 yield from _verbs(inner)
 
 
-def test_from_python(laid: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_from_python(laid, toy_speech, toy_model_file):
     speech = laid / "speech.json"
     shutil.copy(toy_speech, speech)
     made = animate(Request(toy_speech, recogniser="own"), model=toy_model_file)

@@ -1,7 +1,5 @@
 """Contents and names of files, and arguments, reach a terminal as printable text only."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os
@@ -19,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import is_one_error
 from lipmotion import Corpus
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events
@@ -139,7 +137,7 @@ NOT_SHOWN = {
 
 @pytest.mark.skipif(sys.platform == "win32", reason="names that Windows does not allow")
 @pytest.mark.usefixtures("poisoned")
-def test_what_is_obeyed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_obeyed_is_shown(capsys):
     for line in LINES:
         with logged():
             main([word.replace("EVIL", EVIL) for word in line.split()])
@@ -149,7 +147,7 @@ def test_what_is_obeyed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
         assert SHOWN[:8] in shown or line in NOT_SHOWN, line
 
 
-def test_warnings(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_warnings(run, monkeypatch):
     def warn(_: Namespace) -> None:
         logging.getLogger("lipmotion").warning("%s is odd", EVIL)
         logging.getLogger("another.package").error(EVIL)
@@ -165,7 +163,7 @@ def test_warnings(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("watched", [False, True])
-def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, watched: bool) -> None:
+def test_progress(capsys, monkeypatch, watched):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: watched, raising=False)
     with report_progress(Namespace(machine_readable=False, stopper=Stopper(), events=Events())) as report:
         report.receive(Progress(EVIL, 0, 2, 0.0))
@@ -179,17 +177,13 @@ def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Monkey
     assert not any(part in err for part in ("\x1b]", "\x07", "\x9b", "\u202e", "\nlipmotion: error: forged"))
 
 
-def test_tables_have_a_line_a_row() -> None:
+def test_tables_have_a_line_a_row():
     """A value with an end of line in it does not begin a row of its own."""
     row = dict.fromkeys(("acc", "acc_per_clip", "nrmse", "global_variance", "jerk"), 0.5)
     condition = {"channels": {EVIL: row}, "acc": 0.5, "amse": 0.5, "leading": EVIL, "lag_ms": 1.0}
     figures = {
-        "closed_under": None,
-        "still_channels": [EVIL],
-        "split": EVIL,
-        "clips": 1,
-        "conditions": {EVIL: condition},
-    }
+        "closed_under": None, "still_channels": [EVIL], "split": EVIL, "clips": 1, "conditions": {EVIL: condition},
+    }  # fmt: skip
     assert figures_table(figures).count(SHOWN) == 5
     assert OBEYED.search(figures_table(figures)) is None
     span = Span(0.0, 1.0, Unit(EVIL, EVIL, EVIL))
@@ -197,7 +191,7 @@ def test_tables_have_a_line_a_row() -> None:
     assert OBEYED.search(explanation_text(explained)) is None
 
 
-def test_what_is_laid_out_stays_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_laid_out_stays_so(capsys):
     print_lines("one\ttwo\n\n  three é 語 👩‍👧\n")
     print_line("tab\tand\nend")
     print_json({"name": EVIL, "n": np.float64(1.5).item()})
@@ -209,11 +203,11 @@ def test_what_is_laid_out_stays_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert document.isprintable()
 
 
-def test_a_bug_is_none() -> None:
+def test_a_bug_is_none():
     assert outcome(RuntimeError("oh")) is None
 
 
-def test_a_message_that_repeats_a_file_is_cut_in_its_middle() -> None:
+def test_a_message_that_repeats_a_file_is_cut_in_its_middle():
     for error in (InputError, OSError):
         told = outcome(error(f"a.csv: found {'x' * 100_000}; give numbers"))
         assert told is not None
@@ -224,7 +218,7 @@ def test_a_message_that_repeats_a_file_is_cut_in_its_middle() -> None:
         assert " ... " in told[1]
 
 
-def test_a_current_folder_that_is_gone_is_said() -> None:
+def test_a_current_folder_that_is_gone_is_said():
     told = outcome(FileNotFoundError(2, os.strerror(2)))
     assert told is not None
     assert "the current folder has been deleted" in told[1]
@@ -233,13 +227,13 @@ def test_a_current_folder_that_is_gone_is_said() -> None:
     assert "a.wav" in other[1]
 
 
-def test_a_message_of_usual_length_is_whole() -> None:
+def test_a_message_of_usual_length_is_whole():
     told = outcome(InputError("word " * 199))
     assert told is not None
     assert " ... " not in told[1]
 
 
-def test_a_wrong_command_line_is_one_line_of_limited_length(run: RunCommand) -> None:
+def test_a_wrong_command_line_is_one_line_of_limited_length(run):
     done = run("cues", *["a.wav"] * 10_000)
     assert is_one_error(done, 2)
     assert len(done.err[0]) < 1100

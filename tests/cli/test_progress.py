@@ -1,7 +1,3 @@
-"""Progress of long work for a program and on a terminal."""
-
-from __future__ import annotations
-
 import json
 import logging
 import os
@@ -15,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from children import LIPMOTION, environment, run_child
-from cli.conftest import Done, RunCommand
-from lipmotion import Corpus
+from cli.conftest import Done
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, JsonLines
 from lipmotion.cli.terminal.progress import report_progress
@@ -26,12 +21,9 @@ from lipmotion.types import Item, Progress
 from lipmotion_lab.verbs import evaluate
 
 EVENTS = (
-    Progress("first", 0, 2, 0.0),
-    Item("a", "prepared"),
-    Progress("first", 1, 2, 0.25, -61.5),
-    Item("b", "skipped", "no face\nanywhere"),
-    Progress("second", 2, 2, 1.0),
-)
+    Progress("first", 0, 2, 0.0), Item("a", "prepared"), Progress("first", 1, 2, 0.25, -61.5),
+    Item("b", "skipped", "no face\nanywhere"), Progress("second", 2, 2, 1.0),
+)  # fmt: skip
 
 
 def objects(done: Done) -> list[dict[str, object]]:
@@ -44,7 +36,7 @@ def options(machine_readable: bool) -> Namespace:
     )
 
 
-def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_event_is_one_json_object_on_a_line(capsys):
     with report_progress(options(machine_readable=True)) as report:
         for event in EVENTS:
             report.receive(event)
@@ -63,7 +55,7 @@ def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[
     ]
 
 
-def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys):
     with report_progress(options(machine_readable=False)) as report:
         for event in EVENTS:
             report.receive(event)
@@ -71,7 +63,7 @@ def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pyte
     assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face\\nanywhere\n")
 
 
-def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_gets_a_bar(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     with report_progress(options(machine_readable=False)) as report:
         for event in EVENTS:
@@ -87,7 +79,7 @@ def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: 
 
 
 @pytest.mark.long
-def test_training_for_a_program(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_training_for_a_program(run, toy_corpus, here):
     done = run("train", toy_corpus.path, "-o", "m.lipmotion", "--from", "none", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     first, *between, last = objects(done)
@@ -99,7 +91,7 @@ def test_training_for_a_program(run: RunCommand, toy_corpus: Corpus, here: Path)
     assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
 
 
-def test_a_failure_is_said_to_both(run: RunCommand) -> None:
+def test_a_failure_is_said_to_both(run):
     done = run("train", "missing", "-o", "m", "--machine-readable")
     assert done.code == 4
     start, failure = objects(done)
@@ -107,7 +99,7 @@ def test_a_failure_is_said_to_both(run: RunCommand) -> None:
     assert done.err == [f"lipmotion: error: {failure['reason']}"]
 
 
-def test_why_it_failed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_why_it_failed(capsys, monkeypatch):
     def fail(error: BaseException, _: Namespace) -> None:
         raise error
 
@@ -126,7 +118,7 @@ def test_why_it_failed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.M
         assert said.err.endswith(f"{reason}\n") or code == 1
 
 
-def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
+def test_an_error_on_the_command_line_is_a_failure_too(run):
     done = run("evaluate", "--machine-readable")
     assert done.code == 2
     (failure,) = objects(done)
@@ -140,7 +132,7 @@ def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
     "arguments",
     [["info"], ["--help"], ["cues", "--help"], ["--version"], ["train", "CORPUS", "-o", "m", "--machine-readable"]],
 )
-def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str]) -> None:
+def test_output_that_is_full(toy_corpus, here, arguments):
     command = [str(toy_corpus.path) if argument == "CORPUS" else argument for argument in arguments]
     with Path("/dev/full").open("w") as full:
         unbuffered = "1" if command[0] == "train" else ""
@@ -155,7 +147,7 @@ CLOSED = "standard {} is closed"
 
 @pytest.mark.skipif(sys.platform == "win32", reason="streams are closed as POSIX shells do")
 @pytest.mark.long
-def test_streams_that_are_closed(toy_speech: Path, toy_model_file: Path, here: Path) -> None:
+def test_streams_that_are_closed(toy_speech, toy_model_file, here):
     """No file that is opened takes the number of a standard stream."""
     own = shlex.join([str(toy_speech), "--model", str(toy_model_file), "--recogniser", "own"])
     for line, code, said in (
@@ -176,7 +168,7 @@ def test_streams_that_are_closed(toy_speech: Path, toy_model_file: Path, here: P
 
 
 @pytest.mark.usefixtures("ordinary_signals")
-def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPatch, run: RunCommand) -> None:
+def test_what_is_swallowed_stops_at_the_next_event(monkeypatch, run):
     """As when the signal comes during an import that treats any exception as a missing package."""
 
     def swallows(given: Namespace) -> None:

@@ -1,12 +1,10 @@
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused
 from lipmotion import load_model, read_motion, speak, write
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices import installed
@@ -26,7 +24,7 @@ def basics(toy_model_file: Path) -> tuple[object, ...]:
     return ("speak", TEXT, "--model", toy_model_file)
 
 
-def test_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_files(run, basics, here):
     names = ["a.mp4", "a.wav", "a.json", "a.csv"]
     assert run(*basics, "--fps", "5", "--rate", "50", "-o", *names) == (0, names, [])
     assert sorted(path.name for path in here.iterdir()) == sorted(names)
@@ -35,9 +33,7 @@ def test_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     assert [span.label.phone for span in units][:3] == ["sil", "p", "aa"]
 
 
-def test_it_is_the_function_of_the_same_name(
-    run: RunCommand, basics: tuple[object, ...], toy_model_file: Path, here: Path
-) -> None:
+def test_it_is_the_function_of_the_same_name(run, basics, toy_model_file, here):
     run(*basics, "--voice", "one", "-o", "command.json", "command.wav")
     model = load_model(toy_model_file)
     sound, result = speak(TEXT, voice="stand-in:one", model=model)
@@ -47,21 +43,21 @@ def test_it_is_the_function_of_the_same_name(
         assert (here / name).read_bytes() == (here / "function" / name).read_bytes()
 
 
-def test_a_text_file(run: RunCommand, toy_model_file: Path, here: Path) -> None:
+def test_a_text_file(run, toy_model_file, here):
     (here / "text.txt").write_text("\ufeff" + TEXT, encoding="utf-8")
     assert run("speak", "--text", "text.txt", "--model", toy_model_file, "-o", "a.json").code == 0
     words = [unit.get("word") for unit in json.loads((here / "a.json").read_text())["units"]]
     assert list(dict.fromkeys(filter(None, words))) == ["papa", "see", "bob"]
 
 
-def test_for_programs(run: RunCommand, basics: tuple[object, ...]) -> None:
+def test_for_programs(run, basics):
     done = run(*basics, "-o", "a.wav", "--machine-readable")
     start, success = map(json.loads, done.out)
     assert (start["type"], success["type"], success["files"]) == ("start", "success", ["a.wav"])
     assert success["seconds"] == pytest.approx(1.31, abs=0.02)
 
 
-def test_voices(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_voices(run, monkeypatch):
     done = run("speak", "--voices")
     assert [line.split() for line in done.out] == [["stand-in:one", "en-us"], ["stand-in:two", "en-us"]]
     success = json.loads(run("speak", "--voices", "--machine-readable").out[-1])
@@ -70,7 +66,7 @@ def test_voices(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run("speak", "--voices") == (0, ["no voice is installed"], [])
 
 
-def test_wrong_command_lines(run: RunCommand) -> None:
+def test_wrong_command_lines(run):
     for line, said in (
         (["speak", TEXT], "required: -o FILE, or --voices"),
         (["speak", "--voices", "-o", "a.wav"], "required: -o FILE, or --voices"),
@@ -82,7 +78,7 @@ def test_wrong_command_lines(run: RunCommand) -> None:
         assert said in done.err[-1]
 
 
-def test_errors(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+def test_errors(run, basics, here):
     for more, code, said in (
         ("-o a.mp3", 7, ".wav .flac .ogg"),
         ("-o no/a.wav", 7, "does not exist"),
@@ -92,23 +88,17 @@ def test_errors(run: RunCommand, basics: tuple[object, ...], here: Path) -> None
         ("-o a.json --channels smile", 3, "no motion channel 'smile'"),
         ("-o a.json --speaker nobody", 3, "no 'nobody'"),
     ):
-        done = run(*basics, *more.split())
-        assert is_one_error(done, code)
-        assert said in done.err[0]
+        check_refused(run(*basics, *more.split()), code, said)
         assert list(here.iterdir()) == []
 
 
-def test_without_a_synthesiser_it_says_what_to_install(
-    run: RunCommand, basics: tuple[object, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_synthesiser_it_says_what_to_install(run, basics, monkeypatch):
     only = installed.SYNTHESISERS["stand-in"]
     monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": replace(only, voices=tuple)})
-    done = run(*basics, "-o", "a.wav")
-    assert is_one_error(done, 8)
-    assert f"{install_command('text')}, or: apt install stand-in" in done.err[0]
+    check_refused(run(*basics, "-o", "a.wav"), 8, f"{install_command('text')}, or: apt install stand-in")
 
 
-def test_an_output_never_replaces_the_model(run: RunCommand, basics: tuple[object, ...], toy_model_file: Path) -> None:
+def test_an_output_never_replaces_the_model(run, basics, toy_model_file):
     done = run(*basics, "-o", toy_model_file)
     assert done.code == 7
     assert toy_model_file.exists()

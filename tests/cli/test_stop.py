@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -16,8 +14,6 @@ import lipmotion
 from children import LIPMOTION, PIPE, child, environment, run_child
 from children import Done as Completed
 from cli import signalled
-from cli.conftest import RunCommand
-from lipmotion import Corpus
 from lipmotion.cli.terminal.stop import Stopped, Stopper
 from lipmotion.cli.verbs import info
 
@@ -30,9 +26,7 @@ pytestmark = [
 
 
 @BOTH
-def test_a_signal_is_one_line_and_an_exit_code(
-    run: RunCommand, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
-) -> None:
+def test_a_signal_is_one_line_and_an_exit_code(run, monkeypatch, number):
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.excepthook
 
     def kill(_: Namespace) -> None:
@@ -44,7 +38,7 @@ def test_a_signal_is_one_line_and_an_exit_code(
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.excepthook) == before
 
 
-def test_an_error_that_follows_from_a_signal_is_not_shown(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_that_follows_from_a_signal_is_not_shown(run, monkeypatch):
     def kill(error: Exception, _: Namespace) -> None:
         try:
             signal.raise_signal(signal.SIGINT)
@@ -56,9 +50,7 @@ def test_an_error_that_follows_from_a_signal_is_not_shown(run: RunCommand, monke
         assert run("info") == (130, [], [LINE])
 
 
-def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(
-    run: RunCommand, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run, monkeypatch):
     tidied = []
 
     def kill(_: Namespace) -> None:
@@ -73,7 +65,7 @@ def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(
     assert tidied == [True]
 
 
-def test_an_ignored_signal_stays_ignored(monkeypatch: pytest.MonkeyPatch, run: RunCommand) -> None:
+def test_an_ignored_signal_stays_ignored(monkeypatch, run):
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         monkeypatch.setattr(info, "run", lambda _: signal.raise_signal(signal.SIGINT))
@@ -83,7 +75,7 @@ def test_an_ignored_signal_stays_ignored(monkeypatch: pytest.MonkeyPatch, run: R
         signal.signal(signal.SIGINT, before)
 
 
-def test_while_packages_are_imported(toy_speech: Path, here: Path) -> None:
+def test_while_packages_are_imported(toy_speech, here):
     """The first package that is imported sends the signal, before the program has printed anything."""
     number = signal.SIGTERM
     (here / "numpy.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nwhile True: pass\n")
@@ -111,7 +103,7 @@ sys.exit(main())
 
 
 @pytest.mark.long
-def test_training_stopped_in_the_middle_goes_on(toy_corpus: Corpus, here: Path, run_outside: RunCommand) -> None:
+def test_training_stopped_in_the_middle_goes_on(toy_corpus, here, run_outside):
     number = signal.SIGTERM
     train = ["train", toy_corpus.path, "--engine", "joint", "--set", "mixtures=1"]  # it learns in a second
     run_outside(*train, "-o", "whole.lipmotion")
@@ -135,7 +127,7 @@ def test_training_stopped_in_the_middle_goes_on(toy_corpus: Corpus, here: Path, 
     assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion", "whole.lipmotion"]
 
 
-def test_a_second_signal_later_ends_the_program() -> None:
+def test_a_second_signal_later_ends_the_program():
     """A second signal ends the program at once, even where the first one was swallowed."""
     program = (
         "import time\n"
@@ -149,7 +141,6 @@ def test_a_second_signal_later_ends_the_program() -> None:
         "    except KeyboardInterrupt: pass\n"
     )
     with child([sys.executable, "-c", program]) as process:
-        assert process.stdout is not None
         for _ in range(2):
             assert process.stdout.readline() == "ready\n"
             process.send_signal(signal.SIGINT)
@@ -183,7 +174,7 @@ def lines(toy_speech: Path, toy_model_file: Path, here: Path) -> dict[str, tuple
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["cues", "train"])
-def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object], bool, int]], here: Path) -> None:
+def test_whenever_the_signal_comes(name, lines, here):
     """From the first call to the end of Python: one final event says how the command ended, and no file is left."""
     arguments, events_only, code = lines[name]
     assert signalled_at(0, signal.SIGTERM, arguments).returncode == code
@@ -204,7 +195,7 @@ def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object
 
 
 @pytest.mark.long
-def test_a_film_that_is_stopped(toy_speech: Path, toy_model_file: Path, filmed_face_file: Path, here: Path) -> None:
+def test_a_film_that_is_stopped(toy_speech, toy_model_file, filmed_face_file, here):
     """Before frames are made, and while they are."""
     own = ["--model", toy_model_file, "--recogniser", "own", "--face", filmed_face_file, "--machine-readable"]
     arguments = ["animate", toy_speech, *own, "-o", here / "a.mp4"]
@@ -219,7 +210,7 @@ def test_a_film_that_is_stopped(toy_speech: Path, toy_model_file: Path, filmed_f
         assert list(here.iterdir()) == []
 
 
-def test_a_late_signal_does_not_change_what_is_done(toy_model_file: Path, here: Path) -> None:
+def test_a_late_signal_does_not_change_what_is_done(toy_model_file, here):
     for number, step in ((signal.SIGINT, signalled.RETURN_MARK), (signal.SIGTERM, signalled.CLEARANCE_MARK)):
         done = signalled_at(step, number, ["info", toy_model_file])
         assert (done.returncode, done.stderr) == (0, "")
@@ -227,7 +218,7 @@ def test_a_late_signal_does_not_change_what_is_done(toy_model_file: Path, here: 
     assert list(here.iterdir()) == []
 
 
-def test_once_settled_a_signal_comes_too_late() -> None:
+def test_once_settled_a_signal_comes_too_late():
     stopper = Stopper()
     stopper.listen()
     try:
@@ -240,7 +231,7 @@ def test_once_settled_a_signal_comes_too_late() -> None:
         stopper.stop_listening(process_ends=False)
 
 
-def test_what_was_swallowed_is_not_settled() -> None:
+def test_what_was_swallowed_is_not_settled():
     stopper = Stopper()
     stopper.listen()
     try:
@@ -253,7 +244,7 @@ def test_what_was_swallowed_is_not_settled() -> None:
         stopper.stop_listening(process_ends=False)
 
 
-def test_little_is_loaded_before_signals_are_listened_to() -> None:
+def test_little_is_loaded_before_signals_are_listened_to():
     """Before the handlers are installed, Python answers a signal with a traceback."""
     program = (
         "import sys; before = set(sys.modules); import lipmotion.cli.main; print(*sorted({*sys.modules} - before))"
@@ -262,11 +253,7 @@ def test_little_is_loaded_before_signals_are_listened_to() -> None:
     done = run_child([sys.executable, "-S", "-c", program], variables=source, check=True)
     loaded = set(done.stdout.split())
     assert {name for name in loaded if name.startswith("lipmotion")} == {
-        "lipmotion",
-        "lipmotion.cli",
-        "lipmotion.cli.terminal",
-        "lipmotion.cli.terminal.events",
-        "lipmotion.cli.main",
+        "lipmotion", "lipmotion.cli", "lipmotion.cli.terminal", "lipmotion.cli.terminal.events", "lipmotion.cli.main",
         "lipmotion.cli.terminal.stop",
-    }
+    }  # fmt: skip
     assert not loaded & {"typing", "re", "json", "argparse", "logging", "numpy", "pathlib"}

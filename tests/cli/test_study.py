@@ -1,20 +1,23 @@
-"""``lipmotion study``."""
-
-from __future__ import annotations
-
+import json
+import socket
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
-from lipmotion_studio.study.answers import read_answers
+from cli.conftest import check_refused, is_one_error
+from lipmotion.storage.files import lock_folder
+from lipmotion.storage.json_text import nan_as_null
+from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
+from lipmotion_studio.study.answers import read_answers, write_answers
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
+from study.analysis.simulated import Effects, comparisons, paired_answers, rated_answers, ratings
 from study.small_study import small_study
 from study.test_design import write_video
 
 
-def test_design_makes_a_study(here: Path, run: RunCommand) -> None:
+def test_design_makes_a_study(here, run):
     for name in ("one", "two"):
         write_video(here / "said" / f"{name}.mp4", 10)
         write_video(here / "ours" / f"{name}.mp4", 90)
@@ -26,7 +29,7 @@ def test_design_makes_a_study(here: Path, run: RunCommand) -> None:
     assert run("study", "design", "-o", "other", "--paired", "--mos", *words).code == 2
 
 
-def test_export_and_forget(here: Path, run: RunCommand) -> None:
+def test_export_and_forget(here, run):
     small_study(here / "study")
     with closing(StudyStore(here / "study")) as store:
         for _ in range(2):
@@ -48,6 +51,52 @@ def test_export_and_forget(here: Path, run: RunCommand) -> None:
 
 
 @pytest.mark.parametrize("words", [("serve", "none"), ("export", "none", "-o", "a.csv"), ("forget", "none", "r001")])
-def test_what_is_no_study_is_one_error(here: Path, run: RunCommand, words: tuple[str, ...]) -> None:
+def test_what_is_no_study_is_one_error(here, run, words):
     assert is_one_error(run("study", *words), 3)
     assert list(here.iterdir()) == []
+
+
+def write_study(path: Path) -> None:
+    draw = np.random.default_rng(2)
+    answers = rated_answers(ratings(draw, np.array([3.0, 4.0]), (8, 6), Effects()))
+    write_answers(path, answers + paired_answers(comparisons(draw, np.array([-0.5, 0.5]), (8, 6), Effects())))
+
+
+def test_the_figures_are_those_of_the_function(run, here):
+    write_study(here / "answers.csv")
+    done = run("study", "analyse", "answers.csv", "-o", "result.json", "--baseline", "c1", "--sentences", "12")
+    assert (done.code, done.err) == (0, [])
+    figures = analyse_study(here / "answers.csv", baseline="c1", sentences=12)
+    assert "\n".join(done.out) == analysis_table(figures)
+    assert json.loads((here / "result.json").read_text()) == json.loads(json.dumps(nan_as_null(figures)))
+
+
+def test_programs_read_lines_of_json(run, here):
+    write_study(here / "answers.csv")
+    done = run("study", "analyse", "answers.csv", "--machine-readable")
+    assert done.code == 0
+    assert [part["kind"] for part in json.loads(done.out[-1])["figures"]["all"]] == ["mos", "paired"]
+
+
+def test_what_cannot_be_used(run, here):
+    write_study(here / "answers.csv")
+    (here / "other.csv").write_text("rater,kind\n1,2\n")
+    for arguments, code, words in (
+        (("other.csv",), 3, "no column"),
+        (("nothing.csv",), 3, "nothing.csv"),
+        (("answers.csv", "--baseline", "c7"), 3, "the baseline 'c7', required one of: c0, c1"),
+        (("answers.csv", "--power", "2"), 3, "a power of 2"),
+        (("answers.csv", "-o", "answers.csv"), 7, "answers.csv"),
+    ):
+        check_refused(run("study", "analyse", *arguments), code, words)
+
+
+def test_what_the_studio_refuses(here, run):
+    pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
+    assert is_one_error(run("studio", "nothing.wav"), 3)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        assert is_one_error(run("studio", "--port", taken.getsockname()[1], "-o", "project"), 3)
+    with lock_folder(here / "project"):  # as by another studio
+        assert is_one_error(run("studio", "-o", "project"), 7)
+    (here / "project" / "project.json").write_text("{}", encoding="utf-8")
+    assert is_one_error(run("studio", "project"), 3)

@@ -1,15 +1,10 @@
-from __future__ import annotations
-
 import shutil
-import wave
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused
 from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
 from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.train import TrainReport
@@ -18,7 +13,7 @@ from lipmotion.testing.toy import toy_sentences
 from lipmotion.units import load_unit_set
 
 
-def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_a_model_and_what_it_was_made_of(run, toy_corpus, here):
     done = run("train", toy_corpus.path, "-o", "mine.lipmotion")
     use = "use it: lipmotion animate SPEECH -o FILE --model mine.lipmotion"
     assert done == (0, [f"mine.lipmotion: 8 used, 0.3 minutes, 0 skipped; {use}"], [])
@@ -29,13 +24,7 @@ def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, he
 
 
 @pytest.mark.long
-def test_all_of_a_corpus(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
-    assert run("train", toy_corpus.path, "-o", "all.lipmotion", "--split", "all").code == 0
-    assert load_model(here / "all.lipmotion").about["split"] == "all"
-
-
-@pytest.mark.long
-def test_what_was_left_out_is_said(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_what_was_left_out_is_said(run, toy_corpus, here):
     corpus = Corpus.create(here / "corpus")
     for name in toy_corpus.names("train")[:4]:
         utterance = toy_corpus.utterance(name)
@@ -48,7 +37,7 @@ def test_what_was_left_out_is_said(run: RunCommand, toy_corpus: Corpus, here: Pa
 
 
 @pytest.mark.long
-def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_speakers_are_chosen(run, toy_corpus, here):
     corpus = Corpus.create(here / "corpus")
     for name, speaker in zip(toy_corpus.names("train"), ("anna", "anna", "ben", "ben", "carl"), strict=False):
         corpus.add(replace(toy_corpus.utterance(name), speaker=speaker))
@@ -63,9 +52,7 @@ def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) ->
     )
 
 
-def test_what_is_given_wins_over_what_the_joint_engine_recognises(
-    run: RunCommand, toy_corpus: Corpus, toy_speech: Path, here: Path
-) -> None:
+def test_what_is_given_wins_over_what_the_joint_engine_recognises(run, toy_corpus, toy_speech, here):
     own = ["--units", "eVis", "--set", "recognise_units=true", "--set", "mixtures=1"]
     assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
     assert load_model(here / "m").engine.name == "joint"
@@ -82,7 +69,7 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(
     assert {span.label.unit for span in units[0] if not span.label.phone} >= {"bilabial", "low"}
 
 
-def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_a_system_of_the_coupled_engine(run, toy_corpus, here):
     wanted = ["--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
     assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
     config = load_model(here / "m").engine.config
@@ -93,7 +80,7 @@ def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, her
 
 
 @pytest.mark.long
-def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_units_of_a_table_that_is_not_needed_again(run, toy_corpus, here):
     units = load_unit_set("eVis")
     table = here / "mine.txt"
     table.write_text("".join(f"u{n} {' '.join(units.phones(unit))}\n" for n, unit in enumerate(units.units)))
@@ -106,9 +93,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: 
     assert figures[0] == figures[1]
 
 
-def test_other_voices_are_learned_from_but_those_for_judging(
-    run: RunCommand, toy_model: Model, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_voices_are_learned_from_but_those_for_judging(run, toy_model, toy_corpus, toy_speech, here, monkeypatch):
     """Of two installed voices, slt is held out; one friend was recorded."""
     speakers: list[list[str]] = []
 
@@ -132,18 +117,6 @@ def test_other_voices_are_learned_from_but_those_for_judging(
     assert speakers == [["friend", "rms"], ["rms"], []]
 
 
-def test_an_engine_without_a_use_for_voices(
-    run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    sentence = toy_sentences(3)[0]
-    one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
-    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthesise_sentences", lambda **_: iter([one]))
-    refused = run("train", toy_corpus.path, "-o", "other", "--voices")
-    assert is_one_error(refused, 3)
-    assert "the engine 'trajectory' does not learn from other voices without motion" in refused.err[0]
-    assert list(here.iterdir()) == []
-
-
 UNUSABLE = [
     ("missing -o m", 4, "missing: no such corpus; make one"),
     ("folder -o m", 4, "folder: not a corpus"),
@@ -163,19 +136,15 @@ UNUSABLE = [
 ]
 
 
-def test_what_cannot_be_used(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_what_cannot_be_used(run, toy_corpus, here):
     (here / "folder").mkdir()
     for arguments, code, words in UNUSABLE:
-        done = run("train", *arguments.replace("CORPUS", str(toy_corpus.path)).split())
-        assert is_one_error(done, code)
-        assert words in done.err[0]
+        check_refused(run("train", *arguments.replace("CORPUS", str(toy_corpus.path)).split()), code, words)
         assert [path.name for path in here.rglob("*")] == ["folder"]
 
 
 @pytest.mark.long
-def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(
-    run: RunCommand, toy_corpus: Corpus, here: Path
-) -> None:
+def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(run, toy_corpus, here):
     for more, visual in (((), "eigenlips"), (("--visual", "geometry"), None)):
         assert run("train", toy_corpus.path, "-o", "m.lipmotion", "--force", "--preset", "xieliu2007", *more).code == 0
         model = load_model(here / "m.lipmotion")
@@ -183,19 +152,8 @@ def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(
         assert (model.engine.config.conversion, model.engine.config.states) == ("em", 5)
 
 
-def sound(path: Path, samples: np.ndarray) -> Path:
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(16_000)
-        file.writeframes(np.round(samples * 32767).astype("<i2").tobytes())
-    return path
-
-
 @pytest.mark.long
-def test_it_is_the_function_of_the_same_name(
-    run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path
-) -> None:
+def test_it_is_the_function_of_the_same_name(run, here, toy_speech, toy_model_file):
     done = run("adapt", toy_speech, "--model", toy_model_file, "-o", "voice.lipmotion")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("voice.lipmotion: 1 recordings, ")
@@ -205,18 +163,3 @@ def test_it_is_the_function_of_the_same_name(
     said = dict(line.split(maxsplit=1) for line in run("info", "voice.lipmotion").out if len(line.split()) > 1)
     assert said["adapted"].startswith("recordings=1, speech_s=")
     assert run("animate", toy_speech, "--model", "voice.lipmotion", "-o", "m.json").code == 0
-
-
-@pytest.mark.long
-def test_what_cannot_be_adapted_to(run: RunCommand, here: Path, toy_model_file: Path, tmp_path: Path) -> None:
-    silent = sound(tmp_path / "silent.wav", np.zeros(32_000))
-    (tmp_path / "text.wav").write_bytes(b"words")
-    for path, words in (
-        (tmp_path / "missing.wav", "no such file"),
-        (tmp_path / "text.wav", "is text, required a recording"),
-        (silent, "no speech found in the recordings"),
-    ):
-        done = run("adapt", path, "--model", toy_model_file, "-o", "voice.lipmotion")
-        assert is_one_error(done, 3)
-        assert words in done.err[0]
-        assert list(here.iterdir()) == []

@@ -1,7 +1,5 @@
 """Files without permission: one error line, the exit code of its kind, and no file left behind."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -76,20 +74,16 @@ def laid(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: Path)
         path.chmod(0o755)
 
 
-def run_as_ordinary(line: str) -> Done:
-    done = run_child([*ordinary(), *LIPMOTION, *line.split()])
-    return Done(done.returncode, done.stdout.splitlines(), done.stderr.splitlines())
-
-
 @pytest.mark.long
-def test_what_may_not_be_read_or_written(laid: Path) -> None:
+def test_what_may_not_be_read_or_written(laid):
     before = sorted(path.name for path in laid.iterdir())
     for closed, code, line in LINES:
         (laid / closed).chmod(0)
         try:
-            done = run_as_ordinary(line)
+            ran = run_child([*ordinary(), *LIPMOTION, *line.split()])
         finally:
             (laid / closed).chmod(0o755)
+        done = Done(ran.returncode, ran.stdout.splitlines(), ran.stderr.splitlines())
         if "--machine-readable" in line:
             last = json.loads((done.err if line.startswith("cues") else done.out)[-1])
             assert (done.code, last["type"]) == (code, "failure"), done

@@ -1,18 +1,16 @@
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand, is_one_error
+from cli.conftest import check_refused
 
 pytestmark = pytest.mark.usefixtures("here")
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SAID = "please speak and my lips will move five big blue boats float by"
 
 
-def test_words_are_written_and_given_back(run: RunCommand, here: Path) -> None:
+def test_words_are_written_and_given_back(run, here):
     assert run("words", WELCOME, "-o", "said.txt", "said.json") == (0, ["said.txt", "said.json"], [])
     assert (here / "said.txt").read_text() == SAID + "\n"
     done = run("animate", WELCOME, "--transcript", "said.json", "-o", "motion.json")
@@ -21,7 +19,7 @@ def test_words_are_written_and_given_back(run: RunCommand, here: Path) -> None:
     assert list(dict.fromkeys(unit["word"] for unit in units if unit.get("word"))) == SAID.split()
 
 
-def test_for_people_and_programs(run: RunCommand) -> None:
+def test_for_people_and_programs(run):
     assert run("words", WELCOME) == (0, [SAID], [])
     done = run("words", WELCOME, "--machine-readable")
     start, success = map(json.loads, done.out)
@@ -31,7 +29,7 @@ def test_for_people_and_programs(run: RunCommand) -> None:
     assert 0 < success["confidence"] < 1
 
 
-def test_errors(run: RunCommand) -> None:
+def test_errors(run):
     for line, code, said in (
         (["missing.wav"], 3, "no such file"),
         ([WELCOME, "-o", "words.csv"], 7, "unknown format '.csv'; required one of: .txt .json"),
@@ -39,6 +37,4 @@ def test_errors(run: RunCommand) -> None:
         ([WELCOME, "--recogniser", "fast"], 3, "'fast' recognises phones, not words; required one of: auto, w"),
         ([WELCOME, "--recogniser", "own"], 3, "'own' recognises phones, not words; required one of: auto, wo"),
     ):
-        done = run("words", *line)
-        assert is_one_error(done, code)
-        assert said in done.err[0]
+        check_refused(run("words", *line), code, said)

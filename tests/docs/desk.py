@@ -1,7 +1,5 @@
 """A folder with all that commands on pages name: speech, words, motion, corpora, models, characters, answers."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

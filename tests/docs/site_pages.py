@@ -1,7 +1,5 @@
 """The pages of the documentation site, and their blocks of commands and Python."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from collections.abc import Iterator

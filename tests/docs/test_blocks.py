@@ -1,7 +1,5 @@
 """What pages say to type is run: here, by the test of the page, or by hand, as a marker says, with the last output."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from functools import partial
@@ -12,20 +10,17 @@ import pytest
 import lipmotion
 from docs.desk import copied, set_desk
 from docs.site_pages import ROOT, Block, blocks, pages
-from lipmotion import Corpus, Model
+from lipmotion import Corpus
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training import train as train_module
 
 TESTED = {
-    "README": "test_readme.py",
-    "docs/start": "test_readme.py",
-    "docs/your-face": "docs/test_your_face.py",
-    "docs/api": "docs/test_api_page.py",
-    "docs/extend/": "docs/test_extend.py",
+    "README": "test_readme.py", "docs/start": "test_readme.py", "docs/your-face": "docs/test_your_face.py",
+    "docs/api": "docs/test_api_page.py", "docs/extend/": "docs/test_extend.py",
     "recipes/": "docs/test_corpus_recipes.py",
-}
+}  # fmt: skip
 """Pages, or folders of pages, with a test of their own."""
 RESULTS = "docs/results/"
 """Pages that are the output of the commands on them: their sheets have commit and date."""
@@ -40,7 +35,7 @@ def commands(block: Block) -> list[list[str]]:
     return [each for each in words if each]
 
 
-def test_every_command_is_understood() -> None:
+def test_every_command_is_understood():
     understood = parser()
     found = [words for block in ALL if block.language == "sh" for words in commands(block)]
     assert len(found) > 100
@@ -49,7 +44,7 @@ def test_every_command_is_understood() -> None:
             assert understood.parse_args(words[1:]).verb == words[1]
 
 
-def test_what_runs_here_is_ours_and_markers_say_when_and_what() -> None:
+def test_what_runs_here_is_ours_and_markers_say_when_and_what():
     foreign = [
         words for block in HERE if block.language == "sh" for words in commands(block) if words[0] != "lipmotion"
     ]
@@ -72,9 +67,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory, toy_model_file: Path, coupled
 @pytest.mark.long
 @pytest.mark.usefixtures("recognised_once")
 @pytest.mark.parametrize("page", dict.fromkeys(block.page for block in HERE))
-def test_blocks_of_a_page_run(
-    page: str, desk: Path, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_blocks_of_a_page_run(page, desk, toy_model, tmp_path, monkeypatch):
     monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     monkeypatch.chdir(copied(desk, tmp_path / "desk"))
     names: dict[str, object] = {"lipmotion": lipmotion, "corpus": Corpus.open(Path("my-corpus"))}

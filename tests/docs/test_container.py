@@ -1,7 +1,5 @@
 """The Containerfile says what the repository has; where a builder is, it is built."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -25,7 +23,7 @@ def pins(name: str) -> set[str]:
     return set(PIN.findall((ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")))
 
 
-def test_what_is_copied_is_there() -> None:
+def test_what_is_copied_is_there():
     copied = [name for line in after("COPY") for name in line.split()[:-1]]
     assert {"requirements", "pyproject.toml", "src"} <= set(copied)
     assert all((ROOT / name).exists() for name in copied)
@@ -34,7 +32,7 @@ def test_what_is_copied_is_there() -> None:
     assert set(kept[1:]) == {f"!{name}" for name in copied}
 
 
-def test_the_base_and_the_command() -> None:
+def test_the_base_and_the_command():
     (base,) = after("FROM")
     assert re.fullmatch(r"python:3\.1[0-2]-slim", base), "face tracking needs Python 3.10 to 3.12"
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
@@ -44,12 +42,12 @@ def test_the_base_and_the_command() -> None:
         assert pins(name)
 
 
-def test_the_list_of_face_tracking_is_part_of_the_whole() -> None:
+def test_the_list_of_face_tracking_is_part_of_the_whole():
     assert pins("core") < pins("video") < pins("dev")
 
 
 @pytest.mark.long
-def test_it_can_be_built() -> None:
+def test_it_can_be_built():
     builder = next(filter(shutil.which, ("podman", "docker")), None)
     if builder is None or run_child([builder, "info"]).returncode:
         pytest.skip("nothing here builds containers")

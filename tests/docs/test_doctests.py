@@ -1,7 +1,5 @@
 """The examples in docstrings run from the root of the repository, with the shipped model and examples/welcome.flac."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 from collections.abc import Iterator
@@ -37,12 +35,12 @@ EXAMPLES = documented()
 
 @pytest.mark.usefixtures("recognised_once")
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
-def test_the_examples_of_a_docstring_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_examples_of_a_docstring_run(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     reports: list[str] = []
     result = doctest.DocTestRunner(verbose=False).run(EXAMPLES[name], out=reports.append)
     assert result.failed == 0, "".join(reports)
 
 
-def test_every_public_name_has_an_example() -> None:
+def test_every_public_name_has_an_example():
     assert [name for name, _, home in homes() if f"{home}.{name}" not in EXAMPLES] == []

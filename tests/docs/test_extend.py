@@ -1,7 +1,5 @@
 """The pages of docs/extend: their code is written to files, installed as packages, checked and used."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -11,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from children import LIPMOTION, Done, environment, run_child
-from lipmotion import Corpus
 
 PAGES = Path(__file__).parents[2] / "docs" / "extend"
 PROJECT = """[build-system]
@@ -62,16 +59,14 @@ class Package:
 
 @pytest.mark.long
 @pytest.mark.parametrize("page", ["engine.md", "face.md", "exporter.md"])
-def test_what_a_page_writes_keeps_its_contract(page: str, tmp_path: Path) -> None:
+def test_what_a_page_writes_keeps_its_contract(page, tmp_path):
     package = Package(page, tmp_path)
     done = package.run("-c", package.check)
     assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.long
-def test_an_installed_engine_trains_saves_loads_and_animates(
-    toy_corpus: Corpus, toy_speech: Path, tmp_path: Path
-) -> None:
+def test_an_installed_engine_trains_saves_loads_and_animates(toy_corpus, toy_speech, tmp_path):
     package, model = Package("engine.md", tmp_path / "package"), tmp_path / "ridge.lipmotion"
     package.lipmotion("train", toy_corpus.path, "-o", model, "--engine", "ridge", "--set", "penalty=500")
     assert "penalty=500.0" in package.lipmotion("info", model)
@@ -85,7 +80,7 @@ def test_an_installed_engine_trains_saves_loads_and_animates(
 
 
 @pytest.mark.long
-def test_an_installed_predictor_is_chosen_by_name(toy_corpus: Corpus, toy_speech: Path, tmp_path: Path) -> None:
+def test_an_installed_predictor_is_chosen_by_name(toy_corpus, toy_speech, tmp_path):
     package, model = Package("predictor.md", tmp_path / "package"), tmp_path / "frames.lipmotion"
     package.lipmotion("train", toy_corpus.path, "-o", model, "--set", "predictor=frames")
     assert "predictor=frames" in package.lipmotion("info", model)
@@ -100,7 +95,7 @@ def test_an_installed_predictor_is_chosen_by_name(toy_corpus: Corpus, toy_speech
 
 
 @pytest.mark.long
-def test_an_installed_face_format_and_output_work_from_the_command_line(toy_speech: Path, tmp_path: Path) -> None:
+def test_an_installed_face_format_and_output_work_from_the_command_line(toy_speech, tmp_path):
     face, table = Package("face.md", tmp_path / "face"), Package("exporter.md", tmp_path / "table")
     words = Package("output.md", tmp_path / "words")
     words.lipmotion("animate", toy_speech, "--transcript", "see bob papa mama", "-o", tmp_path / "a.words.csv")

@@ -1,7 +1,5 @@
 """Links of all Markdown files resolve, the index has every page, and names of modules and options are present ones."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import fields
@@ -23,15 +21,10 @@ PAGES = sorted(
 CODE_ROOTS = (ROOT, ROOT / "src" / "lipmotion", ROOT / "src", ROOT / "tests")
 
 
-def without_code(text: str) -> str:
-    """Return Markdown without its blocks and spans of code, whose brackets are no links."""
-    text = re.sub(r"^( *)```.*?^\1```", "", text, flags=re.MULTILINE | re.DOTALL)
-    return re.sub(r"`[^`\n]*`", "", text)
-
-
 def links(text: str) -> Iterator[str]:
-    """Give the targets of all links and pictures of a page."""
-    yield from re.findall(r"\]\(([^()\s]+)\)", without_code(text))
+    """Give the targets of all links and pictures of a page; brackets in code are no links."""
+    text = re.sub(r"^( *)```.*?^\1```", "", text, flags=re.MULTILINE | re.DOTALL)
+    yield from re.findall(r"\]\(([^()\s]+)\)", re.sub(r"`[^`\n]*`", "", text))
 
 
 def anchors(page: Path) -> set[str]:
@@ -57,26 +50,26 @@ def broken(text: str, page: Path) -> list[str]:
     return found
 
 
-def test_relative_links_resolve() -> None:
+def test_relative_links_resolve():
     found = {str(page.relative_to(ROOT)): broken(page.read_text(encoding="utf-8"), page) for page in PAGES}
     assert {page: targets for page, targets in found.items() if targets} == {}
 
 
-def test_a_broken_link_is_found() -> None:
+def test_a_broken_link_is_found():
     text = "[a](gone.md) [b](index.md#gone) [c](/etc) `[d](code.md)` ![e](images/welcome.png) [f](index.md#results)"
     assert broken(text, INDEX) == ["gone.md", "index.md#gone", "/etc"]
 
 
-def test_the_index_links_every_page() -> None:
+def test_the_index_links_every_page():
     linked = {(DOCS / target.partition("#")[0]).resolve() for target in links(INDEX.read_text(encoding="utf-8"))}
     assert [str(page.relative_to(ROOT)) for page in DOCS.rglob("*.md") if page not in {*linked, INDEX}] == []
 
 
-def test_the_readme_leads_to_the_index() -> None:
+def test_the_readme_leads_to_the_index():
     assert "docs/index.md" in set(links((ROOT / "README.md").read_text(encoding="utf-8")))
 
 
-def test_named_files_of_the_source_exist() -> None:
+def test_named_files_of_the_source_exist():
     """Paths such as `speech/features/mfcc.py` in spans of code: of the package, of the tests, or of the repository."""
     first = {path.name for root in CODE_ROOTS for path in root.iterdir()}
     for page in PAGES:
@@ -87,7 +80,7 @@ def test_named_files_of_the_source_exist() -> None:
         assert [(page, name) for name in missing if name.endswith(".py") or name.split("/")[0] in first] == []
 
 
-def test_no_page_uses_a_former_name_of_an_option() -> None:
+def test_no_page_uses_a_former_name_of_an_option():
     configurations = [ENGINES.load(name).Config for name in ENGINES.built_in]
     present = {field.name for config in configurations for field in fields(config)}
     former = {old for config in configurations for old in config.aliases} - present - {*ENGINES.built_in}
@@ -102,13 +95,13 @@ def test_no_page_uses_a_former_name_of_an_option() -> None:
     assert found == set()
 
 
-def test_readme_is_short() -> None:
+def test_readme_is_short():
     text = re.sub(r"!\[[^]]*\]\([^)]*\)", "", (ROOT / "README.md").read_text(encoding="utf-8"))
     text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text)
     assert len([word for word in text.split() if re.search(r"\w", word)]) <= 600
 
 
-def test_the_figures_of_the_readme_stand_in_the_results() -> None:
+def test_the_figures_of_the_readme_stand_in_the_results():
     section = (ROOT / "README.md").read_text(encoding="utf-8").split("## How good it is")[1].split("\n## ")[0]
     given = set(re.findall(r"\b0\.\d+", section))
     results = (DOCS / "results" / "figures.md").read_text(encoding="utf-8")
@@ -116,7 +109,7 @@ def test_the_figures_of_the_readme_stand_in_the_results() -> None:
     assert given - set(re.findall(r"\b0\.\d+", results)) == set()
 
 
-def test_all_pages_say_the_same_of_how_long_training_takes() -> None:
+def test_all_pages_say_the_same_of_how_long_training_takes():
     pages = [(ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/verbs.md")]
     said = [re.findall(r"(\w+ \w+ \w+) for 22 minutes of recordings", page) for page in pages]
     assert said == [["about three minutes"], ["about three minutes"]]
@@ -127,7 +120,7 @@ def test_all_pages_say_the_same_of_how_long_training_takes() -> None:
     assert 150 <= float(seconds) * 452 / float(clips) <= 210
 
 
-def test_no_package_registry_and_no_absolute_path_is_named() -> None:
+def test_no_package_registry_and_no_absolute_path_is_named():
     listed = run_child(["git", "ls-files"], folder=ROOT)
     if listed.returncode:
         pytest.skip("not a git repository")

@@ -17,7 +17,7 @@ SHEET = {"page": "results/mouth.md", "tables": TABLES, "stated": ["the aim was 3
 FIGURES, REFERENCE = module_at("scripts/figures_page.py"), module_at("scripts/reference_pages.py")
 
 
-def test_pages_show_what_their_sheets_hold() -> None:
+def test_pages_show_what_their_sheets_hold():
     """Run ``python scripts/figures_page.py``; a figure that it names belongs into the sheet of its page."""
     found, current = FIGURES.sheets(), FIGURES.current_models()
     assert FIGURES.overview(found, current) == FIGURES.OVERVIEW.read_text(encoding="utf-8")
@@ -27,7 +27,7 @@ def test_pages_show_what_their_sheets_hold() -> None:
         assert page == FIGURES.OVERVIEW or FIGURES.not_held(page, text, found) == [], page
 
 
-def test_sheets_are_stamped_and_shown() -> None:
+def test_sheets_are_stamped_and_shown():
     shown, current = "".join(page.read_text(encoding="utf-8") for page in FIGURES.pages()), FIGURES.current_models()
     for name, sheet in FIGURES.sheets().items():
         assert (ROOT / "docs" / sheet["page"]).is_file(), name
@@ -39,14 +39,14 @@ def test_sheets_are_stamped_and_shown() -> None:
             ), (name, key)
 
 
-def test_a_figure_that_no_sheet_holds_is_found() -> None:
+def test_a_figure_that_no_sheet_holds_is_found():
     text = "The gap is 0.256, not 0.257; `0.9`; the aim of 3.5 % was missed by 12 MB ([x](a0.77.md)).\n"
     assert FIGURES.not_held(PAGE, text, {"mouth": SHEET}) == ["0.257", "12"]
     guide = ROOT / "docs" / "faces.md"
     assert FIGURES.not_held(guide, text, {"mouth": SHEET}) == ["0.257"]
 
 
-def test_a_figure_of_another_model_says_so() -> None:
+def test_a_figure_of_another_model_says_so():
     page = "<!--figures:mouth.gap-->\n<!--end-->\n"
     now = FIGURES.written(page, {"mouth": SHEET}, frozenset({"shipped 00000000"}))
     assert "| opening | 0.256 |\n\n*shipped 00000000 · `make bench`*\n" in now
@@ -99,7 +99,7 @@ def test_current_models_are_the_shipped_one_and_all_engines() -> None:
     assert {"trajectory", "coupled", "selection", "joint", "shipped"} <= {name.split()[0] for name in current}
 
 
-def test_tables_of_the_reference_are_those_of_the_code() -> None:
+def test_tables_of_the_reference_are_those_of_the_code():
     """Run ``python scripts/reference_pages.py``."""
     pages = {page: page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")}
     assert [page for page, text in pages.items() if REFERENCE.written(text) != text] == []
@@ -107,7 +107,7 @@ def test_tables_of_the_reference_are_those_of_the_code() -> None:
     assert [name for name in REFERENCE.TABLES if f"<!--made:{name}-->" not in made] == []
 
 
-def test_every_verb_is_listed_with_pages() -> None:
+def test_every_verb_is_listed_with_pages():
     rows = REFERENCE.verb_list().splitlines()
     verbs = {name.split()[0] for name, _, _ in REFERENCE.verbs(REFERENCE.whole_parser())}
     assert {row.split("`")[1].split()[0] for row in rows} == verbs == set(REFERENCE.SEE)

@@ -35,7 +35,7 @@ def text(page: str) -> str:
     return FENCES.sub("", (DOCS / "papers" / f"{page}.md").read_text("utf-8"))
 
 
-def test_every_function_and_test_of_an_equation_exists() -> None:
+def test_every_function_and_test_of_an_equation_exists():
     found = [match for page in PAGES for match in NAMED.findall(text(page))]
     assert len(found) > 10
     for path, name in found:
@@ -43,7 +43,7 @@ def test_every_function_and_test_of_an_equation_exists() -> None:
         assert f"def {name}(" in place.read_text("utf-8"), (path, name)
 
 
-def test_names_without_a_path_exist() -> None:
+def test_names_without_a_path_exist():
     names = [name for page in PAGES for name in re.findall(r"`([A-Za-z_][\w.]*)`", text(page))]
     tests = [name for name in names if name.startswith("test_")]
     functions = [name for name in names if "." in name]
@@ -52,7 +52,7 @@ def test_names_without_a_path_exist() -> None:
     assert [name for name in functions if not defined(SOURCE).issuperset(name.split("."))] == []
 
 
-def test_options_exist() -> None:
+def test_options_exist():
     options = {each.name for config in CONFIGURATIONS for each in fields(config)}
     pages = [(DOCS / "papers" / f"{page}.md").read_text("utf-8") for page in PAGES]
     named = [name for page in pages for name in re.findall(r"(?:`|--set \"?)(\w+)=", page)]
@@ -61,7 +61,7 @@ def test_options_exist() -> None:
 
 
 @pytest.mark.parametrize("page", [page for page, count in PAGES.items() if count])
-def test_every_equation_has_a_row_with_a_function_and_a_test(page: str) -> None:
+def test_every_equation_has_a_row_with_a_function_and_a_test(page):
     numbers = set()
     for row in re.findall(r"^\| (.+?) \|(.+`.+)\|(.*`.+`.*)\|$", text(page), re.MULTILINE):
         for first, last in re.findall(r"(?<![\w.])(\d+)(?:–(\d+))?(?![\w.])", re.sub(r"§[\d.]+|Fig. \d+", "", row[0])):

@@ -1,7 +1,3 @@
-"""The pages for other programs: short, and with tables that exist."""
-
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -17,17 +13,17 @@ TABLES = sorted((ROOT / "examples" / "rigs").glob("*.csv"))
 MAX_LINES = 60
 
 
-def test_a_jaw_opens_and_closes() -> None:
+def test_a_jaw_opens_and_closes():
     jaw = make_curves(motion(), units(), ROOT / "examples" / "rigs" / "jaw-bone.csv")["jaw.rotation.x"]
     assert jaw.max() == pytest.approx(65 * 0.2 - 0.8, abs=0.5)
     assert jaw[[20, 55, 95]] == pytest.approx(0.0)
 
 
-def test_pages_are_short() -> None:
+def test_pages_are_short():
     assert [page for page in PAGES if len(page.read_text(encoding="utf-8").splitlines()) > MAX_LINES] == []
 
 
-def test_every_table_moves_its_rig_and_is_on_a_page() -> None:
+def test_every_table_moves_its_rig_and_is_on_a_page():
     text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     assert TABLES
     for table in TABLES:

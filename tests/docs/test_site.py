@@ -1,7 +1,5 @@
 """The documentation site: every page is in its sidebar, nothing comes from elsewhere, no warning when it is built."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path
@@ -16,7 +14,7 @@ TOOLS = Path(sys.prefix) / "site-tools"
 """Where ``make site`` installs Sphinx."""
 
 
-def test_the_sidebar_holds_every_page_once() -> None:
+def test_the_sidebar_holds_every_page_once():
     listed = pages()
     there = [
         ROOT / "tests" / "robustness" / "table.md",
@@ -30,7 +28,7 @@ def test_the_sidebar_holds_every_page_once() -> None:
     assert ":caption: Results\n\n/docs/limits\n" in SETTINGS.sidebar(SETTINGS.INDEX)
 
 
-def test_pages_link_files_not_folders() -> None:
+def test_pages_link_files_not_folders():
     """GitHub shows folders, the site does not."""
     for page in pages():
         path = ROOT / f"{page}.md"
@@ -38,48 +36,30 @@ def test_pages_link_files_not_folders() -> None:
         assert [target for target in inside if not (path.parent / target.partition("#")[0]).is_file()] == [], page
 
 
-def test_nothing_from_elsewhere_is_named() -> None:
+def test_nothing_from_elsewhere_is_named():
     assert not re.search(r"https?:|//", (ROOT / "docs" / "conf.py").read_text(encoding="utf-8"))
 
 
-def test_lists_of_arguments_become_field_lists() -> None:
+def test_lists_of_arguments_become_field_lists():
     given = [
-        "Return it.",
-        "path, name : where",
-        "             it is",
-        "rate_hz : frames",
-        "Note: none.",
+        "Return it.", "path, name : where", "             it is", "rate_hz : frames", "Note: none.",
         "Raises A, B: bad.",
-    ]
+    ]  # fmt: skip
     made = [
-        ":param path,name: where",
-        "             it is",
-        ":param rate_hz: frames",
-        "",
-        "Note: none.",
-        "",
+        ":param path,name: where", "             it is", ":param rate_hz: frames", "", "Note: none.", "",
         ":raises A,B: bad.",
-    ]
+    ]  # fmt: skip
     assert SETTINGS.restructured(given) == ["Return it.", "", *made]
 
 
 @pytest.mark.long
-def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+def test_the_site_is_built_without_a_warning(tmp_path):
     if not TOOLS.is_dir():
         pytest.skip("make site installs the tools")
     site = tmp_path / "site"
     command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-c",
-        ROOT / "docs",
-        "-d",
-        tmp_path / "cache",
-    ]
+        sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", ROOT / "docs", "-d", tmp_path / "cache",
+    ]  # fmt: skip
     run_child([*command, ROOT, site], variables=environment(PYTHONPATH=f"{ROOT / 'src'}:{TOOLS}"), check=True)
     for page in pages():
         text = (site / f"{page}.html").read_text(encoding="utf-8")

@@ -1,7 +1,5 @@
 """docs/your-face.md, done: a video of a drawn person becomes a model and a face that say another sentence."""
 
-from __future__ import annotations
-
 import shlex
 from itertools import chain
 from pathlib import Path
@@ -34,7 +32,7 @@ def write_clip(path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.video
-def test_a_clip_becomes_a_face_that_speaks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_clip_becomes_a_face_that_speaks(tmp_path, monkeypatch):
     pytest.importorskip("mediapipe")
     monkeypatch.chdir(tmp_path)
     write_clip(tmp_path / "me.mp4")

@@ -1,13 +1,12 @@
-"""Corpora that differ from the toy corpus in one way."""
-
-from __future__ import annotations
+"""Corpora that differ from the toy corpus in one way, and sentences that are seen in part."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from lipmotion import Corpus
-from lipmotion.types import Channel, Utterance
+from lipmotion.testing.examples import examples
+from lipmotion.types import Channel, Example, Utterance
 
 
 def copied(corpus: Corpus, folder: Path, change: Callable[[Utterance], Utterance]) -> Corpus:
@@ -29,3 +28,14 @@ def renamed(corpus: Corpus, folder: Path, *names: str) -> Corpus:
         )
 
     return copied(corpus, folder, change)
+
+
+def partly_valid(count: int, hidden: int) -> list[Example]:
+    """Return sentences whose last frames are not valid, and have wrong values."""
+    made = []
+    for one in examples(count):
+        valid = one.valid.copy()
+        valid[-hidden:] = False
+        one.motion.values[-hidden:] = 9
+        made.append(replace(one, valid=valid))
+    return made

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +16,7 @@ def valid_motion(examples: list[Example]) -> np.ndarray:
     return np.concatenate([one.motion.values[one.valid] for one in examples])
 
 
-def test_motion_has_a_row_for_every_feature_frame(examples: list[Example]) -> None:
+def test_motion_has_a_row_for_every_feature_frame(examples):
     for baseline in BASELINES:
         engine = baseline()
         fit = engine.fit(examples, silent_monitor)
@@ -35,7 +33,7 @@ def test_motion_has_a_row_for_every_feature_frame(examples: list[Example]) -> No
         MeanPose().fit(unseen, silent_monitor)
 
 
-def test_the_mean_pose(examples: list[Example]) -> None:
+def test_the_mean_pose(examples):
     model = MeanPose().fit(examples, silent_monitor).model
     made = MeanPose().generate(model, examples[0].speech)
     assert made.motion.values == pytest.approx(
@@ -62,13 +60,13 @@ def error(engine, examples: list[Example]) -> float:
     return float(np.abs(made - examples[0].motion["opening"])[inner].max())
 
 
-def test_the_reach_of_the_acoustic_context(examples: list[Example]) -> None:
+def test_the_reach_of_the_acoustic_context(examples):
     column = np.eye(39)[3]
     assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH)) < 0.2
     assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH + 8)) > 1
 
 
-def test_loudness_is_smoothed(examples: list[Example]) -> None:
+def test_loudness_is_smoothed(examples):
     made = with_delayed_opening(examples, np.eye(39)[LOG_ENERGY], 0)
     slow = []
     for one in made:

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -26,7 +24,7 @@ def clips() -> tuple[Clips, Clips, Clips]:
     return original, near, far
 
 
-def test_figures_are_those_of_the_measures(clips: tuple[Clips, Clips, Clips]) -> None:
+def test_figures_are_those_of_the_measures(clips):
     original, near, _ = clips
     wanted = curves.pooled_correlation(near, original).mean()
     assert correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
@@ -36,7 +34,7 @@ def test_figures_are_those_of_the_measures(clips: tuple[Clips, Clips, Clips]) ->
     assert closing_score_statistic(some, others, 50).value == pytest.approx(100 * score)
 
 
-def test_a_channel_that_stands_still_explains_nothing(clips: tuple[Clips, Clips, Clips]) -> None:
+def test_a_channel_that_stands_still_explains_nothing(clips):
     original, near, _ = clips
     still = [np.concatenate([g[:, :2], np.full((len(g), 1), 0.1)], axis=1) for g in near]
     assert correlation_statistic(still, original).value == pytest.approx(
@@ -44,12 +42,12 @@ def test_a_channel_that_stands_still_explains_nothing(clips: tuple[Clips, Clips,
     )
 
 
-def test_nothing_closes() -> None:
+def test_nothing_closes():
     open_mouth = [np.ones((5, 1))]
     assert np.isnan(closing_score_statistic(open_mouth, open_mouth, 0.5).value)
 
 
-def test_the_interval_is_that_of_drawn_clips(clips: tuple[Clips, Clips, Clips]) -> None:
+def test_the_interval_is_that_of_drawn_clips(clips):
     original, near, far = clips
     draw = np.random.default_rng(7)
     drawn = [draw.integers(6, size=6) for _ in range(50)]
@@ -66,7 +64,7 @@ def test_the_interval_is_that_of_drawn_clips(clips: tuple[Clips, Clips, Clips]) 
     assert one.gain(one, 7) == (0, 0)
 
 
-def test_the_interval_of_one_clip_is_its_value() -> None:
+def test_the_interval_of_one_clip_is_its_value():
     one = ClipStatistic([np.array([3.0, 2.0])], lambda total: float(total[0] / total[1]))
     assert one.interval(0) == (1.5, 1.5)
 
@@ -75,5 +73,5 @@ def test_the_interval_of_one_clip_is_its_value() -> None:
     ("gain", "wanted"),
     [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((2e-10, 7e-9), ""), ((None, None), "")],
 )
-def test_marks(gain: tuple[float, float], wanted: str) -> None:
+def test_marks(gain, wanted):
     assert significance_mark(gain) == wanted

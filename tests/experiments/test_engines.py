@@ -40,7 +40,7 @@ def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[st
 
 
 @LONG
-def test_every_system_in_every_condition(figures: dict[str, Any]) -> None:
+def test_every_system_in_every_condition(figures):
     assert list(figures["conditions"]) == CONDITIONS
     for condition in figures["conditions"].values():
         assert list(condition["systems"]) == [*ENGINES_COMPARED]
@@ -51,7 +51,7 @@ def test_every_system_in_every_condition(figures: dict[str, Any]) -> None:
 
 
 @LONG
-def test_differences_are_paired(figures: dict[str, Any]) -> None:
+def test_differences_are_paired(figures):
     for condition in figures["conditions"].values():
         rows = condition["systems"]
         for name in ENGINES_COMPARED:
@@ -62,9 +62,7 @@ def test_differences_are_paired(figures: dict[str, Any]) -> None:
 
 @LONG
 @pytest.mark.parametrize("engine", ["coupled"])
-def test_the_figures_are_those_of_the_verb_evaluate(
-    figures: dict[str, Any], folder: Path, toy_corpus: Corpus, engine: str
-) -> None:
+def test_the_figures_are_those_of_the_verb_evaluate(figures, folder, toy_corpus, engine):
     wanted = evaluate(load_model(folder / f"{engine}.lipmotion"), toy_corpus, selection=Selection("test"))
     for name in CONDITIONS:
         found, condition = figures["conditions"][name]["systems"][engine], wanted["conditions"][name]
@@ -78,7 +76,7 @@ def test_the_figures_are_those_of_the_verb_evaluate(
 
 
 @LONG
-def test_a_second_run_trains_nothing(figures: dict[str, Any], toy_corpus: Corpus, folder: Path) -> None:
+def test_a_second_run_trains_nothing(figures, toy_corpus, folder):
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
     received: set[tuple[str, str]] = set()
     settings = replace(SMALL, receive=lambda system, condition, *_: received.add((condition, system)))
@@ -92,7 +90,7 @@ def test_a_second_run_trains_nothing(figures: dict[str, Any], toy_corpus: Corpus
 
 
 @LONG
-def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list[Progress]) -> None:
+def test_progress_goes_from_nothing_to_all(figures, stages):
     shares = [event.share for event in stages]
     assert figures
     assert shares == sorted(shares)
@@ -100,9 +98,7 @@ def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list
 
 
 @LONG
-def test_models_of_something_else_are_refused(
-    figures: dict[str, Any], toy_corpus: Corpus, folder: Path, tmp_path: Path
-) -> None:
+def test_models_of_something_else_are_refused(figures, toy_corpus, folder, tmp_path):
     assert figures
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "coupled.lipmotion").write_bytes((folder / "trajectory.lipmotion").read_bytes())
@@ -121,14 +117,14 @@ def test_models_of_something_else_are_refused(
         engines(toy_corpus, models=tmp_path / "file", settings=SMALL)
 
 
-def test_recordings_of_the_training_are_not_compared(toy_corpus: Corpus) -> None:
+def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
             engines(toy_corpus, split=split, settings=SMALL)
 
 
 @LONG
-def test_the_table_has_every_system(figures: dict[str, Any]) -> None:
+def test_the_table_has_every_system(figures):
     lines = table(figures).splitlines()
     for name in ENGINES_COMPARED:
         assert sum(line.startswith(f"  {name} ") for line in lines) == 2

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,10 +12,8 @@ from experiments.copies import copied, renamed
 from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.closures import find_closings
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
-from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
 from lipmotion_lab.folds import folds, table
 from lipmotion_lab.runner import ExperimentSettings
@@ -53,7 +49,7 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
 
 
 @pytest.mark.long
-def test_what_was_done(figures: dict[str, Any]) -> None:
+def test_what_was_done(figures):
     assert (figures["folds"], figures["seed"], figures["clips"]) == (3, 0, 8)
     assert figures["trained_on"] == [5, 5, 6]
     assert list(figures["conditions"]) == CONDITIONS
@@ -61,7 +57,7 @@ def test_what_was_done(figures: dict[str, Any]) -> None:
 
 
 @pytest.mark.long
-def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
+def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
     generated = np.concatenate([clip.generated[:, 0] for clip in by_hand])
     original = np.concatenate([clip.original[:, 0] for clip in by_hand])
     row = figures["conditions"]["with transcript"]
@@ -73,46 +69,7 @@ def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand:
     assert low <= row["acc"] <= high
 
 
-@pytest.mark.long
-def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
-    under, row = figures["closed_under"], figures["conditions"]["with transcript"]
-    pairs = [(find_closings(c.generated[:, 0], under), find_closings(c.original[:, 0], under)) for c in by_hand]
-    hits = [any(abs(int(g) - int(o)) <= 2 for g in made) for made, recorded_ones in pairs for o in recorded_ones]
-    good = [any(abs(int(g) - int(o)) <= 2 for o in recorded_ones) for made, recorded_ones in pairs for g in made]
-    assert (row["closings"], row["generated_closings"]) == (len(hits), len(good))
-    assert (row["score"], row["precision"]) == pytest.approx((100 * np.mean(hits), 100 * np.mean(good)))
-
-
-@pytest.mark.long
-def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
-    under, row = figures["closed_under"], figures["conditions"]["with transcript"]
-    wanted, hit, elsewhere, speech_s = 0, 0, [0, 0], 0.0
-    for clip in by_hand:
-        inside = np.zeros(len(clip.original), bool)
-        for start_s, end_s, phone in clip.spoken:
-            if phone not in BILABIAL:
-                speech_s += end_s - start_s
-                continue
-            frames = np.arange(len(clip.original))
-            near = (frames >= np.ceil(start_s * RATE_HZ - 1e-6) - 1) & (frames <= np.floor(end_s * RATE_HZ + 1e-6) + 1)
-            inside |= near
-            wanted += bool((clip.original[near, 0] < under).any())
-            hit += bool((clip.original[near, 0] < under).any() and (clip.generated[near, 0] < under).any())
-        for side, curve in enumerate((clip.generated[:, 0], clip.original[:, 0])):
-            elsewhere[side] += int((~inside[find_closings(curve, under)]).sum())
-    assert wanted > 10
-    assert (row["p_b_m"], row["recall_p_b_m"]) == (wanted, pytest.approx(100 * hit / wanted))
-    assert row["false_per_minute"] == pytest.approx(elsewhere[0] / speech_s * 60)
-    assert row["original_per_minute"] == pytest.approx(elsewhere[1] / speech_s * 60)
-
-
-def test_counts_that_cannot_be(toy_corpus: Corpus) -> None:
-    for count in (-1, 1, 9):
-        with pytest.raises(InputError, match=f"{count} folds; required: from 2 to 8, which is how many"):
-            folds(toy_corpus, count=count)
-
-
-def test_corpora_that_cannot_be(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_corpora_that_cannot_be(toy_corpus, tmp_path):
     with pytest.raises(CorpusError, match="no utterances of split 'train'"):
         folds(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
@@ -145,9 +102,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
     assert cut != first
 
 
-def test_finished_parts_are_not_generated_again(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_finished_parts_are_not_generated_again(toy_corpus, tmp_path, monkeypatch):
     made: list[tuple[str, ...]] = []
 
     def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
@@ -177,9 +132,7 @@ def test_finished_parts_are_not_generated_again(
     assert run(None) == again
 
 
-def test_by_speaker_everybody_is_a_stranger_once(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypatch):
     people = ["anna", "ben", "", "anna", "eve", "ben", "anna", "eve"]
     speaker_of = dict(zip(toy_corpus.names("train"), people, strict=True))
     corpus = copied(toy_corpus, tmp_path, lambda each: replace(each, speaker=speaker_of.get(each.name, "test only")))

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import partial
@@ -36,7 +34,7 @@ def figures(toy_corpus: Corpus, work: Path) -> dict[str, Any]:
 
 
 @pytest.mark.long
-def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures, toy_corpus):
     assert (figures["clips"], figures["trained_on"], len(figures["tables"])) == (2, 8, 4)
     evaluated: dict[tuple[str, str], Any] = {}
     for block in figures["tables"]:
@@ -58,9 +56,7 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures: dict[str, An
 
 
 @pytest.mark.long
-def test_what_was_finished_is_not_trained_again(
-    figures: dict[str, Any], toy_corpus: Corpus, work: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_finished_is_not_trained_again(figures, toy_corpus, work, monkeypatch):
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
     monkeypatch.setattr(JointEngine, "growing_models", None)
     again = hofer2008(toy_corpus, TWO, work=work, settings=SMALL)
@@ -68,7 +64,7 @@ def test_what_was_finished_is_not_trained_again(
 
 
 @pytest.mark.long
-def test_pins_move_the_lips_of_the_same_units(figures: dict[str, Any]) -> None:
+def test_pins_move_the_lips_of_the_same_units(figures):
     """Of given words: of recognised units, only those that are p b m alone are pinned."""
     printed, pinned = (block["rows"]["eVis"] for block in figures["tables"] if block["condition"] == "with transcript")
     assert pinned["recall_p_b_m"] == 100
@@ -76,14 +72,14 @@ def test_pins_move_the_lips_of_the_same_units(figures: dict[str, Any]) -> None:
     assert pinned["gaussians"] == printed["gaussians"]
 
 
-def test_what_held_of_the_order_is_told_in_words() -> None:
+def test_what_held_of_the_order_is_told_in_words():
     gains = [("eVis", "pbVis", (1.0, 3.0)), ("eVis", "phone", (-2.0, -1.0)), ("pbVis", "phone", (-1.0, 1.0))]
     pairs = [{"better": better, "worse": worse, "score_gain_95": gain} for better, worse, gain in gains]
     block = {"rows": {"eVis": {"score": 70.0}, "phone": {"score": 71.0}}, "paper_order": pairs}
     assert what_held(block) == ("best: phone; of the paper's 3 pairs hold 1, reversed 1 (phone over eVis), open 1")
 
 
-def test_a_star_is_that_of_its_own_interval() -> None:
+def test_a_star_is_that_of_its_own_interval():
     results = Path(__file__).parents[2] / "docs" / "results" / "hofer2008.json"
     figures = json.loads(results.read_text(encoding="utf-8"))
     row = figures["tables"][0]["rows"]["eVis"] | {"score_gain_95": [1.0, 2.0], "acc_gain_95": [-1.0, 1.0]}
@@ -93,7 +89,7 @@ def test_a_star_is_that_of_its_own_interval() -> None:
     assert f"{row['acc']:.3f} (" in line
 
 
-def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_nothing_to_train_on_or_to_compare_with(toy_corpus, tmp_path):
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):
         hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):

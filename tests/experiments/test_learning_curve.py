@@ -1,8 +1,5 @@
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -33,7 +30,7 @@ def figures(toy_corpus: Corpus, order: tuple[str, ...]) -> dict[str, Any]:
 
 
 @pytest.mark.long
-def test_each_size_once_the_smallest_first(figures: dict[str, Any]) -> None:
+def test_each_size_once_the_smallest_first(figures):
     assert [(row["names"], row["used"]) for row in figures["rows"]] == [(4, 4), (8, 8)]
     assert (figures["split"], figures["clips"], figures["order"]) == ("test", 2, "given")
     assert all(list(row["conditions"]) == CONDITIONS for row in figures["rows"])
@@ -41,9 +38,7 @@ def test_each_size_once_the_smallest_first(figures: dict[str, Any]) -> None:
 
 
 @pytest.mark.long
-def test_a_row_is_what_train_and_evaluate_say(
-    figures: dict[str, Any], toy_corpus: Corpus, order: tuple[str, ...]
-) -> None:
+def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus, order):
     names = sorted(order[: figures["rows"][0]["names"]])
     wanted = evaluate(train(toy_corpus, selection=Selection(names=names), recogniser=PHONE_MODELS)[0], toy_corpus)
     assert figures["closed_under"] == wanted["closed_under"]
@@ -60,15 +55,13 @@ def test_a_row_is_what_train_and_evaluate_say(
 
 
 @pytest.mark.long
-def test_minutes_are_those_of_the_utterances(
-    figures: dict[str, Any], toy_corpus: Corpus, order: tuple[str, ...]
-) -> None:
+def test_minutes_are_those_of_the_utterances(figures, toy_corpus, order):
     seconds = [len(toy_corpus.utterance(name).audio.samples) / 16_000 for name in order]
     assert [row["minutes"] for row in figures["rows"]] == pytest.approx([sum(seconds[:4]) / 60, sum(seconds) / 60])
 
 
 @pytest.mark.long
-def test_channels_that_are_not_there_are_dashes(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_channels_that_are_not_there_are_dashes(toy_corpus, tmp_path):
     made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SMALL)
     row = made["rows"][0]["conditions"]["audio only"]
     assert (row["acc_width"], row["acc_outer"]) == (None, None)
@@ -76,8 +69,8 @@ def test_channels_that_are_not_there_are_dashes(toy_corpus: Corpus, tmp_path: Pa
 
 
 def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    toy_corpus, tmp_path, monkeypatch
+):
     trained: list[list[str]] = []
     stops = [True]
 
@@ -107,7 +100,7 @@ def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_traine
     assert (figures["order"], figures["seed"], figures["closed_under"]) == ("shuffled", 1, 0.1)
 
 
-def test_what_cannot_be_trained_on(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_what_cannot_be_trained_on(toy_corpus, tmp_path):
     for order, sizes, words in (
         ([], None, "the list of utterances to train on is empty; give one name a line"),
         (None, [], "sizes none; required: from 1 to 8"),

@@ -1,7 +1,3 @@
-"""The system of Minnis & Breen 2000 beside its variants."""
-
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +27,7 @@ LONG = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 
 
-def test_all_additions_together_are_the_default() -> None:
+def test_all_additions_together_are_the_default():
     """Each row has an option of its own; without a row, an addition would be hidden in another one."""
     printed, everything = rows()[PRINTED], rows()[EVERYTHING]
     alone = {key: getattr(everything, key) for keys in ADDITIONS.values() if len(keys) == 1 for key in keys}
@@ -39,7 +35,7 @@ def test_all_additions_together_are_the_default() -> None:
     assert len({str(config) for config in rows().values()}) == len(rows())
 
 
-def test_a_bend_is_the_change_of_the_velocity() -> None:
+def test_a_bend_is_the_change_of_the_velocity():
     curve = np.maximum(np.arange(30.0) - 12, 0)
     change = velocity_change(curve)
     assert change[12] == pytest.approx(4)
@@ -57,7 +53,7 @@ def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
 
 
 @LONG
-def test_the_row_as_printed_is_the_preset(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+def test_the_row_as_printed_is_the_preset(figures, toy_corpus):
     model, _ = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine_from_settings(preset="minnis2000"))
     wanted = evaluate(model, toy_corpus)["conditions"]
     for condition, systems in figures["lists"]["test"]["conditions"].items():
@@ -66,7 +62,7 @@ def test_the_row_as_printed_is_the_preset(figures: dict[str, Any], toy_corpus: C
 
 
 @LONG
-def test_a_second_run_does_not_train(figures: dict[str, Any], toy_corpus: Corpus, folder: Path) -> None:
+def test_a_second_run_does_not_train(figures, toy_corpus, folder):
     received: list[tuple[str, str, str, int]] = []
 
     def receive(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
@@ -81,9 +77,7 @@ def test_a_second_run_does_not_train(figures: dict[str, Any], toy_corpus: Corpus
 
 
 @LONG
-def test_a_run_that_was_stopped_goes_on(
-    figures: dict[str, Any], toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path, monkeypatch):
     def run() -> dict[str, Any]:
         return minnis2000(toy_corpus, work=tmp_path, settings=ExperimentSettings(recogniser=PHONE_MODELS))
 
@@ -107,7 +101,7 @@ def test_a_run_that_was_stopped_goes_on(
 
 
 @LONG
-def test_every_row_stands_in_the_table(figures: dict[str, Any]) -> None:
+def test_every_row_stands_in_the_table(figures):
     text = table(figures)
     for found in figures["lists"].values():
         for systems in found["conditions"].values():

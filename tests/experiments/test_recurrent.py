@@ -25,7 +25,7 @@ def model(examples: list[Example], stages: list[Progress]) -> FrameRegressionMod
         return BlstmBaseline().fit(examples, stages.append).model
 
 
-def test_held_out_motion_is_predicted(model: FrameRegressionModel) -> None:
+def test_held_out_motion_is_predicted(model):
     held_out = sentences(14, seed=5)[-1]
     result = BlstmBaseline().generate(model, held_out.speech)
     assert result.motion.channels == CHANNELS
@@ -35,7 +35,7 @@ def test_held_out_motion_is_predicted(model: FrameRegressionModel) -> None:
     assert result.motion["opening"].max() < 1  # values of frames that are not valid are not learned
 
 
-def test_the_same_seed_gives_the_same(examples: list[Example], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_seed_gives_the_same(examples, monkeypatch):
     monkeypatch.setattr(network, "EPOCHS", 1)
     monkeypatch.setattr(network, "LEAST_STEPS", 1)
     one, same, other = (BlstmBaseline(seed).fit(examples, lambda _: None).model for seed in (0, 0, 1))
@@ -44,7 +44,7 @@ def test_the_same_seed_gives_the_same(examples: list[Example], monkeypatch: pyte
     assert not np.allclose(made[0], made[2])
 
 
-def test_epochs_are_counted(model: FrameRegressionModel, stages: list[Progress]) -> None:
+def test_epochs_are_counted(model, stages):
     assert model
     assert (stages[0].share, stages[-1].share) == (0, 1)
     assert stages[-1].steps == 40

@@ -1,7 +1,3 @@
-"""The report as a whole: what is run, what is kept, what is written; the experiments are stand-ins, but for one."""
-
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,7 +19,7 @@ from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options
 from lipmotion_lab.report import report
 from lipmotion_lab.report.report import PAGE, PARTS, PartRun, ReportPart, WrittenReport, experiment_report
 from lipmotion_lab.runner import ExperimentSettings
-from study.browser import BROWSER, DRIVER, MISSING, axe_script, browser
+from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
 
 SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
 TWO, SETS = ("hofer2008", "folds"), ("eVis", "phone")
@@ -68,9 +64,7 @@ def state(folder: Path) -> dict[str, tuple[int, bytes]]:
     return {str(path): (path.stat().st_mtime_ns, path.read_bytes()) for path in files}
 
 
-def test_what_is_finished_is_not_run_again_and_no_byte_changes(
-    ran: list[str], toy_corpus: Corpus, tmp_path: Path
-) -> None:
+def test_what_is_finished_is_not_run_again_and_no_byte_changes(ran, toy_corpus, tmp_path):
     folder = tmp_path / "a" / "report"
     found = experiment_report(toy_corpus, folder)
     assert (ran, list(found.made), found.left_out) == (list(PARTS), list(PARTS), {})
@@ -90,9 +84,7 @@ def test_what_is_finished_is_not_run_again_and_no_byte_changes(
     assert stamp["command"].endswith("-o report --only folds")
 
 
-def test_a_run_that_was_stopped_goes_on(
-    ran: list[str], toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_was_stopped_goes_on(ran, toy_corpus, tmp_path, monkeypatch):
     def stopped(given: PartRun) -> dict[str, Any]:
         (given.work / "half").write_text("finished")
         raise KeyboardInterrupt
@@ -113,9 +105,7 @@ def test_a_run_that_was_stopped_goes_on(
     assert "not chosen" in Links(tmp_path / "r" / PAGE).text
 
 
-def test_what_fails_is_told_and_stops_nothing_else(
-    ran: list[str], toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_fails_is_told_and_stops_nothing_else(ran, toy_corpus, tmp_path, monkeypatch):
     """An experiment with an error of its own, and one whose figures cannot be told."""
 
     def broken(_: object) -> Any:
@@ -141,7 +131,7 @@ def test_what_fails_is_told_and_stops_nothing_else(
 
 
 @pytest.mark.long
-def test_other_recordings_or_settings_are_run_again(ran: list[str], toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
     run: Callable[..., WrittenReport] = partial(experiment_report, folder=tmp_path / "r", only=["folds"])
     run(toy_corpus)
     assert run(toy_corpus, quick=True).made == ["folds"]
@@ -155,7 +145,7 @@ def test_other_recordings_or_settings_are_run_again(ran: list[str], toy_corpus: 
 
 @pytest.mark.long
 @pytest.mark.usefixtures("ran")
-def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus, tmp_path):
     without_val = toy_corpus.part([*toy_corpus.names("train"), *toy_corpus.names("test")])
     found = experiment_report(without_val, tmp_path / "r")
     assert set(found.left_out) == {"hofer2008"}
@@ -169,7 +159,7 @@ def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus: Corpus, tmp_pat
     assert not (tmp_path / "other").exists()
 
 
-def test_what_cannot_be_used_is_refused_before_the_work(ran: list[str], toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_what_cannot_be_used_is_refused_before_the_work(ran, toy_corpus, tmp_path):
     file, full = tmp_path / "file", tmp_path / "full"
     file.write_text("x")
     (full / "inner").mkdir(parents=True)
@@ -201,7 +191,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Wri
 
 
 @pytest.mark.long
-def test_a_real_experiment_has_videos_and_curves(written: WrittenReport) -> None:
+def test_a_real_experiment_has_videos_and_curves(written):
     folder = written.page.parent
     record = json.loads((folder / "hofer2008" / "figures.json").read_text())
     systems = [f"{name}, 3 states" for name in SETS]
@@ -216,21 +206,13 @@ def test_a_real_experiment_has_videos_and_curves(written: WrittenReport) -> None
 
 @pytest.mark.long
 @pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)
-def test_a_browser_plays_it_and_nobody_is_kept_out(written: WrittenReport, tmp_path: Path) -> None:
-    axe = axe_script()
-    if axe is None:
-        pytest.skip("axe-core is not installed")
+def test_a_browser_plays_it_and_nobody_is_kept_out(written, tmp_path):
     with browser(tmp_path) as window:
         for width, height, scheme in SCREENS:
             window.show_as(width, height, scheme, mobile=width < 400)
             window.open(written.page.as_uri())
             window.run("document.querySelectorAll('details').forEach(each => { each.open = true; })")
-            assert window.run("return document.documentElement.scrollWidth") <= width
-            window.run(axe)
-            found = window.run_until_done(
-                "axe.run().then(found => arguments[0](found.violations.map(each => each.id)))"
-            )
-            assert found == []
+            check_screen(window, "report", width, scheme)
         window.click("button.together")
         playing = "const done = arguments[0], video = document.querySelector('video');" + (
             "video.addEventListener('timeupdate', () => { if (video.currentTime > 0.1) done(true); });"

@@ -57,7 +57,7 @@ def section_of(name: str) -> Section:
 
 
 @pytest.mark.parametrize("name", PARTS)
-def test_every_table_and_chart_is_whole(name: str) -> None:
+def test_every_table_and_chart_is_whole(name):
     section = section_of(name)
     names = [table.name for table in section.tables]
     assert len(names) == len(set(names))
@@ -71,7 +71,7 @@ def test_every_table_and_chart_is_whole(name: str) -> None:
     assert all(sentences for sentences in section.words.values())
 
 
-def test_hofers_pairs_are_counted_from_their_intervals() -> None:
+def test_hofers_pairs_are_counted_from_their_intervals():
     section, figures = section_of("hofer2008"), figures_of("hofer2008")
     (block,) = [
         each
@@ -85,7 +85,7 @@ def test_hofers_pairs_are_counted_from_their_intervals() -> None:
     assert len(section.more) == len(figures["tables"]) - 1
 
 
-def test_xie_and_lius_figures_stand_beside_ours() -> None:
+def test_xie_and_lius_figures_stand_beside_ours():
     section, figures = section_of("xieliu2007"), figures_of("xieliu2007")
     ours = figures["rows"][-1]["conditions"]["audio only"]
     for record in section.table.records():
@@ -97,7 +97,7 @@ def test_xie_and_lius_figures_stand_beside_ours() -> None:
     assert f"Systems as printed: AMSE: of the paper's {len(pairs)} pairs {held} held" in section.words["By AMSE"][0]
 
 
-def test_an_addition_that_helps_is_named_so() -> None:
+def test_an_addition_that_helps_is_named_so():
     section, figures = section_of("minnis2000"), figures_of("minnis2000")
     rows = figures["lists"]["test"]["conditions"]["audio only"]
     raised, lowered, left_open = section.words["Each addition alone"]
@@ -107,12 +107,12 @@ def test_an_addition_that_helps_is_named_so() -> None:
     assert section.table.caption == "Unit selection, test, audio only"
 
 
-def test_few_recordings_are_warned_of() -> None:
+def test_few_recordings_are_warned_of():
     assert warn_of_few(FEW_CLIPS) == {}
     assert "Only 2 recordings" in warn_of_few(2)["Beware"][0]
 
 
-def test_a_share_that_is_not_defined_is_not_told_as_0() -> None:
+def test_a_share_that_is_not_defined_is_not_told_as_0():
     figures = figures_of("folds")
     figures["conditions"]["audio only"]["recall_p_b_m"] = None
     (sentence,) = PARTS["folds"].section(figures).words["More closings than a test list has"]
@@ -120,7 +120,7 @@ def test_a_share_that_is_not_defined_is_not_told_as_0() -> None:
 
 
 @pytest.mark.parametrize("name", PARTS)
-def test_figures_that_are_not_defined_end_no_run(name: str) -> None:
+def test_figures_that_are_not_defined_end_no_run(name):
     def undefined(content: Any) -> Any:
         """Return figures whose correlations, scores and their intervals are not defined."""
         if isinstance(content, list):
@@ -206,12 +206,12 @@ def order(here: dict[str, float | None], signs: dict[str, int], is_error: bool =
         ((0, 0, 0), "0 held, 0 reversed, 3 open: these recordings say nothing of its order"),
     ],
 )
-def test_the_verdict_counts_pairs(signs: tuple[int, ...], outcome: str) -> None:
+def test_the_verdict_counts_pairs(signs, outcome):
     found = order({"a": 0.3, "b": 0.2, "c": 0.1}, dict(zip(("ab", "ac", "bc"), signs, strict=True)))
     assert found.verdict() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
 
 
-def test_every_pair_is_told_once_the_better_one_here_first() -> None:
+def test_every_pair_is_told_once_the_better_one_here_first():
     found = order({"a": 0.1, "b": 0.3, "c": 0.1}, {"ab": -1, "ac": 0, "bc": 1})
     said = found.sentences()
     assert said[:2] == ["In print: a 3.0, b 2.0, c 1.0.", "Here: b 0.3, a 0.1, c 0.1."]
@@ -222,13 +222,13 @@ def test_every_pair_is_told_once_the_better_one_here_first() -> None:
     assert said[6].startswith("Intervals aside, 1 of 3 differences")
 
 
-def test_the_smallest_error_is_the_best() -> None:
+def test_the_smallest_error_is_the_best():
     found = order({"a": 0.1, "b": None, "c": 0.3}, {"ab": 1, "ac": 1, "bc": 1}, is_error=True)
     assert found.verdict().endswith("Best in print: c; here: a.")
     assert found.sentences()[1] == "Here: a 0.1, c 0.3."
 
 
-def test_equal_and_undefined_figures() -> None:
+def test_equal_and_undefined_figures():
     signs = {"ab": 0, "ac": 0, "bc": 0}
     assert order({"a": 0.1, "b": 0.1, "c": 0.0}, signs).verdict().endswith("here: a, b.")
     nothing = order({"a": None, "b": None, "c": None}, signs)
@@ -243,7 +243,7 @@ ROWS = {
 TABLE = Table("t", "All & some", (Column("acc", "ACC", ".2f", "a note"), Column("kind", "kind")), ROWS, "c")
 
 
-def test_every_figure_has_its_interval_and_difference_in_the_files() -> None:
+def test_every_figure_has_its_interval_and_difference_in_the_files():
     first, second = csv.DictReader(io.StringIO(TABLE.as_csv()))
     assert first["system"] == "a, <b>"
     assert [float(first[key]) for key in ("acc", "acc_low", "acc_high")] == [0.5, 0.4, 0.6]
@@ -254,7 +254,7 @@ def test_every_figure_has_its_interval_and_difference_in_the_files() -> None:
     assert (content["reference"], content["columns"]["acc"]) == ("c", "a note")
 
 
-def test_the_page_shows_the_interval_and_a_star() -> None:
+def test_the_page_shows_the_interval_and_a_star():
     html = TABLE.as_html("folder")
     assert '<th scope="row">a, &lt;b&gt;</th><td class="number">0.50* <small>0.40–0.60</small></td><td>x</td>' in html
     assert '<th scope="row">c</th><td class="number">–</td><td>–</td>' in html
@@ -262,12 +262,12 @@ def test_the_page_shows_the_interval_and_a_star() -> None:
     assert "difference from c leaves out 0" in html
 
 
-def test_a_table_without_rows() -> None:
+def test_a_table_without_rows():
     empty = Table("t", "none", (Column("acc", "ACC", ".2f"),), {})
     assert (empty.as_csv().strip(), empty.records()) == ("system", [])
 
 
-def test_figures_intervals_and_the_papers_stand_on_one_axis() -> None:
+def test_figures_intervals_and_the_papers_stand_on_one_axis():
     rows = [Dot("a", 0.5, (0.4, 0.6), 0.9), Dot("<b>", 0.7, (None, None)), Dot("c", None)]
     drawing = ElementTree.fromstring(draw_dots("ACC", "ACC", rows)).find("svg")  # noqa: S314 (our own)
     first, second = (float(each.attrib["cx"]) for each in drawing.findall("circle"))
@@ -280,19 +280,19 @@ def test_figures_intervals_and_the_papers_stand_on_one_axis() -> None:
     assert "<b> 0.7" in drawing.attrib["aria-label"]
 
 
-def test_a_curve_has_both_motions_and_what_is_marked() -> None:
+def test_a_curve_has_both_motions_and_what_is_marked():
     time_s = np.arange(5) / 25
     made = ElementTree.fromstring(draw_curve("x", time_s, np.zeros(5), np.arange(5.0), [(-0.1, 0.04, "p")])).find("svg")  # noqa: S314 (our own)
     assert [line.attrib["class"] for line in made.findall("polyline")] == ["recorded", "generated"]
     assert float(made.find("rect").attrib["x"]) == 34
 
 
-def test_a_still_motion_is_drawn() -> None:
+def test_a_still_motion_is_drawn():
     assert "polyline" in draw_curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])
     assert "nan" not in draw_dots("a", "b", [Dot("still", 0.0, (0.0, 0.0))])
 
 
-def test_a_curve_over_numbers_rises_with_them() -> None:
+def test_a_curve_over_numbers_rises_with_them():
     lines = {"a": [(10.0, Dot("10", 0.1, (0.0, 0.2))), (100.0, Dot("100", 0.3, (0.2, 0.4)))]}
     drawing = ElementTree.fromstring(draw_rising("t", "n", lines)).find("svg")  # noqa: S314 (our own)
     (x1, y1), (x2, y2) = (map(float, p.split(",")) for p in drawing.find("polyline").attrib["points"].split())

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -10,14 +8,24 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied
-from lipmotion import Corpus, evaluate, train
+from lipmotion import Corpus, Model, Selection, evaluate, train
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.recognition.recogniser import Recogniser, cached_recogniser
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.storage.archive import read_archive
-from lipmotion_lab.evaluation.held_out import NoiseConditions, generate_clips, load_held_out
+from lipmotion_lab.evaluation.held_out import (
+    LONGEST_S,
+    HeldOutRecordings,
+    NoiseConditions,
+    add_noise,
+    generate_clips,
+    load_held_out,
+    read_talkers,
+)
 from lipmotion_lab.runner import ExperimentSettings
 from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
@@ -68,7 +76,7 @@ def figures(toy_corpus: Corpus, folder: Path, work: Path) -> dict[str, Any]:
 
 
 @LONG
-def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
+def test_every_size_condition_and_system(figures):
     assert [(row["names"], row["used"]) for row in figures["rows"]] == [(3, 3), (8, 8)]
     for row in figures["rows"]:
         assert list(row["conditions"]) == ["audio only", "with transcript"]
@@ -80,7 +88,7 @@ def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
 
 
 @LONG
-def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus):
     wanted = evaluate(train(toy_corpus, recogniser=PHONE_MODELS)[0], toy_corpus)
     for condition, expected_figures in wanted["conditions"].items():
         row = figures["rows"][-1]["conditions"][condition]["trajectory HMM"]
@@ -93,7 +101,7 @@ def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpu
 
 @LONG
 @pytest.mark.parametrize("name", [MULTISTREAM, REFERENCE_SYSTEM])
-def test_a_preset_is_the_row_of_the_table(name: str, figures: dict[str, Any], work: Path, toy_corpus: Corpus) -> None:
+def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     """The arrays of the model file and the motion are the same; conversions of one model differ by that alone."""
     model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine_from_settings(preset=name))[0]
     arrays = model.engine.to_arrays(model.learned)
@@ -120,7 +128,7 @@ def test_a_preset_is_the_row_of_the_table(name: str, figures: dict[str, Any], wo
 
 
 @LONG
-def test_a_tuned_system_is_the_best_that_was_tried(figures: dict[str, Any]) -> None:
+def test_a_tuned_system_is_the_best_that_was_tried(figures):
     for name in (MULTISTREAM, REFERENCE_SYSTEM):
         assert {trial["options"].get("audio_weight", 1.0) for trial in figures["tuning"]["tried"][name]} == {1.0, 0.3}
         row = figures["rows"][-1]["training"][name + TUNED]
@@ -136,9 +144,7 @@ def test_a_tuned_system_is_the_best_that_was_tried(figures: dict[str, Any]) -> N
 
 
 @LONG
-def test_it_goes_on_from_what_is_finished(
-    figures: dict[str, Any], work: Path, toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus, monkeypatch):
     monkeypatch.setattr(systems, "train_stages", None)
     monkeypatch.setattr(six_systems, "generate_clips", None)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], tuning=BRIEF)
@@ -149,7 +155,7 @@ def test_it_goes_on_from_what_is_finished(
 
 
 @LONG
-def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: dict[str, Any]) -> None:
+def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures):
     rows = figures["rows"][-1]["conditions"]["audio only"]
     for name, row in rows.items():
         for key in ("amse", "acc"):
@@ -161,7 +167,7 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: d
 
 
 @LONG
-def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
+def test_noise_makes_it_worse(figures):
     clean = figures["rows"][-1]["conditions"]["audio only"]
     much = figures["noise"][0]["systems"]
     for name in ("trajectory HMM", MULTISTREAM):
@@ -170,14 +176,14 @@ def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
 
 
 @LONG
-def test_pictures_are_written(figures: dict[str, Any], folder: Path) -> None:
+def test_pictures_are_written(figures, folder):
     assert figures
     assert sorted(path.name for path in folder.iterdir()) == sorted(PLOT_FILES.values())
     assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
 
 
 @LONG
-def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
+def test_the_text_names_every_system(figures):
     lines = table(figures).splitlines()
     for name in SYSTEMS:
         assert sum(line.startswith(f"  {name}  ") for line in lines) >= 5
@@ -187,7 +193,7 @@ def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
 
 @LONG
 @pytest.mark.parametrize("visual", ["both"])
-def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
+def test_eigenlips(visual, toy_corpus):
     options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
     received: list[tuple[str, str]] = []
     settings = replace(SMALL, receive=lambda *given: received.append(given[:2]))
@@ -208,7 +214,7 @@ def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
     assert (["eigenlips"] in starts) == (visual == "both")
 
 
-def test_systems_in_the_order_of_the_table() -> None:
+def test_systems_in_the_order_of_the_table():
     assert select_systems(["loudness", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "loudness"]
     assert select_systems([MATCHED]) == ["ph-MSHMM", "ph-vi-FHMM", REFERENCE_SYSTEM, "ph-vi-FHMM" + TUNED, MATCHED]
     assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
@@ -216,7 +222,7 @@ def test_systems_in_the_order_of_the_table() -> None:
         select_systems(["ph-RNN"])
 
 
-def test_other_engines_are_compared_when_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_engines_are_compared_when_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
     left_out = COMPARED_SYSTEMS.keys() - select_systems(None)
     assert left_out == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
@@ -225,15 +231,13 @@ def test_other_engines_are_compared_when_named(monkeypatch: pytest.MonkeyPatch) 
         select_systems([BLSTM])
 
 
-def test_without_matplotlib_there_are_no_pictures(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_matplotlib_there_are_no_pictures(toy_corpus, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingDependencyError, match=r'need matplotlib.*; pip install ".*\[plots\]"'):
         xieliu2007(toy_corpus, plots=tmp_path)
 
 
-def test_what_cannot_be_chosen(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_what_cannot_be_chosen(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="no system 'nothing'"):
         xieliu2007(toy_corpus, ComparisonOptions(systems=["nothing"]), settings=SMALL)
     with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
@@ -247,8 +251,51 @@ def test_what_cannot_be_chosen(toy_corpus: Corpus, tmp_path: Path) -> None:
         xieliu2007(toy_corpus, plots=tmp_path / "file")
 
 
-def test_noise_that_cannot_be_made() -> None:
+def test_noise_that_cannot_be_made():
     with pytest.raises(InputError, match="unknown noise 'pink'; required some of: white, babble"):
         NoiseConditions(("pink",))
     with pytest.raises(InputError, match="a babble of 0 talkers; required at least 2"):
         NoiseConditions(("babble",))
+
+
+@pytest.fixture(scope="module")
+def clean(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
+    return load_held_out(toy_corpus, Recogniser(toy_model.phones, "own"), selection=Selection("test"))
+
+
+def test_faces_stay_and_the_sound_is_noisy(clean):
+    noisy_recordings = add_noise(clean, "white", 10, seed=4)
+    assert list(noisy_recordings.conditions) == ["audio only"]
+    assert noisy_recordings.reference is clean.reference
+    for number, (one, before) in enumerate(zip(noisy_recordings.utterances, clean.utterances, strict=True)):
+        wanted = noisy_audio(before.audio, "white", 10, seed=4 + number)
+        assert np.array_equal(one.audio.samples, wanted.samples)
+        assert np.array_equal(one.features.values, analysed(wanted).mfcc().values)
+        assert one.track is before.track
+        assert noisy_recordings.conditions["audio only"][number] == clean.phones.recognise(one.audio, one.features)
+
+
+def test_every_clip_has_noise_of_its_own(clean):
+    noisy_utterances = add_noise(clean, "white", 0).utterances
+    one, other = (
+        noisy.audio.samples - before.audio.samples
+        for noisy, before in zip(noisy_utterances, clean.utterances, strict=True)
+    )
+    shorter = min(len(one), len(other))
+    assert abs(np.corrcoef(one[:shorter], other[:shorter])[0, 1]) < 0.05
+
+
+def test_talkers_are_the_recordings_of_a_folder(toy_speech, tmp_path):
+    for name in ("b.wav", "a.wav"):
+        (tmp_path / name).write_bytes(toy_speech.read_bytes())
+    (tmp_path / "words.txt").write_text("no sound")
+    talkers = read_talkers(tmp_path)
+    assert len(talkers) == 2
+    assert all(0 < talker.duration_s <= LONGEST_S for talker in talkers)
+
+
+def test_no_talkers(tmp_path):
+    with pytest.raises(InputError, match="nowhere: no such folder; give one with recordings of other people"):
+        read_talkers(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="no recording in it"):
+        read_talkers(tmp_path)

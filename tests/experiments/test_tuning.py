@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,7 +35,7 @@ def validation(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
     return load_held_out(toy_corpus, phones, selection=Selection("val"), channels=("opening", "width"))
 
 
-def test_a_model_on_the_way_is_that_of_its_own_training() -> None:
+def test_a_model_on_the_way_is_that_of_its_own_training():
     sentences = examples(3)
     one, two = train_stages(SMALL | {"mixtures": 2}, sentences)
     assert [system.engine.config.mixtures for system in (one, two)] == [1, 2]
@@ -49,7 +47,7 @@ def test_a_model_on_the_way_is_that_of_its_own_training() -> None:
     assert two.model.chains.parameters > one.model.chains.parameters
 
 
-def test_parameters_are_counted_by_hand() -> None:
+def test_parameters_are_counted_by_hand():
     """13 visemes × 2 states: means and variances of every density, and a probability of moving on of every state."""
     (system,) = train_stages(SMALL, examples(3))
     groups = [group.mixtures.means.shape[2] for group in system.model.chains.groups]
@@ -57,7 +55,7 @@ def test_parameters_are_counted_by_hand() -> None:
 
 
 @pytest.mark.long
-def test_every_conversion_is_judged_by_the_correlation_of_what_it_makes(validation: HeldOutRecordings) -> None:
+def test_every_conversion_is_judged_by_the_correlation_of_what_it_makes(validation):
     systems = [*train_stages(SMALL, examples(3))]
     found = [*judge_systems(iter(systems), validation, CONVERSIONS)]
     assert [(system.engine.config.start, system.engine.config.steps) for _, system in found] == [
@@ -74,7 +72,7 @@ def test_every_conversion_is_judged_by_the_correlation_of_what_it_makes(validati
     assert best.engine.config.start == min(found, key=lambda pair: pair[0].amse)[1].engine.config.start
 
 
-def test_one_setting_after_another_from_the_best_so_far() -> None:
+def test_one_setting_after_another_from_the_best_so_far():
     asked: list[Mapping[str, Any]] = []
 
     def attempt(options: Mapping[str, Any]) -> list[Trial]:
@@ -94,7 +92,7 @@ def test_one_setting_after_another_from_the_best_so_far() -> None:
     assert best_trial([Trial({"a": 1}, 0.5, 0, 0), Trial({"a": 2}, 0.5, 0, 0)]).options == {"a": 1}
 
 
-def test_what_is_tried_for_which_structure() -> None:
+def test_what_is_tried_for_which_structure():
     names = {
         system: [
             *dict.fromkeys(
@@ -108,12 +106,9 @@ def test_what_is_tried_for_which_structure() -> None:
     assert names["ph-FHMM"] == ["audio_weight", "mixtures", "unseen_loss", "start_asynchrony", "states"]
 
 
-def test_options_are_told_where_they_are_not_those_printed() -> None:
+def test_options_are_told_where_they_are_not_those_printed():
     for system, options in SYSTEMS.items():
         changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 0.0}))
         assert changed == {
-            "structure": options["structure"],
-            "chains": options["chains"],
-            "audio_weight": 0.3,
-            "unseen_loss": 0.0,
-        }, system
+            "structure": options["structure"], "chains": options["chains"], "audio_weight": 0.3, "unseen_loss": 0.0,
+        }, system  # fmt: skip

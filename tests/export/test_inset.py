@@ -1,7 +1,3 @@
-"""A picture in a corner of a video."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -21,7 +17,7 @@ def drawn(frame: np.ndarray, made: np.ndarray) -> tuple[slice, slice]:
 
 @pytest.mark.parametrize("size", [(56, 72), (10, 300), (300, 10), (1, 1)])
 @pytest.mark.parametrize("frame_size", [(120, 160), (480, 270)])
-def test_it_lies_in_the_lower_right_corner(size: tuple[int, int], frame_size: tuple[int, int]) -> None:
+def test_it_lies_in_the_lower_right_corner(size, frame_size):
     (frame,), picture = frames(1, *frame_size), np.full((*size, 3), 130, np.uint8)
     (made,) = add_inset([frame], [picture])
     assert (made.shape, made.dtype) == (frame.shape, np.uint8)
@@ -37,7 +33,7 @@ def test_it_lies_in_the_lower_right_corner(size: tuple[int, int], frame_size: tu
     assert np.array_equal(np.unique(made[rows, columns]), [130, WHITE])
 
 
-def test_the_picture_keeps_its_form_and_its_place() -> None:
+def test_the_picture_keeps_its_form_and_its_place():
     """A picture that is dark at the left and light at the right, and red above."""
     picture = np.zeros((56, 72, 3), np.uint8)
     picture[:, 36:, 1] = 200
@@ -58,7 +54,7 @@ def test_the_picture_keeps_its_form_and_its_place() -> None:
     assert np.abs(turned[rows, columns].astype(int) - made[rows, columns][::-1, ::-1]).max() <= 1
 
 
-def test_every_frame_has_its_own_picture_and_is_not_changed() -> None:
+def test_every_frame_has_its_own_picture_and_is_not_changed():
     films, pictures = frames(5), [np.full((56, 72, 3), 100 + n, np.uint8) for n in range(4)]
     before = [frame.copy() for frame in films]
     made = list(add_inset(films, pictures))
@@ -69,7 +65,7 @@ def test_every_frame_has_its_own_picture_and_is_not_changed() -> None:
     assert list(add_inset([], pictures)) == []
 
 
-def test_a_label_leaves_the_inset_free() -> None:
+def test_a_label_leaves_the_inset_free():
     (made,) = add_inset(frames(1, 288, 360), [np.full((56, 72, 3), 130, np.uint8)])
     left, top, right, bottom = inset_box((288, 360), (56, 72))
     (marked,) = mark_frames([made], (left, top, right, bottom))

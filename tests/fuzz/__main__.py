@@ -7,8 +7,6 @@ The minutes are shared between the readers; making the good input (a minute) is 
 folder of its own, reduced, with its trace beside it; ``--replay`` reads such a folder again. Exit code 1: defects.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -31,7 +29,6 @@ from fuzz.worker import Worker
 
 
 def main() -> int:
-    """Print a table; return 1 if anything was found."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--reader", action="append", choices=sorted(READERS), help="this one only (repeatable)")
@@ -82,7 +79,6 @@ def fuzz(options: argparse.Namespace, good: Good) -> int:
 
 
 def replay(options: argparse.Namespace, good: Good) -> int:
-    """Read one input again."""
     name = options.reader[0] if options.reader else options.replay.parent.name
     with Worker(good) as worker:
         result = worker.read_input(name, picked_up(options.replay))

@@ -3,11 +3,9 @@
 Of readers of JSON, every other input has a hostile value in one place of a good document, until all have been read.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import chain, zip_longest
 from random import Random
@@ -76,7 +74,8 @@ def campaign(
     accepted, refused = list[Files](), list[Files]()
     queue = reader.seeds(good)
     order = Random(seed)
-    planned = chain.from_iterable(_in_turn([systematic(files, order) for files in queue]))
+    in_turn = zip_longest(*(systematic(files, order) for files in queue))
+    planned = (files for files in chain.from_iterable(in_turn) if files is not None)
     start_s = time.monotonic()
     while (queue or going_on(record)) and record.kinds[HANG] + record.kinds[CRASH] < STOP_AFTER:
         first = bool(queue)
@@ -95,11 +94,6 @@ def campaign(
             (accepted if result.kind == READ else refused).append(files)
     record.kept, record.seconds = len(accepted + refused), time.monotonic() - start_s
     return record
-
-
-def _in_turn(inputs: list[Iterator[Files]]) -> Iterator[tuple[Files, ...]]:
-    """Yield one of each list of inputs, until all have ended."""
-    return (tuple(files for files in row if files is not None) for row in zip_longest(*inputs))
 
 
 def _chosen(chance: Random, accepted: list[Files], refused: list[Files]) -> Files:

@@ -1,7 +1,5 @@
 """Characters that are small and would be expensive, or that are large and hold nothing."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,12 +10,10 @@ from lipmotion import Corpus
 
 @pytest.fixture(scope="session")
 def good(toy_corpus: Corpus, toy_model_file: Path, coupled_model_file: Path) -> Good:
-    """The good corpus and models of all tests."""
     return Good(toy_corpus.path, (toy_model_file, coupled_model_file))
 
 
 @pytest.fixture(scope="module")
 def worker(good: Good) -> Iterator[Worker]:
-    """A worker with all readers."""
     with Worker(good, lines=False) as process:
         yield process

@@ -1,7 +1,5 @@
 """Inputs that once showed defects and are too large to be stored: long repetitions."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 

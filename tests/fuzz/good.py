@@ -1,7 +1,5 @@
 """The good corpus and models of the fuzzer, made from the toy corpus."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from fuzz.inputs import Good
@@ -31,5 +29,4 @@ def make_good(folder: Path) -> Good:
 
 
 def good_in(folder: Path) -> Good:
-    """Return the good corpus and models that ``make_good`` wrote to a folder."""
     return Good(folder / "corpus", tuple(folder / f"{name}.lipmotion" for name in ENGINES))

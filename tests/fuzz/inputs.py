@@ -1,7 +1,5 @@
 """Inputs of the fuzzer, the readers that are fuzzed, and the good inputs from which all others are made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
@@ -41,7 +39,6 @@ class Reader:
 
 
 def digest(files: Files) -> bytes:
-    """Return a digest that identifies an input."""
     found = sha256()
     for name, content in sorted(files.items()):
         found.update(f"{len(name)} {name} {len(content)} ".encode("utf-8", "surrogatepass") + content)

@@ -1,7 +1,5 @@
 """Classification of the result of one input."""
 
-from __future__ import annotations
-
 import logging
 import re
 import shutil

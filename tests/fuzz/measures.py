@@ -1,7 +1,5 @@
 """What the reading of one input takes: lines of the package that it reaches, memory and processor time."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys
@@ -28,49 +26,30 @@ class LineCoverage:
         new, self._new = self._new, set()
         return new
 
-    def _note(self, code: CodeType, line: int) -> None:
-        self._new.add(f"{code.co_filename[len(ROOT) + 1 :]}:{line}")
+    def watch(self) -> None:
+        self._missing: dict[CodeType, set[int]] = {}
+        self._calls: dict[CodeType, int] = {}
+        sys.settrace(self._called)
 
-    if sys.version_info >= (3, 12):
+    def _called(self, frame: FrameType, *_: object) -> Any:
+        code = frame.f_code
+        missing = self._missing.get(code)
+        if missing is None:
+            own = code.co_filename.startswith(ROOT)
+            missing = self._missing[code] = {line for *_, line in code.co_lines() if line} if own else set()
+        if not missing:
+            return None
+        calls = self._calls[code] = self._calls.get(code, 0) + 1
+        return self._run if calls < FREQUENT_HITS or calls % RARE_HITS == 0 else None
 
-        def watch(self) -> None:
-            """Start recording."""
-            tool, events = sys.monitoring.COVERAGE_ID, sys.monitoring.events
-            sys.monitoring.use_tool_id(tool, "fuzz")
-            sys.monitoring.register_callback(tool, events.LINE, self._run)
-            sys.monitoring.set_events(tool, events.LINE)
-
-        def _run(self, code: CodeType, line: int) -> Any:
-            if code.co_filename.startswith(ROOT):
-                self._note(code, line)
-            return sys.monitoring.DISABLE
-
-    else:
-
-        def watch(self) -> None:
-            """Start recording."""
-            self._missing: dict[CodeType, set[int]] = {}
-            self._calls: dict[CodeType, int] = {}
-            sys.settrace(self._called)
-
-        def _called(self, frame: FrameType, *_: object) -> Any:
-            code = frame.f_code
-            missing = self._missing.get(code)
-            if missing is None:
-                own = code.co_filename.startswith(ROOT)
-                missing = self._missing[code] = {line for *_, line in code.co_lines() if line} if own else set()
-            if not missing:
-                return None
-            calls = self._calls[code] = self._calls.get(code, 0) + 1
-            return self._run if calls < FREQUENT_HITS or calls % RARE_HITS == 0 else None
-
-        def _run(self, frame: FrameType, *_: object) -> Any:
-            missing = self._missing[frame.f_code]
-            if frame.f_lineno in missing:
-                missing.remove(frame.f_lineno)
-                self._calls[frame.f_code] = 0
-                self._note(frame.f_code, frame.f_lineno)
-            return self._run if missing else None
+    def _run(self, frame: FrameType, *_: object) -> Any:
+        code, line = frame.f_code, frame.f_lineno
+        missing = self._missing[code]
+        if line in missing:
+            missing.remove(line)
+            self._calls[code] = 0
+            self._new.add(f"{code.co_filename[len(ROOT) + 1 :]}:{line}")
+        return self._run if missing else None
 
 
 try:
@@ -100,7 +79,6 @@ class Memory:
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
     def begin(self) -> None:
-        """Start a new measurement."""
         with suppress(OSError):
             PEAK.write_text("5")  # resets the peak
         self._before_mb = _now_mb("VmRSS")

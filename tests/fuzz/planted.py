@@ -1,7 +1,5 @@
 """A reader with planted defects, to test that the fuzzer finds them."""
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path
@@ -16,12 +14,10 @@ MEGABYTES = 80
 
 
 def seeds(_: Good) -> list[Files]:
-    """Return a good input."""
     return [{"a.txt": b"baby now"}]
 
 
 def read(folder: Path, _: Good) -> None:
-    """Show the defect that the content of the file names."""
     order = (folder / "a.txt").read_bytes()
     if b"raise" in order:
         raise RuntimeError("planted")
@@ -43,5 +39,4 @@ def read(folder: Path, _: Good) -> None:
 
 
 def readers() -> dict[str, Reader]:
-    """Return the one reader."""
     return {"planted": Reader("planted", seeds, read)}

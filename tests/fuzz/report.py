@@ -1,7 +1,5 @@
 """The findings of a fuzzing run: reduced, stored, and with all figures as a table and as JSON."""
 
-from __future__ import annotations
-
 import json
 import re
 import time
@@ -61,7 +59,6 @@ OTHERS = tuple(kind for kind in WRONG if kind not in (CRASH, HANG, MEMORY))
 
 
 def row(record: CampaignRecord) -> dict[str, Any]:
-    """Return the figures of one reader."""
     counts = {name: record.kinds[kind] for name, kind in {"read": READ, "refused": REFUSED}.items()}
     wrong = {"crashes": record.kinds[CRASH], "hangs": record.kinds[HANG], "memory": record.kinds[MEMORY]}
     rate = round(record.distinct / record.seconds, 1) if record.seconds else 0.0
@@ -73,7 +70,6 @@ def row(record: CampaignRecord) -> dict[str, Any]:
 
 
 def table(records: Sequence[CampaignRecord]) -> str:
-    """Return the figures of all readers, and their sums, as a text table."""
     rows = [row(record) for record in records]
     whole = {key: sum(one[key] for one in rows) for key in rows[0] if key != "reader"} if rows else {}
     whole |= {

@@ -1,7 +1,3 @@
-"""Mutations that keep the form of a file."""
-
-from __future__ import annotations
-
 import io
 import json
 import zipfile
@@ -35,7 +31,7 @@ SAMPLES = {
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_changes_are_many_and_the_same_again(name: str) -> None:
+def test_changes_are_many_and_the_same_again(name):
     def made(seed: int) -> list[tuple[int, bytes]]:
         chance, sample = Random(seed), {name: SAMPLES[name]}
         changed = (mutated(chance, sample, sample) for _ in range(ROUNDS))
@@ -47,7 +43,7 @@ def test_changes_are_many_and_the_same_again(name: str) -> None:
     assert found == made(1) != made(2)
 
 
-def test_documents_stay_documents() -> None:
+def test_documents_stay_documents():
     found = [json_text.change(Random(seed), DOCUMENT) for seed in range(COUNT)]
     assert sum(map(_is_json, found)) > 0.8 * COUNT
     assert any(content.count(b'"version"') > 1 and _is_json(content) for content in found)
@@ -61,7 +57,7 @@ def _is_json(content: bytes) -> bool:
     return True
 
 
-def test_every_hostile_value_comes_to_every_place() -> None:
+def test_every_hostile_value_comes_to_every_place():
     small = b'{"a": [1, {"b": 2}]}'
     places = ('{"a": %s}', '{"a": [%s, {"b": 2}]}', '{"a": [1, %s]}', '{"a": [1, {"b": %s}]}')
     wanted = {(place % value).encode() for place in places for value in documents.HOSTILE}
@@ -71,7 +67,7 @@ def test_every_hostile_value_comes_to_every_place() -> None:
         assert len(made) == len(places) * (len(documents.HOSTILE) + documents.OTHER_PARTS)
 
 
-def test_documents_inside_of_other_files_are_changed_in_their_place() -> None:
+def test_documents_inside_of_other_files_are_changed_in_their_place():
     whole = glb(*document())
     for name, content in (("a.glb", whole), ("a.npz", ZIP)):
         made = next(documents.systematic({name: content}, Random(0)))[name]
@@ -85,13 +81,13 @@ def test_documents_inside_of_other_files_are_changed_in_their_place() -> None:
     assert sum(right) > 30
 
 
-def test_archives_stay_archives() -> None:
+def test_archives_stay_archives():
     for seed in range(COUNT):
         with zipfile.ZipFile(io.BytesIO(zips.change(Random(seed), ZIP))) as file:
             assert file.testzip() is None
 
 
-def test_arrays_of_other_types_and_values() -> None:
+def test_arrays_of_other_types_and_values():
     found = [array for seed in range(3 * COUNT) if (array := _array(arrays.change(Random(seed), ARRAY))) is not None]
     assert {array.dtype.kind for array in found} >= set("fciM")
     assert {bool(np.isfinite(array).all()) for array in found if array.dtype.kind == "f"} == {True, False}
@@ -105,7 +101,7 @@ def _array(content: bytes) -> NDArray[Any] | None:
         return None
 
 
-def test_chunks_and_boxes_are_found() -> None:
+def test_chunks_and_boxes_are_found():
     assert boxes.change(Random(0), b"no boxes") != b"no boxes"
     rates = {riff.change(Random(seed), SOUND)[24:28] for seed in range(COUNT)}
     assert len(rates) > 10
@@ -113,7 +109,7 @@ def test_chunks_and_boxes_are_found() -> None:
     assert {b"\0\0\0\x1cmoov", b"\0\0\0\x08moov"} <= sizes  # the size around a box that was left out is right
 
 
-def test_texts_with_control_characters_numbers_and_floods() -> None:
+def test_texts_with_control_characters_numbers_and_floods():
     found = [text.change(Random(seed), b"0.5 1.5 p\n") for seed in range(2 * COUNT)]
     assert any(b"\x1b" in content for content in found)
     assert any(b"1e308" in content for content in found)

@@ -1,14 +1,12 @@
 """Every reader with its good inputs, some mutations of them, and all inputs that once showed defects."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from random import Random
 
 import pytest
 
 from fuzz.floods import FLOODS
-from fuzz.inputs import Files, Good, picked_up
+from fuzz.inputs import Files, picked_up
 from fuzz.judge import READ, REFUSED
 from fuzz.mutators import mutated
 from fuzz.readers import READERS
@@ -24,7 +22,7 @@ INPUTS = {"model": 4, "face": 4, "video": 6, "transcript": 8, "lexicon": 8, "cha
 
 
 @pytest.mark.parametrize("name", [pytest.param(each, marks=[pytest.mark.long] * (each in LONG)) for each in READERS])
-def test_good_input_is_read_and_changed_input_read_or_refused(name: str, worker: Worker, good: Good) -> None:
+def test_good_input_is_read_and_changed_input_read_or_refused(name, worker, good):
     """The same changes every time; ``python -m fuzz`` goes further."""
     seeds = READERS[name].seeds(good)
     results = [worker.read_input(name, files) for files in seeds]
@@ -37,17 +35,17 @@ def test_good_input_is_read_and_changed_input_read_or_refused(name: str, worker:
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: f"{folder.parent.name}: {folder.name}")
-def test_what_was_found_once(folder: Path, worker: Worker) -> None:
+def test_what_was_found_once(folder, worker):
     _check(worker, folder.parent.name, picked_up(folder))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "flood"), FLOODS, ids=lambda part: part)
-def test_a_flood_that_was_found_once(name: str, flood: str, worker: Worker) -> None:
+def test_a_flood_that_was_found_once(name, flood, worker):
     _check(worker, name, FLOODS[name, flood]())
 
 
-def test_all_that_was_found_is_of_a_reader() -> None:
+def test_all_that_was_found_is_of_a_reader():
     assert FOLDERS
     assert {folder.parent.name for folder in FOLDERS} <= READERS.keys()
 

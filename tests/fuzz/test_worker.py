@@ -1,12 +1,9 @@
 """The worker process, with a reader that has planted defects, its judgement, and the report."""
 
-from __future__ import annotations
-
 import json
 import sys
 import warnings
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -30,7 +27,7 @@ def planted() -> Iterator[Worker]:
         yield process
 
 
-def test_defects_are_told_apart(planted: Worker) -> None:
+def test_defects_are_told_apart(planted):
     for order, kind in ORDERS.items():
         result = planted.read_input("planted", _input(order))
         assert result.kind == kind, result
@@ -39,7 +36,7 @@ def test_defects_are_told_apart(planted: Worker) -> None:
 
 
 @pytest.mark.long
-def test_a_hang() -> None:
+def test_a_hang():
     with Worker(NOWHERE, hang_s=1.0, readers=readers) as impatient:
         result = impatient.read_input("planted", _input("sleep"))
     assert result.kind == HANG
@@ -47,30 +44,30 @@ def test_a_hang() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is measured as Linux tells it")
-def test_too_much_memory(planted: Worker) -> None:
+def test_too_much_memory(planted):
     assert planted.read_input("planted", _input("eat")).kind == MEMORY
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
-def test_a_crash(planted: Worker) -> None:
+def test_a_crash(planted):
     result = planted.read_input("planted", _input("abort"))
     assert (result.kind, result.where.split()[0]) == (CRASH, "SIGABRT")
     assert planted.read_input("planted", _input("now")).kind == READ
 
 
-def test_lines_are_new_once() -> None:
+def test_lines_are_new_once():
     with Worker(NOWHERE, readers=readers) as process:
         first, second = (process.read_input("planted", _input("now")).lines for _ in range(2))
     assert any(line.startswith("units/text_normalisation.py") for line in first)
     assert second == frozenset()
 
 
-def test_smaller_ones_of_the_same() -> None:
+def test_smaller_ones_of_the_same():
     files = smallest({"a.txt": b"some text, then X, then more"}, lambda files: b"X" in files["a.txt"], 10.0)
     assert files == {"a.txt": b"X"}
 
 
-def test_a_finding_is_kept(planted: Worker, tmp_path: Path) -> None:
+def test_a_finding_is_kept(planted, tmp_path):
     record = CampaignRecord("planted")
     files = _input("please raise it")
     record.add(planted.read_input("planted", files), files)
@@ -79,7 +76,7 @@ def test_a_finding_is_kept(planted: Worker, tmp_path: Path) -> None:
     assert "RuntimeError: planted" in place.with_name(f"{place.name}.trace").read_text(encoding="utf-8")
 
 
-def test_a_campaign_finds_and_counts(planted: Worker) -> None:
+def test_a_campaign_finds_and_counts(planted):
     (reader,) = readers().values()
 
     def run() -> CampaignRecord:
@@ -105,24 +102,20 @@ def read_with(error: Exception, folder: Path) -> Result:
     return read_result(Reader("planted", seeds, read), FILES, folder / "bad", NOWHERE)
 
 
-def test_a_message_that_is_no_short_printable_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_message_that_is_no_short_printable_line(tmp_path, monkeypatch):
     for line, kind in {"short": REFUSED, "x" * 5000: ERROR, "a\nb": ERROR, "\x1b[2J": ERROR, "\x9b2J": ERROR}.items():
-        monkeypatch.setattr(judge, "outcome", partial(_told, line))
+        monkeypatch.setattr(judge, "outcome", lambda _, line=line: (3, line))
         assert read_with(InputError("anything"), tmp_path).kind == kind
     assert list(tmp_path.iterdir()) == []
 
 
-def _told(line: str, _: object) -> tuple[int, str]:
-    return 3, line
-
-
-def test_messages_are_alike_whatever_they_quote(tmp_path: Path) -> None:
+def test_messages_are_alike_whatever_they_quote(tmp_path):
     found = {read_with(InputError(f"{path}: line {n} is {path!r}"), tmp_path).where for n, path in enumerate("ab")}
     assert len(found) == 2  # a name without a folder is a word
     assert len({read_with(InputError(f"/x/{n}: line {n} is 'x{n}'"), tmp_path).where for n in range(3)}) == 1
 
 
-def test_memory_and_warnings_are_defects(tmp_path: Path) -> None:
+def test_memory_and_warnings_are_defects(tmp_path):
     def warn(*_: object) -> None:
         warnings.warn("overflow", RuntimeWarning, stacklevel=1)
 
@@ -138,7 +131,7 @@ def records() -> list[CampaignRecord]:
     return [first, second]
 
 
-def test_a_table_with_a_sum() -> None:
+def test_a_table_with_a_sum():
     head, *rows = (line.split() for line in table(records()).splitlines())
     by_name = {row[0]: dict(zip(head, row, strict=True)) for row in rows}
     assert list(by_name) == ["audio", "labels", "all"]
@@ -146,7 +139,7 @@ def test_a_table_with_a_sum() -> None:
     assert (by_name["audio"]["per_s"], by_name["audio"]["errors"], by_name["audio"]["defects"]) == ("2.0", "1", "3")
 
 
-def test_the_same_as_json(tmp_path: Path) -> None:
+def test_the_same_as_json(tmp_path):
     write_json(tmp_path / "a.json", records(), 7, 0.5)
     found = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert [one["reader"] for one in found["readers"]] == ["audio", "labels"]

@@ -6,10 +6,12 @@ import faulthandler
 import multiprocessing
 import os
 import re
+import shutil
 import signal
 import tempfile
 from contextlib import suppress
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -135,7 +137,8 @@ def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any, tell
     os.chdir(here)
     tempfile.tempdir = str(here)
     quiet()
-    known, lines, memory = _known(readers), LineCoverage(), Memory(memory_mb)
+    known = import_module("fuzz.readers").READERS if readers is None else readers()
+    lines, memory = LineCoverage(), Memory(memory_mb)
     if tell_lines:
         lines.watch()
     pipe.send("ready")
@@ -147,33 +150,16 @@ def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any, tell
             pipe.send((replace(_checked(result, memory, here), lines=frozenset(lines.taken())), memory.retains_much()))
 
 
-def _known(readers: Any) -> Readers:
-    if readers is None:
-        from fuzz.readers import READERS
-
-        return READERS
-    return readers()
-
-
 def _checked(result: Result, memory: Memory, here: Path) -> Result:
     """Return the result; a defect instead, if the reader used too much memory or left files behind."""
     left = sorted(path.name for path in here.iterdir())
     for name in left:
-        _removed(here / name)
+        shutil.rmtree(here / name, ignore_errors=True) if (here / name).is_dir() else (here / name).unlink()
     if result.kind in (READ, REFUSED) and memory.too_much():
         return Result(MEMORY, result.where or result.kind, f"{memory.grown_mb():.0f} MB; {result.detail}")
     if result.kind in (READ, REFUSED) and left:
         return Result(LEFT, "beside it", ", ".join(left))
     return result
-
-
-def _removed(path: Path) -> None:
-    if path.is_dir():
-        import shutil
-
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink()
 
 
 def _place(log_text: str) -> str:

@@ -1,7 +1,5 @@
 """Arrays of a model, damaged in every way; and what came of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -46,7 +44,6 @@ UNREADABLE = ("a NaN", "an infinity", "complex", "dates", "a row less", "emptied
 
 
 def damaged(arrays: Mapping[str, Array], damages: Mapping[str, Damage]) -> Iterator[tuple[str, str, dict[str, Array]]]:
-    """Give each array's name and each damage's, and all arrays with that one damaged."""
     for name, array in arrays.items():
         for what, damage in damages.items():
             try:

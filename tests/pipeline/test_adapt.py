@@ -1,18 +1,14 @@
-from __future__ import annotations
-
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lipmotion import Model, adapt, animate, load_model, save_model
-from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.errors import InputError
 from lipmotion.pipeline.model import read_header
 from lipmotion.pipeline.request import Request
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
-from pipeline.test_model import npy, rewritten
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +23,7 @@ def adapted_file(adapted: Model, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return path
 
 
-def test_only_the_adaptation_changes(toy_model: Model, adapted: Model) -> None:
+def test_only_the_adaptation_changes(toy_model, adapted):
     assert toy_model.adaptation is None
     assert adapted.adaptation is not None
     assert adapted.phones is toy_model.phones
@@ -37,7 +33,7 @@ def test_only_the_adaptation_changes(toy_model: Model, adapted: Model) -> None:
     assert about == toy_model.about
 
 
-def test_it_is_used_from_then_on(toy_model: Model, adapted: Model, toy_speech: Path, monkeypatch) -> None:
+def test_it_is_used_from_then_on(toy_model, adapted, toy_speech, monkeypatch):
     used = []
     kind = type(adapted.adaptation)
     plain = kind.own_features
@@ -49,11 +45,8 @@ def test_it_is_used_from_then_on(toy_model: Model, adapted: Model, toy_speech: P
     assert len(used) == 2
 
 
-def test_a_saved_and_loaded_adaptation_gives_the_same_phones(
-    adapted: Model, adapted_file: Path, toy_speech: Path
-) -> None:
+def test_a_saved_and_loaded_adaptation_gives_the_same_phones(adapted, adapted_file, toy_speech):
     again = load_model(adapted_file)
-    assert again.adaptation is not None
     assert np.array_equal(again.adaptation.own, adapted.adaptation.own)
     assert np.array_equal(again.adaptation.general, adapted.adaptation.general)
     assert read_header(adapted_file)["adapted"] == adapted.about["adapted"]
@@ -62,27 +55,14 @@ def test_a_saved_and_loaded_adaptation_gives_the_same_phones(
     assert [span.label.phone for span in before] == [span.label.phone for span in after]
 
 
-def test_a_model_without_it_is_written_as_before(toy_model_file: Path) -> None:
-    with zipfile.ZipFile(toy_model_file) as file:
-        assert not [name for name in file.namelist() if name.startswith("adaptation")]
-    assert load_model(toy_model_file).adaptation is None
-
-
 @pytest.mark.long
-def test_an_earlier_adaptation_is_forgotten(adapted: Model, toy_model: Model, toy_speech: Path) -> None:
+def test_an_earlier_adaptation_is_forgotten(adapted, toy_model, toy_speech):
     again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
     assert np.array_equal(again.adaptation.own, fresh.adaptation.own)
     assert again.about == fresh.about
 
 
-def test_a_damaged_adaptation(adapted_file: Path, tmp_path: Path) -> None:
-    for changes in ({"adaptation/own.npy": None}, {"adaptation/numbers.npy": npy(np.array([np.nan, 1.0]))}):
-        path = rewritten(adapted_file, tmp_path / "m.lipmotion", changes)
-        with pytest.raises(ModelFormatError, match=r"m.lipmotion: the adaptation is damaged .+ adapt the model again"):
-            load_model(path)
-
-
-def test_a_list_of_recordings_is_required(toy_model: Model) -> None:
+def test_a_list_of_recordings_is_required(toy_model):
     for given in ([], "one.wav", Path("one.wav"), Audio(np.zeros(16_000, np.float32), 16_000)):
         with pytest.raises(InputError, match="required: one or more recordings of the speaker"):
             adapt(toy_model, given)

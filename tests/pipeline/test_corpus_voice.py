@@ -1,7 +1,3 @@
-"""A text said by the recordings of a corpus, and the motion that belongs to them."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -19,14 +15,13 @@ SETTINGS = {"joint_recogniser": False, "articulation": False, "conditions": 0}
 
 @pytest.fixture(scope="module")
 def selection_model(toy_corpus: Corpus) -> Model:
-    """A model of the recordings of the toy corpus."""
     engine = engine_named("selection", SETTINGS)
     small = HmmConfig(mixtures=1, iterations=3)
     return train(toy_corpus, selection=Selection(None), engine=engine, recogniser=small)[0]
 
 
 @pytest.mark.long
-def test_a_recorded_sentence_is_said_by_its_recording(toy_corpus: Corpus, selection_model: Model) -> None:
+def test_a_recorded_sentence_is_said_by_its_recording(toy_corpus, selection_model):
     name = toy_corpus.names()[0]
     utterance = toy_corpus.utterance(name)
     assert utterance.words
@@ -42,7 +37,7 @@ def test_a_recorded_sentence_is_said_by_its_recording(toy_corpus: Corpus, select
     assert len(generation.motion.values) == pytest.approx(sound.duration_s * 100, abs=2)
 
 
-def test_sound_and_motion_are_in_step(toy_corpus: Corpus, selection_model: Model) -> None:
+def test_sound_and_motion_are_in_step(toy_corpus, selection_model):
     sound, generation = speak_from_corpus("Mama now, see papa.", toy_corpus, selection_model)
     opening = generation.motion["opening"]
     loud = np.array([np.abs(sound.samples[n * 160 : (n + 1) * 160]).max() for n in range(len(sound.samples) // 160)])
@@ -57,7 +52,7 @@ def test_sound_and_motion_are_in_step(toy_corpus: Corpus, selection_model: Model
     assert generation.units[0].end_s <= REST_S + 1e-6
 
 
-def test_sources_are_the_recordings_whose_sound_is_joined(toy_corpus: Corpus, selection_model: Model) -> None:
+def test_sources_are_the_recordings_whose_sound_is_joined(toy_corpus, selection_model):
     sound, generation = speak_from_corpus("baby blue", toy_corpus, selection_model)
     found = []
     for span in generation.units:
@@ -76,26 +71,24 @@ def test_sources_are_the_recordings_whose_sound_is_joined(toy_corpus: Corpus, se
     assert np.mean(np.array(found) > 0.8) > 0.6  # motion is chosen again, by the features of the joined sound
 
 
-def test_a_model_without_recordings_is_refused(toy_corpus: Corpus, toy_model: Model) -> None:
+def test_a_model_without_recordings_is_refused(toy_corpus, toy_model):
     with pytest.raises(InputError, match="--engine selection"):
         speak_from_corpus("baby blue", toy_corpus, toy_model)
 
 
-def test_another_corpus_is_refused(selection_model: Model, tmp_path) -> None:
+def test_another_corpus_is_refused(selection_model, tmp_path):
     with pytest.raises(InputError, match="lacks"):
         speak_from_corpus("baby blue", Corpus.create(tmp_path / "empty"), selection_model)
 
 
-def test_phones_that_were_never_recorded_are_named(
-    toy_corpus: Corpus, selection_model: Model, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_phones_that_were_never_recorded_are_named(toy_corpus, selection_model, caplog):
     speak_from_corpus("baby blue", toy_corpus, selection_model)
     assert "do not have" not in caplog.text
     speak_from_corpus("judge", toy_corpus, selection_model)
     assert "jh (" in caplog.text
 
 
-def test_recordings_of_several_people_are_refused(toy_corpus: Corpus, selection_model: Model, monkeypatch) -> None:
+def test_recordings_of_several_people_are_refused(toy_corpus, selection_model, monkeypatch):
     names = iter("ab" * 20)
     known = toy_corpus.utterance
     monkeypatch.setattr(toy_corpus, "utterance", lambda name: replace(known(name), speaker=next(names)))

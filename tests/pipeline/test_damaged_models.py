@@ -1,7 +1,5 @@
 """No array of a model, whatever is done to it, gives motion that no face has."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 
@@ -50,7 +48,7 @@ def absurd(model: Model, sentence: ToySentence, damages: tuple[str, ...]) -> tup
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ENGINES)
-def test_damaged_arrays_of_an_engine(name: str, toy_sentence: ToySentence, request: pytest.FixtureRequest) -> None:
+def test_damaged_arrays_of_an_engine(name, toy_sentence, request):
     found, refusals, harmless = absurd(request.getfixturevalue(name), toy_sentence, QUICK)
     assert found == []
     assert refusals > 60
@@ -58,7 +56,7 @@ def test_damaged_arrays_of_an_engine(name: str, toy_sentence: ToySentence, reque
 
 
 @pytest.mark.long
-def test_damaged_arrays_of_all_other_parts(pictured_model: Model) -> None:
+def test_damaged_arrays_of_all_other_parts(pictured_model):
     model = pictured_model
     assert model.eigenlips is not None
     parts = {
@@ -84,7 +82,7 @@ UNDECLARED = {
 
 
 @pytest.mark.parametrize("name", UNDECLARED)
-def test_an_array_that_nothing_declares(name: str, request: pytest.FixtureRequest) -> None:
+def test_an_array_that_nothing_declares(name, request):
     model: Model = request.getfixturevalue(name)
     arrays = model.engine.to_arrays(model.learned)
     for more in UNDECLARED[name]:

@@ -1,7 +1,3 @@
-"""Delivery as files and videos have it."""
-
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Delivery, Model, animate, read_motion, write
+from lipmotion import Delivery, animate, read_motion, write
 from lipmotion.articulation.contact import find_closures
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import InputError
@@ -18,7 +14,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift_prosody
 from lipmotion.pipeline.request import Outputs, Request
-from lipmotion.types import Generation, Prosody, StateTrace
+from lipmotion.types import Prosody
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Face, Staging
@@ -26,21 +22,11 @@ from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.scenes import delivered_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
-from meshes.speech import motion, units
 from speech.made_voices import laugh, pulses, recording, said, vowels
 
 
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
-
-
 @pytest.mark.parametrize("offset_ms", [500.0, -250.0])
-def test_files_say_when_the_sound_begins(
-    generation: Generation, offset_ms: float, toy_speech: Path, tmp_path: Path
-) -> None:
+def test_files_say_when_the_sound_begins(generation, offset_ms, toy_speech, tmp_path):
     delivery = Delivery(offset_ms=offset_ms)
     paths = [tmp_path / "a.json", tmp_path / "a.blender.py"]
     write(generation, paths, speech=toy_speech, delivery=delivery, curves="arkit", channels=["jawOpen"])
@@ -52,9 +38,7 @@ def test_files_say_when_the_sound_begins(
     assert scene.sound_s == pytest.approx(offset_ms / 1000)
 
 
-def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
-    generation: Generation, tmp_path: Path
-) -> None:
+def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(generation, tmp_path):
     write_glb(tmp_path / "head.glb", head())
     character = load_character(tmp_path / "head.glb")
     larger = Delivery(intensity=2)
@@ -65,9 +49,7 @@ def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
     assert doubled.max() > 1.5 * plain.max()
 
 
-def test_brows_and_head_of_pictures_come_later_with_the_mouth(
-    generation: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_brows_and_head_of_pictures_come_later_with_the_mouth(generation, toy_speech, tmp_path, monkeypatch):
     levels = []
 
     def staged(face: Face, _: Staging, prosody: Prosody | None = None) -> Face:
@@ -84,7 +66,7 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
 
 
 @pytest.mark.parametrize("offset_ms", [30.0, -30.0, 0.0])
-def test_loudness_and_pitch_move_together(offset_ms: float) -> None:
+def test_loudness_and_pitch_move_together(offset_ms):
     prosody = Prosody(np.arange(10.0) - 40, np.arange(10.0) / 10)
     moved, by = shift_prosody(prosody, Delivery(offset_ms=offset_ms)), round(offset_ms / 10)
     assert len(moved.level_db) == len(moved.log_f0) == 10 + by
@@ -95,9 +77,7 @@ def test_loudness_and_pitch_move_together(offset_ms: float) -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [12.0, 23.976])
-def test_closures_between_two_frames_of_a_slow_file_are_kept(
-    generation: Generation, rate_hz: float, tmp_path: Path
-) -> None:
+def test_closures_between_two_frames_of_a_slow_file_are_kept(generation, rate_hz, tmp_path):
     narrow = generation.motion.values.copy()
     column, closed = (
         generation.motion.column("opening"),
@@ -111,7 +91,7 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(
     assert opening[[round(frame / 100 * rate_hz) for frame in closed]] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, tmp_path: Path) -> None:
+def test_eyes_and_head_move_on_while_the_mouth_is_held(generation, tmp_path):
     smooth, delivery = with_curves(generation, "face")[0], Delivery(min_hold_ms=400)
     assert max(np.abs(smooth.motion[name]).max() for name in ("eyeBlinkLeft", "headYaw")) > 1e-3
     steps = hold_mouth(smooth, delivery.hold_frames(100), [])
@@ -126,7 +106,7 @@ def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, t
     assert {"jawOpen", "opening"} <= set(steps.stepped)
 
 
-def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(generation: Generation) -> None:
+def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(generation):
     found = deliver(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
     assert found.names == (*generation.motion.names, "mood_happy")
     assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
@@ -134,7 +114,7 @@ def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(gener
     assert np.array_equal(again.motion.values, found.values)
 
 
-def test_words_say_the_mood_after_the_one_that_is_asked_for(generation: Generation) -> None:
+def test_words_say_the_mood_after_the_one_that_is_asked_for(generation):
     tagged = replace(generation, moods=(MoodKey(1.0, "sad"),))
     assert deliver(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
     both = deliver(tagged, Delivery(mood="happy")).motion
@@ -142,13 +122,13 @@ def test_words_say_the_mood_after_the_one_that_is_asked_for(generation: Generati
     assert both["mood_happy"][-1] == pytest.approx(0)
 
 
-def test_neutral_is_what_no_mood_is(generation: Generation) -> None:
+def test_neutral_is_what_no_mood_is(generation):
     plain, neutral = (deliver(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)
 
 
-def test_a_filmed_face_has_the_mood_of_its_footage(generation: Generation, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_filmed_face_has_the_mood_of_its_footage(generation, caplog):
     person = ShownPerson(FilmedFace(None, None, ()))  # type: ignore[arg-type] # nothing of it is needed
     with pytest.raises(InputError, match="the mood of its footage"):
         person.check_video(Path("a.mp4"), OutputSettings(face=person, delivery=Delivery(mood="happy")))
@@ -157,7 +137,7 @@ def test_a_filmed_face_has_the_mood_of_its_footage(generation: Generation, caplo
     assert caplog.messages == ["a.mp4: a filmed face has the mood of its footage; not shown: sad:0.5"]
 
 
-def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation: Generation) -> None:
+def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation):
     afraid = deliver(generation, Delivery(mood="afraid"))
     curves = make_curves(afraid.motion, afraid.units, "vowels")
     assert {*curves.names} - {*make_curves(generation.motion, generation.units, "vowels").names} >= {"sad", "surprised"}
@@ -167,7 +147,7 @@ def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation:
     assert curves["surprised"][pressed] == pytest.approx(0)
 
 
-def test_moods_move_on_while_the_mouth_is_held(generation: Generation) -> None:
+def test_moods_move_on_while_the_mouth_is_held(generation):
     found = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
     assert "mood_sad" not in found.stepped
     assert len(np.unique(found.motion["mood_sad"])) > 6
@@ -179,7 +159,7 @@ def request_with_laughter() -> Request:
     return Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
 
 
-def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with_laughter: Request):
+def test_a_face_laughs_where_laughter_is_detected(toy_model, request_with_laughter):
     laughing = animate(request_with_laughter, model=toy_model)
     (event,) = laughing.events
     assert event.kind == LAUGHTER
@@ -192,7 +172,7 @@ def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with
     assert "mood_happy" not in deliver(laughing, Delivery(mood="neutral")).motion.names
 
 
-def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(toy_model: Model, request_with_laughter: Request):
+def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(toy_model, request_with_laughter):
     plain = animate(replace(request_with_laughter, manner="asked"), model=toy_model)
     laughing = animate(request_with_laughter, model=toy_model)
     assert not plain.events

@@ -1,9 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from PIL import Image
 
-from lipmotion import Staging
+import lipmotion
+from faces.test_cut_out import draw
+from lipmotion.articulation.cue_sheets import list_frame_shapes
+from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, silent_monitor
+from lipmotion_faces import Staging
 from lipmotion_faces.outputs.drawn_video import load_drawing, write_drawn_face
 from lipmotion_faces.portrait.planar import PlanarRasteriser
 from lipmotion_faces.registry import make_face
@@ -24,7 +31,7 @@ def drawn_poses(monkeypatch):
 
 
 @pytest.fixture
-def generation() -> Generation:
+def rising() -> Generation:
     values = np.linspace(0, 0.2, 40)[:, None]
     trace = StateTrace(("known",), np.zeros(len(values), np.intp))
     return Generation(Motion(values, 100.0, (Channel("opening"),)), np.zeros_like(values), Timeline(()), trace)
@@ -36,15 +43,15 @@ def write(path, generation, **staging) -> None:
     write_drawn_face(path, generation, sound, 25.0, face, Staging(size=64, **staging), silent_monitor)
 
 
-def test_an_mp4_is_drawn_in_the_colours_of_its_encoder(tmp_path, generation, drawn_poses):
-    write(tmp_path / "a.mp4", generation)
+def test_an_mp4_is_drawn_in_the_colours_of_its_encoder(tmp_path, rising, drawn_poses):
+    write(tmp_path / "a.mp4", rising)
     assert len(drawn_poses) == 10
     assert (tmp_path / "a.mp4").stat().st_size > 1000
 
 
 @pytest.mark.parametrize(("name", "background"), [("a%d.png", "scene"), ("a.webm", "transparent")])
-def test_other_files_are_drawn_in_red_green_and_blue(tmp_path, generation, drawn_poses, name, background):
-    write(tmp_path / name, generation, background=background)
+def test_other_files_are_drawn_in_red_green_and_blue(tmp_path, rising, drawn_poses, name, background):
+    write(tmp_path / name, rising, background=background)
     assert not drawn_poses
     assert len(list(tmp_path.iterdir())) == (10 if "%" in name else 1)
 
@@ -53,3 +60,32 @@ def test_other_files_are_drawn_in_red_green_and_blue(tmp_path, generation, drawn
 def test_what_draws_is_loaded_by_drawing(drawn_poses):
     load_drawing(make_face("man"))
     assert len(drawn_poses) == 1
+
+
+LETTERS = "A B C D E F G H X"
+SOUND = Audio(np.zeros(34_000, np.float32), 16_000)
+
+
+def test_every_picture_is_that_of_its_cue(generation, tmp_path):
+    drawings = draw(tmp_path / "chart", LETTERS)
+    lipmotion.write(generation, tmp_path / "a%05d.png", speech=SOUND, face=drawings, fps=24)
+    shown = list_frame_shapes(lipmotion.cues(generation, fps=24))
+    pictures = sorted(tmp_path.glob("a*.png"))
+    greys = [int(np.asarray(Image.open(path).convert("RGB"))[-1, 0, 0]) for path in pictures]
+    expected = [10 + 10 * LETTERS.split().index(shape) for shape in shown]
+    assert len(greys) == int(generation.motion.time_s[-1] * 24 + 1e-9) + 1
+    assert greys == [*expected, expected[-1]][: len(greys)]
+    assert {10, 90} <= {*greys}
+
+
+def test_what_drawings_cannot_show_is_refused(generation, tmp_path):
+    drawings = draw(tmp_path / "chart", "A B C D E F")
+    silent, clear = replace(generation, units=Timeline(())), Staging(background="transparent")
+    for given, names, options, error, message in (
+        (silent, ["a.json", "a.webm"], {}, ExportError, "has no phones, from which drawings are chosen"),
+        (generation, ["a.webm"], {"fps": 101}, InputError, "the frame rate is 101"),
+        (generation, ["a.mp4"], {"staging": clear}, ExportError, "cannot be transparent"),
+    ):
+        with pytest.raises(error, match=message):
+            lipmotion.write(given, [tmp_path / name for name in names], speech=SOUND, face=drawings, **options)
+        assert not (tmp_path / names[0]).exists()

@@ -1,7 +1,3 @@
-"""A job is the same value from Python and from a file; what it cannot be is refused in one sentence."""
-
-from __future__ import annotations
-
 import re
 import sys
 from dataclasses import replace
@@ -17,7 +13,6 @@ from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.request import locate_paths
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Timeline
 from lipmotion.units import Lexicon
 
@@ -32,7 +27,7 @@ def block(language: str) -> str:
 
 
 @needs_toml
-def test_the_page_says_one_job_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_says_one_job_twice(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(block("toml"))
     names = {"lipmotion": lipmotion, "Path": Path}
@@ -44,7 +39,7 @@ def test_the_page_says_one_job_twice(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @needs_toml
-def test_paths_begin_at_the_folder_of_the_file(tmp_path: Path) -> None:
+def test_paths_begin_at_the_folder_of_the_file(tmp_path):
     (tmp_path / "my.svg").write_text("<svg/>")
     file = tmp_path / "scene.toml"
     file.write_text(
@@ -85,20 +80,20 @@ def test_paths_begin_at_the_folder_of_the_file(tmp_path: Path) -> None:
         ("a = " + "[" * 100_000, "scene.toml"),
     ],
 )
-def test_what_a_file_cannot_say(tmp_path: Path, content: str, words: str) -> None:
+def test_what_a_file_cannot_say(tmp_path, content, words):
     (tmp_path / "scene.toml").write_text(content)
     with pytest.raises(InputError, match=words) as error:
         Job.from_file(tmp_path / "scene.toml")
     assert str(error.value).startswith(str(tmp_path / "scene.toml"))
 
 
-def test_an_old_python_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_old_python_is_named(monkeypatch):
     monkeypatch.setattr("sys.version_info", (3, 10, 4))
     with pytest.raises(InputError, match=r"read by Python 3\.11 or newer"):
         Job.from_file("scene.toml")
 
 
-def test_a_job_writes_what_animate_and_write_do(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_a_job_writes_what_animate_and_write_do(toy_speech, toy_model_file, tmp_path):
     made = [tmp_path / name for name in ("job.json", "calls.json")]
     outputs = Outputs((str(made[0]),), fps=30, channels=("width", "tongue"))
     delivery = Delivery(anticipation_ms=40)
@@ -110,7 +105,7 @@ def test_a_job_writes_what_animate_and_write_do(toy_speech: Path, toy_model_file
     assert made[0].read_bytes() == made[1].read_bytes()
 
 
-def test_a_field_is_a_file_or_what_it_holds(toy_sentence: ToySentence, toy_speech: Path, tmp_path: Path) -> None:
+def test_a_field_is_a_file_or_what_it_holds(toy_sentence, toy_speech, tmp_path):
     (tmp_path / "words.txt").write_text("see bob")
     (tmp_path / "own.dict").write_text("SEE  S IY\n")
     write_labels(tmp_path / "phones.TextGrid", toy_sentence.units)
@@ -130,7 +125,7 @@ def test_a_field_is_a_file_or_what_it_holds(toy_sentence: ToySentence, toy_speec
         read_request(Request())
 
 
-def test_a_job_of_a_sound_writes_it(toy_sentence: ToySentence, toy_model_file: Path, tmp_path: Path) -> None:
+def test_a_job_of_a_sound_writes_it(toy_sentence, toy_model_file, tmp_path):
     request = Request(toy_sentence.audio, units=toy_sentence.units, model=toy_model_file)
     files = (str(tmp_path / "a.wav"), str(tmp_path / "a.csv"))
     made = Job(request, Outputs(files)).run()
@@ -138,7 +133,7 @@ def test_a_job_of_a_sound_writes_it(toy_sentence: ToySentence, toy_model_file: P
     np.testing.assert_array_equal(made.motion.values, animate(request).motion.values)
 
 
-def test_a_background_is_of_a_drawn_face_or_of_a_filmed_one(toy_speech: Path) -> None:
+def test_a_background_is_of_a_drawn_face_or_of_a_filmed_one(toy_speech):
     with pytest.raises(InputError, match="a video is for filmed faces"):
         Job(Request(toy_speech), Outputs(("a.mp4",), background="sea.mp4")).run()
     assert Staging(background="#40a0ff").colour == (64, 160, 255)

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import io
 import json
 import zipfile
@@ -10,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Model, animate, load_model, save_model
+from lipmotion import animate, load_model, save_model
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.pipeline import model as module
 from lipmotion.pipeline.model import VERSION, read_header, shipped_path
@@ -39,14 +37,14 @@ def with_header(source: Path, target: Path, **changes: object) -> Path:
     return rewritten(source, target, {HEADER: json.dumps(header).encode()})
 
 
-def test_saved_and_loaded_it_moves_the_same(toy_model: Model, toy_model_file: Path, toy_speech: Path) -> None:
+def test_saved_and_loaded_it_moves_the_same(toy_model, toy_model_file, toy_speech):
     """Figures are kept at half precision, so the first save changes a little."""
     before, after = (animate(toy_speech, model=model) for model in (toy_model, load_model(toy_model_file)))
     assert [s.label.phone for s in before.units] == [s.label.phone for s in after.units]
     assert np.abs(before.motion.values - after.motion.values).max() < 0.02
 
 
-def test_after_one_save_nothing_changes_any_more(toy_model_file: Path, toy_speech: Path, tmp_path: Path) -> None:
+def test_after_one_save_nothing_changes_any_more(toy_model_file, toy_speech, tmp_path):
     once = load_model(toy_model_file)
     save_model(once, tmp_path / "again.lipmotion")
     twice = load_model(tmp_path / "again.lipmotion")
@@ -60,7 +58,7 @@ def test_after_one_save_nothing_changes_any_more(toy_model_file: Path, toy_speec
     assert once.engine == twice.engine
 
 
-def test_the_file_is_plain_arrays_and_a_header(toy_model_file: Path) -> None:
+def test_the_file_is_plain_arrays_and_a_header(toy_model_file):
     header = read_header(toy_model_file)
     assert (header["format"], header["version"], header["engine"]) == ("lipmotion.model", VERSION, "trajectory")
     assert header["configuration"]["states"] == 5
@@ -76,7 +74,7 @@ def test_the_file_is_plain_arrays_and_a_header(toy_model_file: Path) -> None:
             assert array.dtype.kind in "fiuU"
 
 
-def test_what_a_user_must_know_comes_back(toy_model: Model, tmp_path: Path) -> None:
+def test_what_a_user_must_know_comes_back(toy_model, tmp_path):
     about = {"corpus": ["mine"], "licence": ["CC BY 4.0"], "attribution": ["Ünal 日本"], "minutes": 1.5}
     save_model(replace(toy_model, about=about), tmp_path / "m.lipmotion")
     assert load_model(tmp_path / "m.lipmotion").about == about
@@ -85,7 +83,7 @@ def test_what_a_user_must_know_comes_back(toy_model: Model, tmp_path: Path) -> N
 PICKLED = b"\x93NUMPY\x01\x00v\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,), }".ljust(127) + b"\n"
 
 
-def test_a_part_is_missing_or_wrong(toy_model_file: Path, tmp_path: Path) -> None:
+def test_a_part_is_missing_or_wrong(toy_model_file, tmp_path):
     for changes in (
         {"phones/means.npy": None},
         {"phones/units.npy": npy(np.array(["sil"]))},
@@ -103,7 +101,7 @@ def test_a_part_is_missing_or_wrong(toy_model_file: Path, tmp_path: Path) -> Non
         assert "\n" not in str(caught.value)
 
 
-def test_the_header_says_what_there_is_not(toy_model_file: Path, tmp_path: Path) -> None:
+def test_the_header_says_what_there_is_not(toy_model_file, tmp_path):
     for changes, message in (
         ({"engine": "concatenative"}, "no engine 'concatenative'; there are: trajectory"),
         ({"configuration": {"part": 5}}, "no option 'part'; there are: states, "),
@@ -116,7 +114,7 @@ def test_the_header_says_what_there_is_not(toy_model_file: Path, tmp_path: Path)
             load_model(with_header(toy_model_file, tmp_path / "m.lipmotion", **changes))
 
 
-def test_models_are_one_short_line() -> None:
+def test_models_are_one_short_line():
     model = load_model()
     assert repr(model).startswith("Model(trajectory, geometry, ")
     assert repr(model).endswith(" minutes, format version 3)")
@@ -126,23 +124,23 @@ def test_models_are_one_short_line() -> None:
 
 
 @pytest.mark.parametrize("fixture", ["joint_model", "coupled_model"])
-def test_models_of_engines_are_one_short_line(fixture: str, request: pytest.FixtureRequest) -> None:
+def test_models_of_engines_are_one_short_line(fixture, request):
     learned = request.getfixturevalue(fixture).learned
     assert repr(learned).startswith(f"{type(learned).__name__}(")
     assert len(repr(learned)) < 120
 
 
-def test_the_shipped_model_is_read_once() -> None:
+def test_the_shipped_model_is_read_once():
     assert load_model() is load_model()
 
 
-def test_a_package_without_a_model_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_package_without_a_model_says_so(monkeypatch, tmp_path):
     monkeypatch.setattr(module, "shipped_path", lambda: tmp_path / "grid-s1.lipmotion")
     with pytest.raises(ModelFormatError, match="the package holds no model; install it again, or give one"):
         animate(Audio(np.zeros(16_000, np.float32), 16_000))
 
 
-def test_a_model_with_the_former_names_of_options_is_read(toy_model_file: Path, tmp_path: Path) -> None:
+def test_a_model_with_the_former_names_of_options_is_read(toy_model_file, tmp_path):
     former = {
         "parts": 5, "silent_parts": 13, "listens": True, "axes": 150, "full_range": True, "joint": True,
         "trajectory_steps": 0, "articulation": False,
@@ -154,7 +152,7 @@ def test_a_model_with_the_former_names_of_options_is_read(toy_model_file: Path, 
         load_model(with_header(toy_model_file, tmp_path / "n.lipmotion", configuration={"trajectory_steps": 3}))
 
 
-def test_what_is_no_model(toy_model_file: Path, tmp_path: Path) -> None:
+def test_what_is_no_model(toy_model_file, tmp_path):
     path = tmp_path / "m.lipmotion"
     for read in (load_model, read_header):
         for missing in (tmp_path / "missing.lipmotion", tmp_path):
@@ -183,7 +181,7 @@ def welcome() -> Generation:
     return animate(EXAMPLES / "welcome.flac", transcript=(EXAMPLES / "welcome.txt").read_text())
 
 
-def test_header_says_whose_recordings() -> None:
+def test_header_says_whose_recordings():
     header = read_header(shipped_path())
     assert header["licence"] == ["CC BY 4.0"]
     assert any("GRID" in line for line in header["attribution"])
@@ -192,7 +190,7 @@ def test_header_says_whose_recordings() -> None:
     assert shipped_path().stat().st_size < 9_000_000
 
 
-def test_lips_meet_on_p_b_m(welcome: Generation) -> None:
+def test_lips_meet_on_p_b_m(welcome):
     opening = welcome.motion["opening"]
     closing = [span for span in welcome.units if span.label.phone in ("p", "b", "m")]
     assert len(closing) == 9  # please speak my lips move big blue boats by
@@ -201,7 +199,7 @@ def test_lips_meet_on_p_b_m(welcome: Generation) -> None:
         assert opening[max(first, 0) : last].min() < 0.01, span
 
 
-def test_vowels_open_and_silence_rests(welcome: Generation) -> None:
+def test_vowels_open_and_silence_rests(welcome):
     opening = welcome.motion["opening"]
     loudest = [span for span in welcome.units if span.label.phone in ("ay", "ae", "iy")]
     assert np.median([opening[int(s.start_s * 100) : int(s.end_s * 100) + 1].max() for s in loudest]) > 0.05

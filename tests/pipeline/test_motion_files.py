@@ -1,7 +1,3 @@
-"""What formats hold: the channels that were asked for, or curves of their own."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,28 +19,20 @@ from lipmotion.meshes.model.scene import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import POSES, calibrate_rows, make_curves, pose_sources
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, read_generation, thin_keys
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
 from meshes.heads import head, write_glb
-from meshes.speech import motion, units
 
 TAKE = Path("a.livelink.csv")
 
 
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
-
-
-def test_plain_formats_hold_what_was_chosen(generation: Generation) -> None:
+def test_plain_formats_hold_what_was_chosen(generation):
     chosen = generation.selected(["opening"])
     assert fit_to_format(Path("a.csv"), generation, chosen, None) is chosen
 
 
-def test_a_take_holds_a_whole_face_at_60_frames(generation: Generation) -> None:
+def test_a_take_holds_a_whole_face_at_60_frames(generation):
     held = fit_to_format(TAKE, generation, generation.selected(["opening"]), None)
     assert held.motion.rate_hz == pytest.approx(60.0)
     assert set(ARKIT_MOUTH) < set(held.motion.names)
@@ -52,7 +40,7 @@ def test_a_take_holds_a_whole_face_at_60_frames(generation: Generation) -> None:
     assert held.motion["jawOpen"].max() > 0.2
 
 
-def test_a_take_shows_the_closures_of_the_motion(generation: Generation) -> None:
+def test_a_take_shows_the_closures_of_the_motion(generation):
     at_100 = make_curves(generation.motion, generation.units, "arkit")
     held = fit_to_format(TAKE, generation, generation, 12.0).motion
     for start_s, end_s in ((0.46, 0.64), (0.86, 1.04)):
@@ -63,7 +51,7 @@ def test_a_take_shows_the_closures_of_the_motion(generation: Generation) -> None
         assert slow == pytest.approx(fast, abs=0.01)
 
 
-def test_blendshapes_that_the_motion_has_are_kept(generation: Generation) -> None:
+def test_blendshapes_that_the_motion_has_are_kept(generation):
     frames = len(generation.motion.values)
     names = ("head.jawOpen", "mouthSmile_L", "eyeBlink_L", "opening")
     values = np.random.default_rng(2).random((frames, 4))
@@ -79,14 +67,14 @@ def test_blendshapes_that_the_motion_has_are_kept(generation: Generation) -> Non
     assert {"eyeBlinkLeft", "browInnerUp", *HEAD} < set(held.names)
 
 
-def test_the_script_takes_controls_that_were_asked_for(generation: Generation) -> None:
+def test_the_script_takes_controls_that_were_asked_for(generation):
     control = Motion(np.zeros((201, 1)), 100.0, (Channel("Jaw.rotation.x", "control"),))
     chosen = replace(generation, motion=control, spread=np.zeros((201, 1)))
     assert fit_to_format(Path("a.blender.py"), generation, chosen, None).motion.names == ("Jaw.rotation.x",)
     assert "jawOpen" in fit_to_format(Path("a.blender.py"), generation, generation, None).motion.names
 
 
-def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> None:
+def test_what_moves_on_its_own_can_be_switched_off(generation):
     said = (generation.motion, generation.units)
     still = compute_living_curves(*said, Staging(blinks=False, gaze=False, brows=False, head=False))
     moving = compute_living_curves(*said)
@@ -95,7 +83,7 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
     assert 0 <= moving["eyeBlinkLeft"].min() <= moving["eyeBlinkLeft"].max() <= 1
 
 
-def test_eyes_look_to_one_side_together(generation: Generation) -> None:
+def test_eyes_look_to_one_side_together(generation):
     gaze = np.array([[0.5 * FULL_LOOK_RAD, 0.25 * FULL_LOOK_RAD]])
     to_its_left = eye_and_brow_weights(Liveliness(np.zeros(1), np.zeros(1), gaze, np.zeros((1, 3))))
     for name, weight in (("OutLeft", 0.5), ("InRight", 0.5), ("InLeft", 0), ("OutRight", 0), ("UpLeft", 0.25)):
@@ -107,12 +95,11 @@ def test_eyes_look_to_one_side_together(generation: Generation) -> None:
 
 
 def written(folder: Path, generation: Generation, name: str, **asked: Any) -> list[str]:
-    """Return the lines of a motion file."""
     write(generation, folder / name, **asked)
     return (folder / name).read_text(encoding="utf-8").splitlines()
 
 
-def test_channels_choose_among_the_curves_of_a_format(generation: Generation, tmp_path: Path) -> None:
+def test_channels_choose_among_the_curves_of_a_format(generation, tmp_path):
     lines = written(tmp_path, generation, "a.livelink.csv", curves="arkit", channels=["jawOpen", "opening"])
     moved = np.array([line.split(",")[2:] for line in lines[1:]], float).any(axis=0)
     assert [name for name, moves in zip(lines[0].split(",")[2:], moved, strict=True) if moves] == ["JawOpen"]
@@ -128,23 +115,19 @@ def test_channels_choose_among_the_curves_of_a_format(generation: Generation, tm
         ("a.bvh", {"channels": ["opening"]}, False),
     ],
 )
-def test_what_a_format_cannot_hold_is_said(
-    generation: Generation, tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str, asked: Any, warned: bool
-) -> None:
+def test_what_a_format_cannot_hold_is_said(generation, tmp_path, caplog, name, asked, warned):
     assert written(tmp_path, generation, name, **asked)
     assert ("holds channels of its own, none of those" in caplog.text) == warned
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "a.motion3.json"])
 @pytest.mark.parametrize("rate_hz", [None, 24.0])
-def test_formats_of_the_mouth_do_not_depend_on_curves(
-    generation: Generation, tmp_path: Path, name: str, rate_hz: float | None
-) -> None:
+def test_formats_of_the_mouth_do_not_depend_on_curves(generation, tmp_path, name, rate_hz):
     plain = written(tmp_path, generation, name, rate_hz=rate_hz)
     assert written(tmp_path, generation, name, rate_hz=rate_hz, curves="visemes") == plain
 
 
-def test_controls_of_a_rig_follow_brows_in_every_mood(generation: Generation, tmp_path: Path) -> None:
+def test_controls_of_a_rig_follow_brows_in_every_mood(generation, tmp_path):
     table = tmp_path / "rig.csv"
     table.write_text("control,source\nfrown,browDownLeft\ncheek,cheekSquintRight\n")
     plain, angry = (
@@ -156,7 +139,7 @@ def test_controls_of_a_rig_follow_brows_in_every_mood(generation: Generation, tm
 
 
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".npz"])
-def test_files_of_motion_hold_moods(generation: Generation, tmp_path: Path, suffix: str) -> None:
+def test_files_of_motion_hold_moods(generation, tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     write(generation, path, delivery=Delivery(mood="sad:0.5"))
     found = read_generation(path).motion
@@ -164,9 +147,7 @@ def test_files_of_motion_hold_moods(generation: Generation, tmp_path: Path, suff
     assert spoken_mouth(found, generation.units).frown.max() > 0.2
 
 
-def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(
-    generation: Generation, tmp_path: Path
-) -> None:
+def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(generation, tmp_path):
     plain, fewer = (written(tmp_path, generation, f"{n}.tres", delivery=Delivery(key_tolerance=n)) for n in (0, 0.03))
     assert sum(map(len, fewer)) < 0.5 * sum(map(len, plain))
     names = [line for line in fewer if "NodePath" in line]
@@ -184,7 +165,7 @@ def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(
 STATED = {"open": {"jawOpen": 0.6}, "closed": {"jawOpen": 0.05}, "rounded": {"mouthPucker": 0.9}}
 
 
-def test_a_character_has_the_stated_weights(tmp_path: Path) -> None:
+def test_a_character_has_the_stated_weights(tmp_path):
     write_glb(tmp_path / "head.glb", head())
     before = load_character(tmp_path / "head.glb")
     rows = calibrate_rows(before.table_rows(), pose_sources(before, before.table_rows()), STATED)
@@ -198,7 +179,7 @@ def test_a_character_has_the_stated_weights(tmp_path: Path) -> None:
     ]
 
 
-def test_controls_of_a_rig_have_the_stated_values(tmp_path: Path) -> None:
+def test_controls_of_a_rig_have_the_stated_values(tmp_path):
     (tmp_path / "rig.csv").write_text("control,source,gain,offset\nJaw,jawOpen,-25,\nJaw,mouthPucker,-5,1\nLip,ou,1,\n")
     rows = read_rig_table(tmp_path / "rig.csv")
     sources = pose_sources(tmp_path / "rig.csv", rows)
@@ -208,7 +189,7 @@ def test_controls_of_a_rig_have_the_stated_values(tmp_path: Path) -> None:
     assert changed[1].gain / changed[0].gain == pytest.approx(0.2)
 
 
-def test_three_values_of_one_control_are_met_as_nearly_as_a_line_can() -> None:
+def test_three_values_of_one_control_are_met_as_nearly_as_a_line_can():
     stated = {pose: {"A": value} for pose, value in zip(POSES, (1.0, 0.0, 0.6), strict=True)}
     (row,) = calibrate_rows([RigRow("A", "jawOpen")], {"jawOpen": [0.5, 0.0, 0.2]}, stated)
     assert row.gain == pytest.approx(1.947, abs=1e-3)
@@ -219,7 +200,7 @@ def test_three_values_of_one_control_are_met_as_nearly_as_a_line_can() -> None:
     ("control", "message"),
     [("B", "the table has no 'B'; there are A"), ("A", "'A' follows no curve that tells these poses apart")],
 )
-def test_what_cannot_be_calibrated_is_said(control: str, message: str) -> None:
+def test_what_cannot_be_calibrated_is_said(control, message):
     with pytest.raises(InputError, match=message):
         calibrate_rows([RigRow("A", "")], {}, {"open": {control: 1.0}})
 

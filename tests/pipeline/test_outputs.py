@@ -1,14 +1,9 @@
-"""``pipeline.outputs.output``: which kind of output a name asks for; kinds that packages add."""
-
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from lipmotion import Model, animate, cues, write, write_cues
+from lipmotion import cues, write, write_cues
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.pipeline.outputs import output
@@ -24,7 +19,6 @@ from lipmotion.pipeline.outputs.output import (
     plan,
 )
 from lipmotion.pipeline.request import Outputs
-from lipmotion.types import Generation
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion_faces.outputs.scenes import SceneOutput
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -49,32 +43,19 @@ def settings() -> OutputSettings:
     return OutputSettings(shown_face("portrait"), sounded=True)
 
 
-@pytest.fixture(scope="module")
-def result(toy_model: Model, toy_speech: Path) -> Generation:
-    return animate(toy_speech, model=toy_model)
-
-
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        ("a.json", MotionOutput),
-        ("a.LIVELINK.csv", MotionOutput),
-        ("a.cues.json", CueOutput),
-        ("a.Cues.TSV", CueOutput),
-        ("cues.json", MotionOutput),
-        ("a.mp4", VideoOutput),
-        ("a.MOV", VideoOutput),
-        ("a%05d.png", PicturesOutput),
-        ("a.glb", SceneOutput),
-        ("a.textgrid", LabelOutput),
-        ("a.flac", SoundOutput),
+        ("a.json", MotionOutput), ("a.LIVELINK.csv", MotionOutput), ("a.cues.json", CueOutput),
+        ("a.Cues.TSV", CueOutput), ("cues.json", MotionOutput), ("a.mp4", VideoOutput), ("a.MOV", VideoOutput),
+        ("a%05d.png", PicturesOutput), ("a.glb", SceneOutput), ("a.textgrid", LabelOutput), ("a.flac", SoundOutput),
     ],
-)
-def test_a_name_asks_for_a_kind(name: str, kind: type[Output], settings: OutputSettings) -> None:
+)  # fmt: skip
+def test_a_name_asks_for_a_kind(name, kind, settings):
     assert type(plan(name, settings)) is kind
 
 
-def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path) -> None:
+def test_what_no_kind_writes_is_refused(settings, tmp_path):
     for name in ("a.xyz", "a.png", "a"):
         with pytest.raises(ExportError, match="required one of") as error:
             plan(name, settings)
@@ -85,15 +66,13 @@ def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path
         create_outputs([tmp_path / "a.cues.tsv"], replace(settings, outputs=Outputs(fps=101.0)))
 
 
-def test_cues_beside_other_outputs_are_those_of_the_function(result: Generation, tmp_path: Path) -> None:
+def test_cues_beside_other_outputs_are_those_of_the_function(result, tmp_path):
     write(result, [tmp_path / "a.cues.tsv", tmp_path / "a.csv"])
     write_cues(cues(result), tmp_path / "b.tsv")
     assert (tmp_path / "a.cues.tsv").read_bytes() == (tmp_path / "b.tsv").read_bytes()
 
 
-def test_a_kind_of_a_package_is_written_beside_others(
-    result: Generation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypatch):
     kinds = {**output.OUTPUTS.built_in, "words": f"{__name__}:WordOutput", "wrong": f"{__name__}:settings"}
     monkeypatch.setattr(output, "OUTPUTS", Registry("output", "lipmotion.outputs", kinds))
     with pytest.raises(InputError, match="is called an output, 'wrong', by an installed package"):
@@ -107,7 +86,7 @@ def test_a_kind_of_a_package_is_written_beside_others(
     assert not (tmp_path / "b.json").exists()
 
 
-def test_outputs_share_what_is_made_once(result: Generation, settings: OutputSettings) -> None:
+def test_outputs_share_what_is_made_once(result, settings):
     performance, made = Performance(result, settings), []
 
     def make(_: Performance) -> list[int]:

@@ -1,7 +1,3 @@
-"""Pictures of posterior probabilities: their rows, their size, and where things are drawn."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -48,7 +44,7 @@ def pixels(picture: Image.Image) -> np.ndarray:
     return np.asarray(picture.convert("RGB")).astype(int)
 
 
-def test_units_have_a_row_each_in_the_order_of_their_time() -> None:
+def test_units_have_a_row_each_in_the_order_of_their_time():
     shown = pixels(draw_posteriors(generated(), [posteriors("phone", halves())]))
     rows = [2 * TITLE_PX + ROW_PX * number + ROW_PX // 2 for number in range(3)]
     early, late = LEFT_PX + 100, LEFT_PX + 2 * FRAMES - 100
@@ -61,20 +57,20 @@ def test_units_have_a_row_each_in_the_order_of_their_time() -> None:
     assert shown[rows[2], early].tolist() == shown[rows[2], late].tolist() == faint
 
 
-def test_units_that_are_never_likely_have_no_row() -> None:
+def test_units_that_are_never_likely_have_no_row():
     three, four = halves(), halves()
     four[9, 3] = 0.06
     heights = [draw_posteriors(generated(), [posteriors("phone", probability)]).height for probability in (three, four)]
     assert heights[1] - heights[0] == ROW_PX
 
 
-def test_where_nothing_is_likely_there_is_a_picture_all_the_same() -> None:
+def test_where_nothing_is_likely_there_is_a_picture_all_the_same():
     few = draw_posteriors(generated(), [posteriors("phone", np.full((FRAMES, 30), 1 / 30))])
     assert few.height > draw_posteriors(generated(), [posteriors("phone", halves())]).height
     assert draw_posteriors(generated(), [posteriors("phone", np.zeros((FRAMES, 3)))]).height > 0
 
 
-def test_the_asynchrony_is_a_panel_of_its_own() -> None:
+def test_the_asynchrony_is_a_panel_of_its_own():
     lead = np.tile([0.1, 0.3, 0.6], (FRAMES, 1))
     alone = draw_posteriors(generated(), [posteriors("phone", halves())])
     both = draw_posteriors(generated(), [posteriors("phone", halves()), posteriors("viseme", halves(), lead)])
@@ -84,13 +80,13 @@ def test_the_asynchrony_is_a_panel_of_its_own() -> None:
     assert column[-(5 * TITLE_PX + 120) - 3 * ROW_PX :].min() < 700  # something is drawn above the opening
 
 
-def test_recordings_of_any_length() -> None:
+def test_recordings_of_any_length():
     for frames, columns in {1: MIN_COLUMNS, 400: 800, 5_345: MAX_COLUMNS}.items():
         picture = draw_posteriors(generated(frames), [posteriors("phone", halves(frames))])
         assert picture.width == LEFT_PX + columns + RIGHT_PX
 
 
-def test_a_column_of_a_long_recording_is_the_mean_of_its_frames() -> None:
+def test_a_column_of_a_long_recording_is_the_mean_of_its_frames():
     probability = np.zeros((8 * MAX_COLUMNS, 1))
     probability[::4] = 1
     shown = pixels(draw_posteriors(generated(8 * MAX_COLUMNS), [posteriors("phone", probability)]))
@@ -98,7 +94,7 @@ def test_a_column_of_a_long_recording_is_the_mean_of_its_frames() -> None:
     assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()
 
 
-def test_phones_are_written_where_there_is_room() -> None:
+def test_phones_are_written_where_there_is_room():
     dense = Timeline(tuple(Span(s / 100, (s + 1) / 100, Unit("aa", "aa")) for s in range(FRAMES)))
     strips = []
     for units in (Timeline(()), dense, generated().units):

@@ -1,7 +1,3 @@
-"""The whole path on real recordings: a part of GRID speaker s1, from video files to figures."""
-
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -35,7 +31,7 @@ def some_of_grid(recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> 
 @pytest.mark.recordings
 @pytest.mark.video
 @pytest.mark.slow
-def test_from_videos_to_figures(some_of_grid: Path, tmp_path: Path) -> None:
+def test_from_videos_to_figures(some_of_grid, tmp_path):
     pytest.importorskip("mediapipe")
     from lipmotion import prepare
 

@@ -1,23 +1,19 @@
 """What was written and is given back unedited is what it was; an edit stays where it was made."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lipmotion import Model, animate, cues, read_motion, speak, write
+from lipmotion import animate, cues, read_motion, speak, write
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.recognised_speech import relied_on
-from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Generation, Span, StateTrace, Timeline, Unit
-from meshes.speech import motion, units
+from lipmotion.types import Generation, Span, Timeline, Unit
 from speech import stand_in_voice
 
 LEFT_CORNER = "y_291"
@@ -25,16 +21,7 @@ LEFT_CORNER = "y_291"
 PHONE_FILES = ("a.TextGrid", "a.json", "a.npz")
 
 
-@pytest.fixture(scope="module")
-def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
-
-
-def test_spoken_text_and_its_phones_give_the_motion_of_speak(
-    monkeypatch: pytest.MonkeyPatch, toy_model: Model, tmp_path: Path
-) -> None:
+def test_spoken_text_and_its_phones_give_the_motion_of_speak(monkeypatch, toy_model, tmp_path):
     stand_in_voice.install(monkeypatch)
     sound, said = speak("Papa, see Bob. Mama!", model=toy_model)
     write(said, [tmp_path / name for name in ("a.wav", "a.flac", *PHONE_FILES)], speech=sound)
@@ -48,9 +35,7 @@ def test_spoken_text_and_its_phones_give_the_motion_of_speak(
 
 @pytest.mark.parametrize("name", PHONE_FILES)
 @pytest.mark.parametrize("words", [None, "all"])
-def test_phones_of_a_recording_say_what_is_known_of_them(
-    toy_model: Model, toy_sentence: ToySentence, tmp_path: Path, words: str | None, name: str
-) -> None:
+def test_phones_of_a_recording_say_what_is_known_of_them(toy_model, toy_sentence, tmp_path, words, name):
     transcript = " ".join(toy_sentence.words) if words else None
     request = Request(toy_sentence.audio, transcript=transcript, recogniser="own")
     first = analyse(toy_model, request)
@@ -69,8 +54,8 @@ def test_phones_of_a_recording_say_what_is_known_of_them(
 
 @pytest.mark.parametrize("name", PHONE_FILES)
 def test_corrected_phones_are_known_and_all_others_as_doubtful_as_before(
-    toy_model: Model, toy_sentence: ToySentence, generation: Generation, tmp_path: Path, name: str
-) -> None:
+    toy_model, toy_sentence, generation, tmp_path, name
+):
     found = relied_on(toy_sentence.units, 0.25)
     write(replace(generation, units=found), tmp_path / name)
     read = read_units(tmp_path / name)
@@ -117,7 +102,7 @@ def edited_text(text: str, units: Timeline[Unit], found: Timeline[Unit], kind: s
     return phones + mark + rest
 
 
-def test_silence_alone_comes_back(generation: Generation, tmp_path: Path) -> None:
+def test_silence_alone_comes_back(generation, tmp_path):
     silent = Timeline((Span(0.0, 1.0 / 3, Unit("sil", confidence=0.0)),))
     write(replace(generation, units=silent), tmp_path / "a.TextGrid")
     assert read_units(tmp_path / "a.TextGrid") == silent
@@ -125,9 +110,7 @@ def test_silence_alone_comes_back(generation: Generation, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("suffix", ["json", "csv", "npz", "c3d", "livelink.csv", "fap"])
 @pytest.mark.parametrize("rate_hz", [25.0, 30_000 / 1001])
-def test_motion_that_is_read_and_written_is_what_it_was(
-    generation: Generation, tmp_path: Path, suffix: str, rate_hz: float
-) -> None:
+def test_motion_that_is_read_and_written_is_what_it_was(generation, tmp_path, suffix, rate_hz):
     first, second = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
     write(generation, first, rate_hz=rate_hz)
     write(read_generation(first), second)
@@ -140,9 +123,7 @@ def test_motion_that_is_read_and_written_is_what_it_was(
 
 @pytest.mark.parametrize("suffix", ["json", "csv", "npz", "c3d"])
 @pytest.mark.parametrize("output", ["json", "csv", "npz", "c3d"])
-def test_an_edited_value_is_the_only_one_that_changes(
-    generation: Generation, tmp_path: Path, suffix: str, output: str
-) -> None:
+def test_an_edited_value_is_the_only_one_that_changes(generation, tmp_path, suffix, output):
     write(generation, tmp_path / f"a.{suffix}")
     given = read_generation(tmp_path / f"a.{suffix}")
     values = given.motion.values.copy()
@@ -157,7 +138,7 @@ def test_an_edited_value_is_the_only_one_that_changes(
     assert (after - before)[50, columns] == pytest.approx(0.125, abs=1e-5)
 
 
-def test_an_edited_opening_leaves_brows_alone_that_are_far_away(generation: Generation, tmp_path: Path) -> None:
+def test_an_edited_opening_leaves_brows_alone_that_are_far_away(generation, tmp_path):
     values = generation.motion.values.copy()
     values[20:25, generation.motion.column("opening")] += 0.3
     edited = replace(generation, motion=replace(generation.motion, values=values))

@@ -1,11 +1,5 @@
-"""Several people in one model, from the corpus to the motion of one of them."""
-
-from __future__ import annotations
-
 import logging
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,38 +16,15 @@ from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
+from pipeline import made
+from pipeline.made import GAIN, OFFSET, corpus_of
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
-GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
-"""How ben's opening, width and outer differ from anna's."""
-
-
-def with_motion(utterance: Utterance, values: np.ndarray, channels: tuple[Channel, ...] | None = None) -> Utterance:
-    motion = utterance.track.motion
-    track = replace(utterance.track, motion=Motion(values, motion.rate_hz, channels or motion.channels))
-    return replace(utterance, track=track)
-
-
-def two_people(count: int = 12) -> Iterator[Utterance]:
-    """Every other sentence is ben's, who has a narrower mouth that never closes wholly."""
-    for number, utterance in enumerate(toy_utterances(count)):
-        if number % 2:
-            values = OFFSET + GAIN * utterance.track.motion.values
-            yield replace(with_motion(utterance, values), speaker="ben")
-        else:
-            yield replace(utterance, speaker="anna")
-
-
-def corpus_of(folder: Path, utterances: list[Utterance]) -> Corpus:
-    corpus = Corpus.create(folder)
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
 
 
 @pytest.fixture(scope="module")
 def people(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
-    return corpus_of(tmp_path_factory.mktemp("people") / "corpus", list(two_people()))
+    return corpus_of(tmp_path_factory.mktemp("people") / "corpus", made.people())
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +41,7 @@ def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarra
 
 
 @pytest.mark.long
-def test_each_person_moves_as_far_as_they_do(model: Model, toy_sentence: ToySentence) -> None:
-    assert model.speakers is not None
+def test_each_person_moves_as_far_as_they_do(model, toy_sentence):
     assert model.speakers.names == ("anna", "ben")
     assert model.about["speakers"] == ["anna", "ben"]
     anna, ben, mean = (opening(model, toy_sentence, name) for name in ("anna", "ben", ""))
@@ -80,7 +50,7 @@ def test_each_person_moves_as_far_as_they_do(model: Model, toy_sentence: ToySent
     assert np.corrcoef(anna, ben)[0, 1] > 0.97
 
 
-def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model: Model, toy_sentence: ToySentence) -> None:
+def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model, toy_sentence):
     ranges = find_closable_ranges(toy_sentence.units, len(opening(model, toy_sentence)))
     assert ranges
     for name, closed in (("anna", 0.0), ("ben", OFFSET[0])):
@@ -89,13 +59,12 @@ def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model: Model, toy
             assert curve[frames].min() < closed + 0.012
 
 
-def test_variances_are_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
-    assert model.speakers is not None
+def test_variances_are_in_the_units_of_the_person(model, toy_sentence):
     mean, ben = (animate(request(toy_sentence, name), model=model) for name in ("", "ben"))
     np.testing.assert_allclose(ben.variance, mean.variance * np.square(model.speakers.of("ben").gain))
 
 
-def test_variances_of_long_recordings(model: Model, toy_sentence: ToySentence, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_variances_of_long_recordings(model, toy_sentence, monkeypatch):
     exact = animate(request(toy_sentence, "ben"), model=model)
     monkeypatch.setattr("lipmotion.motion.generation.DOUBLE_FRAMES", 10)
     single = animate(request(toy_sentence, "ben"), model=model)
@@ -106,7 +75,7 @@ def test_variances_of_long_recordings(model: Model, toy_sentence: ToySentence, m
     np.testing.assert_allclose(single.motion.values, exact.motion.values, atol=1e-5)
 
 
-def test_pins_hold_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
+def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):
     pins = (Pin(0.1, "opening", 0.0), Pin(0.9, "opening", 0.17), Pin(0.93, "opening", 0.0), Pin(1.2, "width", 0.5))
     for speaker in ("anna", "ben"):
         motion = animate(request(toy_sentence, speaker), model=model, constraints=Constraints(pins)).motion
@@ -123,7 +92,7 @@ def test_pins_hold_in_the_units_of_the_person(model: Model, toy_sentence: ToySen
             animate(request(toy_sentence, "ben"), model=model, constraints=Constraints((pin,)))
 
 
-def test_unknown_speakers_are_refused(model: Model, toy_model: Model, toy_sentence: ToySentence) -> None:
+def test_unknown_speakers_are_refused(model, toy_model, toy_sentence):
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
         opening(model, toy_sentence, "cleo")
     with pytest.raises(InputError, match=r"tells no speakers apart.*'cleo'"):
@@ -131,16 +100,14 @@ def test_unknown_speakers_are_refused(model: Model, toy_model: Model, toy_senten
     assert toy_model.speakers is None
 
 
-def test_maps_are_in_the_model_file(model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_maps_are_in_the_model_file(model, toy_sentence, tmp_path):
     save_model(model, tmp_path / "people.lipmotion")
     again = load_model(tmp_path / "people.lipmotion")
     for name in ("anna", "ben"):
         np.testing.assert_allclose(opening(again, toy_sentence, name), opening(model, toy_sentence, name), atol=1e-4)
 
 
-def test_maps_of_other_channels_are_refused(
-    model: Model, toy_sentence: ToySentence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path, monkeypatch):
     def of_jaw(maps: object) -> dict[str, np.ndarray]:
         arrays = speakers_to_arrays(maps)
         arrays["channels"] = np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")])
@@ -153,7 +120,7 @@ def test_maps_of_other_channels_are_refused(
         opening(again, toy_sentence, "ben")
 
 
-def test_evaluation_compares_each_with_their_own_motion(people: Corpus, model: Model) -> None:
+def test_evaluation_compares_each_with_their_own_motion(people, model):
     own, mean = (
         evaluate(each, people, selection=Selection("test"), recogniser="own")
         for each in (model, replace(model, speakers=None))
@@ -164,7 +131,7 @@ def test_evaluation_compares_each_with_their_own_motion(people: Corpus, model: M
     assert "strangers" not in mean
 
 
-def test_strangers_are_named_and_get_the_mean_person(people: Corpus, model: Model, tmp_path: Path) -> None:
+def test_strangers_are_named_and_get_the_mean_person(people, model, tmp_path):
     cleo = replace(people.utterance(people.names("test")[0]), speaker="cleo")
     corpus = corpus_of(tmp_path / "cleo", [cleo])
     figures = evaluate(model, corpus, selection=Selection(None), recogniser="own")
@@ -173,14 +140,14 @@ def test_strangers_are_named_and_get_the_mean_person(people: Corpus, model: Mode
     assert figures["conditions"] == mean["conditions"]
 
 
-def test_an_explanation_is_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
+def test_an_explanation_is_in_the_units_of_the_person(model, toy_sentence):
     motion = animate(request(toy_sentence, "ben"), model=model).motion
     for explanation in explain(request(toy_sentence, "ben"), at=[0.0, 0.9], model=model):
         for name, value in explanation.motion.items():
             assert value.value == pytest.approx(motion[name][explanation.frame], abs=1e-9)
 
 
-def test_one_person_is_not_mapped(people: Corpus) -> None:
+def test_one_person_is_not_mapped(people):
     model, _ = train(
         people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
     )
@@ -189,7 +156,7 @@ def test_one_person_is_not_mapped(people: Corpus) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["joint", "coupled"])
-def test_other_engines(people: Corpus, toy_sentence: ToySentence, engine: str) -> None:
+def test_other_engines(people, toy_sentence, engine):
     settings = {"chains": "sVis 2vis", "mixtures": 2} if engine == "coupled" else {}
     model, _ = train(people, recogniser=SMALL, engine=engine_named(engine, settings))
     anna, ben = (opening(model, toy_sentence, name) for name in ("anna", "ben"))
@@ -205,14 +172,13 @@ def test_other_engines(people: Corpus, toy_sentence: ToySentence, engine: str) -
 
 
 def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
-    values = utterance.track.motion.values[:, : len(channels)]
-    return replace(with_motion(utterance, values, channels), speaker="captured")
+    motion = utterance.track.motion
+    motion = Motion(motion.values[:, : len(channels)], motion.rate_hz, channels)
+    return replace(utterance, track=replace(utterance.track, motion=motion), speaker="captured")
 
 
 @pytest.mark.long
-def test_channels_that_all_have_are_trained_on(
-    people: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_channels_that_all_have_are_trained_on(people, tmp_path, caplog):
     footage = [people.utterance(name) for name in people.names("train")[:6]]
     jaw = (Channel("jaw", "weight"), Channel("width"), Channel("opening"))
     capture = [captured(utterance, jaw) for utterance in toy_utterances(6, seed=1)[:3]]
@@ -222,13 +188,12 @@ def test_channels_that_all_have_are_trained_on(
         model, report = train(corpus, recogniser=SMALL)
     assert "training on the 2 channels that all have (width, opening); left out: jaw, outer" in caplog.text
     assert len(report.used) == 9
-    assert model.speakers is not None
     assert model.speakers.names == ("anna", "ben", "captured")
     generated = animate(Request(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
     assert generated.motion.names == ("width", "opening")
 
 
-def test_no_common_channel_is_an_error(people: Corpus, tmp_path: Path) -> None:
+def test_no_common_channel_is_an_error(people, tmp_path):
     weights = tuple(Channel(name, "weight") for name in ("opening", "jaw"))
     strange = [captured(utterance, weights) for utterance in toy_utterances(3)[:1]]
     corpus = corpus_of(tmp_path / "apart", [people.utterance(people.names("train")[1]), *strange])

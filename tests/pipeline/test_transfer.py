@@ -1,8 +1,3 @@
-"""Generated motion onto the face of another person: of a corpus, a video, another model."""
-
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,30 +7,15 @@ import pytest
 import lipmotion
 from lipmotion import Corpus, Model, animate, explain, load_model, map_onto, save_model, train, with_person
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
-from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
+from lipmotion.types import Audio, Channel, Constraints, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
-
-GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
-"""How ben's opening, width and outer differ from those of the toy."""
-
-
-def of_ben(utterance: Utterance, speaker: str = "ben") -> Utterance:
-    motion = utterance.track.motion
-    changed = Motion(OFFSET + GAIN * motion.values, motion.rate_hz, motion.channels)
-    return replace(utterance, track=replace(utterance.track, motion=changed), speaker=speaker)
-
-
-def corpus_of(folder: Path, utterances: Sequence[Utterance]) -> Corpus:
-    corpus = Corpus.create(folder)
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
+from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +25,7 @@ def ben(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
 
 @pytest.fixture(scope="module")
 def of_two(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
-    utterances = [
-        replace(each, speaker="anna") if number % 2 else of_ben(each)
-        for number, each in enumerate(toy_utterances(12, seed=1))
-    ]
-    return corpus_of(tmp_path_factory.mktemp("two") / "corpus", utterances)
+    return corpus_of(tmp_path_factory.mktemp("two") / "corpus", people(seed=1))
 
 
 @pytest.fixture(scope="module")
@@ -76,13 +52,13 @@ def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) ->
 
 
 @pytest.mark.long
-def test_onto_the_person_of_a_corpus(toy_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+def test_onto_the_person_of_a_corpus(toy_model, toy_sentence, ben):
     is_like_ben(toy_model, toy_sentence, ben.path)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["coupled", "selection"])
-def test_every_engine(toy_corpus: Corpus, toy_sentence: ToySentence, ben: Corpus, engine: str) -> None:
+def test_every_engine(toy_corpus, toy_sentence, ben, engine):
     settings: dict[str, object] = {"articulation": False}  # the toy's mouth does not move as English ones do
     if engine == "coupled":
         settings |= {"chains": "sVis 2vis", "mixtures": 2}
@@ -90,9 +66,7 @@ def test_every_engine(toy_corpus: Corpus, toy_sentence: ToySentence, ben: Corpus
     is_like_ben(model, toy_sentence, ben)
 
 
-def test_variance_and_pins_and_explanations_are_of_the_person(
-    toy_model: Model, toy_sentence: ToySentence, ben: Corpus
-) -> None:
+def test_variance_and_pins_and_explanations_are_of_the_person(toy_model, toy_sentence, ben):
     person = map_onto(toy_model, ben)
     own, mapped = (animate(request(toy_sentence, onto), model=toy_model) for onto in (None, person))
     np.testing.assert_allclose(mapped.variance, own.variance * np.square(person.gain))
@@ -105,7 +79,7 @@ def test_variance_and_pins_and_explanations_are_of_the_person(
 
 
 @pytest.mark.long
-def test_a_person_of_the_model_onto_another(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+def test_a_person_of_the_model_onto_another(two_model, toy_sentence, ben):
     """Whoever of the model's people speaks, the motion is in ben's place and range."""
     people = [animate(request(toy_sentence, ben, speaker=name), model=two_model).motion for name in ("", "anna", "ben")]
     ranges = np.stack([np.ptp(np.percentile(motion.values, [5, 95], axis=0), axis=0) for motion in people])
@@ -116,16 +90,14 @@ def test_a_person_of_the_model_onto_another(two_model: Model, toy_sentence: ToyS
         animate(request(toy_sentence, ben, speaker="cleo"), model=two_model)
 
 
-def test_onto_one_person_of_a_corpus_of_several(toy_model: Model, toy_sentence: ToySentence, of_two: Corpus) -> None:
+def test_onto_one_person_of_a_corpus_of_several(toy_model, toy_sentence, of_two):
     is_like_ben(toy_model, toy_sentence, of_two, onto_speaker="ben")
     for more, found in (({}, "2 speakers"), ({"onto_speaker": "cleo"}, "no speaker 'cleo'")):
         with pytest.raises(InputError, match=rf"{found}, required one of: anna, ben; name it \(--onto-speaker\)"):
             animate(request(toy_sentence, of_two, **more), model=toy_model)
 
 
-def test_onto_a_person_of_another_model(
-    toy_model: Model, two_model: Model, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
+def test_onto_a_person_of_another_model(toy_model, two_model, toy_sentence, tmp_path):
     save_model(two_model, tmp_path / "two.lipmotion")
     mapped = animate(request(toy_sentence, tmp_path / "two.lipmotion", onto_speaker="ben"), model=toy_model).motion
     wanted = animate(request(toy_sentence, speaker="ben"), model=two_model).motion
@@ -137,9 +109,7 @@ def test_onto_a_person_of_another_model(
         map_onto(toy_model, two_model)
 
 
-def test_onto_the_person_of_a_video(
-    toy_model: Model, toy_sentence: ToySentence, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_onto_the_person_of_a_video(toy_model, toy_sentence, toy_speech, monkeypatch):
     """The video is as short as a sentence, so that the gain counts in part."""
     tracked = []
 
@@ -157,7 +127,7 @@ def test_onto_the_person_of_a_video(
         map_onto(toy_model, toy_speech, onto_speaker="ben")
 
 
-def test_a_map_is_kept_in_a_model(toy_model: Model, toy_sentence: ToySentence, ben: Corpus, tmp_path: Path) -> None:
+def test_a_map_is_kept_in_a_model(toy_model, toy_sentence, ben, tmp_path):
     person = map_onto(toy_model, ben)
     known = with_person(with_person(toy_model, "ben", person), "cleo", replace(person, gain=2 * person.gain))
     save_model(known, tmp_path / "known.lipmotion")
@@ -174,7 +144,7 @@ def test_a_map_is_kept_in_a_model(toy_model: Model, toy_sentence: ToySentence, b
 
 
 @pytest.mark.long
-def test_a_person_joins_those_of_a_model(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+def test_a_person_joins_those_of_a_model(two_model, toy_sentence, ben):
     person = map_onto(two_model, ben)
     known = with_person(two_model, "other", person)
     found = animate(request(toy_sentence, speaker="other"), model=known).motion
@@ -185,7 +155,7 @@ def test_a_person_joins_those_of_a_model(two_model: Model, toy_sentence: ToySent
     np.testing.assert_allclose(anna, same)
 
 
-def test_other_channels_are_refused(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_other_channels_are_refused(toy_model, toy_sentence, tmp_path):
     def weights(utterance: Utterance) -> Utterance:
         channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
         motion = replace(utterance.track.motion, channels=channels)
@@ -196,33 +166,20 @@ def test_other_channels_are_refused(toy_model: Model, toy_sentence: ToySentence,
         animate(request(toy_sentence, corpus), model=toy_model)
 
 
-def test_no_face_and_no_speech_are_refused(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
-    def unseen(utterance: Utterance) -> Utterance:
-        return replace(utterance, track=replace(utterance.track, seen=np.zeros_like(utterance.track.seen)))
-
-    corpus = corpus_of(tmp_path / "unseen", [unseen(each) for each in toy_utterances(3)])
+def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
+    unseen = [
+        replace(each, track=replace(each.track, seen=np.zeros_like(each.track.seen))) for each in toy_utterances(3)
+    ]
+    corpus = corpus_of(tmp_path / "unseen", unseen)
     with pytest.raises(InputError, match=r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
         animate(request(toy_sentence, corpus), model=toy_model)
     with pytest.raises(InputError, match="the corpus is empty"):
         animate(request(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
 
 
-def test_what_is_no_person(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
-    (tmp_path / "empty.mp4").touch()
-    for onto, error, message in (
-        (tmp_path, CorpusError, "not a corpus"),
-        (tmp_path / "missing.mp4", InputError, "no such file"),
-        (tmp_path / "empty.mp4", InputError, "the file is empty; give a video"),
-    ):
-        with pytest.raises(error, match=message):
-            animate(request(toy_sentence, onto), model=toy_model)
-    with pytest.raises(InputError, match="onto the speaker 'ben', but of what"):
-        animate(request(toy_sentence, onto_speaker="ben"), model=toy_model)
-
-
 @pytest.mark.recordings
 @pytest.mark.video
-def test_onto_a_real_person(recordings: Path) -> None:
+def test_onto_a_real_person(recordings):
     """A face that rests with parted lips: the third of a second of it counts for nearly half of the way."""
     pytest.importorskip("mediapipe")
     from lipmotion_faces.tracking.track import track

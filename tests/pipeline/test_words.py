@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -29,13 +27,13 @@ def found() -> Recognition:
     return recognise_words(WELCOME)
 
 
-def test_long_pauses_end_a_line() -> None:
+def test_long_pauses_end_a_line():
     assert format_words(words((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))) == "oh no\nyes\n"
     assert format_words(words()) == ""
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".JSON"])
-def test_files_of_words_are_transcripts(found: Recognition, tmp_path: Path, suffix: str) -> None:
+def test_files_of_words_are_transcripts(found, tmp_path, suffix):
     path = tmp_path / f"words{suffix}"
     write_words(found.words, [path], WELCOME)
     aligned = animate(WELCOME, transcript=path).units
@@ -44,7 +42,7 @@ def test_files_of_words_are_transcripts(found: Recognition, tmp_path: Path, suff
     assert all(abs(a - b) < 0.05 for a, b in starts)
 
 
-def test_json_has_times_and_confidences(found: Recognition, tmp_path: Path) -> None:
+def test_json_has_times_and_confidences(found, tmp_path):
     write_words(found.words, [tmp_path / "words.json"])
     document = json.loads((tmp_path / "words.json").read_text())
     assert document["text"].startswith("please speak")
@@ -54,24 +52,23 @@ def test_json_has_times_and_confidences(found: Recognition, tmp_path: Path) -> N
     assert all(0 <= word["conf"] <= 1 for word in document["result"])
 
 
-def test_edited_words_win(found: Recognition, tmp_path: Path) -> None:
+def test_edited_words_win(found, tmp_path):
     path = tmp_path / "words.txt"
     write_words(found.words, [path])
     path.write_text(path.read_text().replace("lips", "hips"))
     assert "hips" in {span.label.word for span in animate(WELCOME, transcript=path).units}
 
 
-def test_files_that_cannot_be_written(found: Recognition, tmp_path: Path) -> None:
+def test_files_that_cannot_be_written(found, tmp_path):
     for name in ("words.srt", "words", "nowhere/words.txt"):
         with pytest.raises(ExportError):
             write_words(found.words, [tmp_path / "first.txt", tmp_path / name])
     assert not list(tmp_path.iterdir())
 
 
-def test_speech_is_as_reliable_as_its_words(found: Recognition) -> None:
+def test_speech_is_as_reliable_as_its_words(found):
     request, model = Request(WELCOME), load_model()
     understood = analyse_speech(model, request)
-    assert understood.recognition is not None
     assert understood.recognition.units == found.units
     assert understood.speech.confidence == pytest.approx(found.reliability)
     assert understood.speech.units == analyse(model, request).units
@@ -81,6 +78,6 @@ def test_speech_is_as_reliable_as_its_words(found: Recognition) -> None:
 
 
 @pytest.mark.long
-def test_words_do_not_depend_on_the_processes(monkeypatch: pytest.MonkeyPatch, found: Recognition) -> None:
+def test_words_do_not_depend_on_the_processes(monkeypatch, found):
     monkeypatch.setattr("lipmotion.speech.recognition.word_search.SHORT_FRAMES", 0)
     assert recognise_words(WELCOME, workers=2).words == found.words

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal
@@ -35,7 +33,7 @@ def held(_: int) -> bool:
     return {signal.SIGINT, signal.SIGTERM} <= signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-def test_no_worker_and_one_are_this_process() -> None:
+def test_no_worker_and_one_are_this_process():
     for count in (0, 1):
         with worker_pool(count) as team:
             assert list(team.ordered_map(square, range(20))) == [number * number for number in range(20)]
@@ -47,7 +45,7 @@ def test_no_worker_and_one_are_this_process() -> None:
 
 
 @pytest.mark.parametrize("given", [0, -1, -(2**70)])
-def test_fewer_than_one_process_are_refused(given: int) -> None:
+def test_fewer_than_one_process_are_refused(given):
     assert process_count(None) >= 1
     assert process_count(3) == 3
     with pytest.raises(InputError, match="required 1 or more"):
@@ -56,7 +54,7 @@ def test_fewer_than_one_process_are_refused(given: int) -> None:
         map_in_processes(given)
 
 
-def test_several_workers_are_other_processes() -> None:
+def test_several_workers_are_other_processes():
     """Results come in order, items are taken when they are needed, errors come back, signals are not for workers."""
     taken = []
 
@@ -81,7 +79,7 @@ def test_several_workers_are_other_processes() -> None:
         assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {signal.SIGINT, signal.SIGTERM}
 
 
-def test_a_worker_that_dies_is_a_clear_error() -> None:
+def test_a_worker_that_dies_is_a_clear_error():
     with pytest.raises(CorpusError, match="a worker process died"), worker_pool(2) as team:
         list(team.ordered_map(die, [0, 1, 0]))
 
@@ -91,7 +89,7 @@ def large(_: int) -> bytes:
 
 
 @pytest.mark.long
-def test_a_worker_that_is_ended_while_it_sends_does_not_block() -> None:
+def test_a_worker_that_is_ended_while_it_sends_does_not_block():
     """Its result is larger than the pipe holds, so it is sending when the block is left."""
     before = set(multiprocessing.active_children())
 
@@ -111,7 +109,7 @@ def killed_while_sending(_: int) -> bytes:
 
 
 @pytest.mark.long
-def test_a_worker_that_dies_while_it_sends_is_a_clear_error() -> None:
+def test_a_worker_that_dies_while_it_sends_is_a_clear_error():
     with pytest.raises(CorpusError, match="a worker process died"), worker_pool(2) as team:
         list(team.ordered_map(killed_while_sending, range(2)))
 
@@ -142,7 +140,7 @@ def test_a_signal_that_another_thread_takes_waits_until_a_process_has_started(nu
     assert seen == ["started", "answered"]
 
 
-def test_processes_begin_before_results_are_asked_for() -> None:
+def test_processes_begin_before_results_are_asked_for():
     taken, called = [], []
 
     def items() -> Iterator[int]:
@@ -157,13 +155,13 @@ def test_processes_begin_before_results_are_asked_for() -> None:
     assert called == [True]
 
 
-def test_nothing_is_called_meanwhile_where_there_is_no_process() -> None:
+def test_nothing_is_called_meanwhile_where_there_is_no_process():
     called = []
     assert list(map_in_processes(2, lambda: called.append(True))(square, [3])) == [9]
     assert not called
 
 
-def test_processes_that_nobody_waits_for_end() -> None:
+def test_processes_that_nobody_waits_for_end():
     results = map_in_processes(2)(square, range(9))
     assert multiprocessing.active_children()
     del results

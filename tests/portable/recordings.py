@@ -1,7 +1,5 @@
 """``python -m portable.recordings FILE ...``: compare the shipped model on this processor and on one without AVX."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path

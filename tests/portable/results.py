@@ -1,7 +1,5 @@
 """``python -m portable.results OUT.npz``: write the results that are compared between processors, as arrays."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path

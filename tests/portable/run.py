@@ -1,7 +1,5 @@
 """``python -m portable.run``: run the numeric tests with the kernels of other processors (``make test-portable``)."""
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import os
@@ -26,13 +24,7 @@ NUMERIC = (
     *(
         f"motion/test_{name}.py"
         for name in (
-            "acoustic_network",
-            "closure",
-            "generation",
-            "prior_regression",
-            "space",
-            "speaker_maps",
-            "transfer_map",
+            "acoustic_network", "closure", "generation", "prior_regression", "space", "speaker_maps", "transfer_map",
         )
     ),
     *(
@@ -40,7 +32,7 @@ NUMERIC = (
         for name in ("adaptation", "adaptation_estimation", "combined_phones", "f0", "mfcc", "recogniser")
     ),
     *("speech/general", "speech/test_speaker_similarity.py", "pipeline/training/test_resume.py"),
-)
+)  # fmt: skip
 """Tests that notice rounding: they compare what was computed in two ways, choose between values that nearly tie, or
 need the same bytes twice; name others on the command line for more."""
 LONGEST_S = 3600.0

@@ -1,19 +1,14 @@
 """Environment variables that make this processor compute like others."""
 
-from __future__ import annotations
-
 import sys
 from functools import cache
 
 import children
 
 CORES = {
-    "Haswell": {"AVX2", "FMA3"},
-    "Zen": {"AVX2", "FMA3"},
-    "SkylakeX": {"AVX512_SKX"},
-    "Sandybridge": {"AVX"},
+    "Haswell": {"AVX2", "FMA3"}, "Zen": {"AVX2", "FMA3"}, "SkylakeX": {"AVX512_SKX"}, "Sandybridge": {"AVX"},
     "Prescott": {"SSE3"},
-}
+}  # fmt: skip
 """Values of ``OPENBLAS_CORETYPE``, the processor whose matrix products are used, and the features that these need.
 
 Features have NumPy's names. On a processor without them a process ends at the first such instruction."""

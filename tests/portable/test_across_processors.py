@@ -1,7 +1,5 @@
 """Results on another processor agree within the tolerances that docs/long-work.md states."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import ExitStack
@@ -17,12 +15,9 @@ pytestmark = pytest.mark.long
 
 TESTS = Path(__file__).parents[1]
 TOLERANCES = {
-    "features of": 1e-4,
-    "F0 of": 1e-4,
-    "the shipped model": 1e-5,
-    "network, trained here": 0.02,
+    "features of": 1e-4, "F0 of": 1e-4, "the shipped model": 1e-5, "network, trained here": 0.02,
     "trained here": 1e-3,
-}
+}  # fmt: skip
 """Features are in standard deviations, F0 is a logarithm, motion is in eye distances. The first that fits a name
 counts: hundreds of steps of a network's training make more of a rounding than a regression does."""
 

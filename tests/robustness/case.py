@@ -1,7 +1,5 @@
 """Cases of bad input, and the good inputs from which they are made."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil
@@ -36,13 +34,11 @@ class Bench:
     face: Path
 
     def file(self, name: str, content: bytes | str) -> Path:
-        """Write a file; return its path."""
         path = self.folder / name
         path.write_bytes(content.encode() if isinstance(content, str) else content)
         return path
 
     def samples(self) -> NDArray[np.float32]:
-        """Return the samples of the good sentence [shape=(N,)]."""
         with wave.open(str(self.speech)) as file:
             return np.frombuffer(file.readframes(file.getnframes()), "<i2").astype(np.float32) / 32_768
 
@@ -75,20 +71,17 @@ class Bench:
         return path
 
     def array(self, name: str, of: Path | None = None) -> NDArray[Any]:
-        """Return one array of a model."""
         with zipfile.ZipFile(of or self.model) as file:
             array: NDArray[Any] = np.load(io.BytesIO(file.read(f"{name}.npy")), allow_pickle=False)
         return array.copy()
 
     def copied_corpus(self) -> Path:
-        """Return a copy of the corpus, to be damaged."""
         path = self.folder / "corpus"
         shutil.copytree(self.corpus, path)
         return path
 
 
 def npy(array: NDArray[Any]) -> bytes:
-    """Return the content of an ``.npy`` file with an array."""
     stream = io.BytesIO()
     np.save(stream, array, allow_pickle=True)
     return stream.getvalue()

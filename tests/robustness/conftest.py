@@ -1,15 +1,11 @@
-from __future__ import annotations
-
 import faulthandler
 import signal
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from cli.conftest import here, run, run_outside
-from lipmotion import Corpus
 from robustness import spoken_cases
 from robustness.case import Bench
 from speech import stand_in_voice
@@ -20,13 +16,7 @@ HANGS_S = 120
 
 @pytest.fixture
 def bench(
-    tmp_path: Path,
-    toy_speech: Path,
-    toy_model_file: Path,
-    toy_corpus: Corpus,
-    coupled_model_file: Path,
-    pictured_model_file: Path,
-    filmed_face_file: Path,
+    tmp_path, toy_speech, toy_model_file, toy_corpus, coupled_model_file, pictured_model_file, filmed_face_file
 ) -> Bench:
     """Good inputs, and a folder in which bad ones are written."""
     folder = tmp_path / "bad"

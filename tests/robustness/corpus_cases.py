@@ -1,7 +1,5 @@
 """Damaged corpora, and recordings to prepare with bad labels, motion or lists."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -54,11 +52,9 @@ def _change_entry(corpus: Path, **changes: object) -> None:
 
 
 PICTURED = "train --visual eigenlips"
-
-
-@_damaged("no mouth pictures for eigenlips", 4, "no mouth pictures, which eigenlips need; prepare", verb=PICTURED)
-def _(corpus: Path) -> None:
-    _change_entry(corpus, crops=False)
+_damaged("no mouth pictures for eigenlips", 4, "no mouth pictures, which eigenlips need; prepare", verb=PICTURED)(
+    lambda corpus: _change_entry(corpus, crops=False)
+)
 
 
 @_damaged("mouth pictures of another size", 4, "mouth pictures of 2 sizes; prepare", verb=PICTURED)
@@ -67,19 +63,15 @@ def _(corpus: Path) -> None:
     np.save(first / "crops.npy", np.zeros((_entry(first)["frames"], 9, 9, 3), np.uint8))
 
 
-@_damaged("a manifest of 100,000 brackets", 4, "not a corpus (no readable corpus.json); give a prepared corpus")
-def _(corpus: Path) -> None:
-    (corpus / "corpus.json").write_text("[" * 100_000)
-
-
-@_damaged("a newer version", 4, "corpus version 9, this lipmotion reads versions up to 2; upgrade lipmotion")
-def _(corpus: Path) -> None:
-    _change_manifest(corpus, version=9)
-
-
-@_damaged("a list of utterances that is a list", 4, "the list of utterances is damaged", "prepare the corpus again")
-def _(corpus: Path) -> None:
-    _change_manifest(corpus, utterances=["a"])
+_damaged("a manifest of 100,000 brackets", 4, "not a corpus (no readable corpus.json); give a prepared corpus")(
+    lambda corpus: (corpus / "corpus.json").write_text("[" * 100_000)
+)
+_damaged("a newer version", 4, "corpus version 9, this lipmotion reads versions up to 2; upgrade lipmotion")(
+    lambda corpus: _change_manifest(corpus, version=9)
+)
+_damaged("a list of utterances that is a list", 4, "the list of utterances is damaged", "prepare the corpus again")(
+    lambda corpus: _change_manifest(corpus, utterances=["a"])
+)
 
 
 @_damaged("an utterance that leads elsewhere", 4, "is not listed as one; prepare the corpus again")

@@ -1,7 +1,5 @@
 """The table of all bad inputs as Markdown, written by ``PYTHONPATH=tests python -m robustness.document``."""
 
-from __future__ import annotations
-
 from itertools import groupby
 from pathlib import Path
 
@@ -19,16 +17,9 @@ from robustness import (
 from robustness.case import CASES
 
 MODULES = (
-    speech_cases,
-    spoken_cases,
-    text_cases,
-    motion_cases,
-    model_cases,
-    face_cases,
-    corpus_cases,
-    option_cases,
+    speech_cases, spoken_cases, text_cases, motion_cases, model_cases, face_cases, corpus_cases, option_cases,
     video_cases,
-)
+)  # fmt: skip
 DOCUMENT = Path(__file__).parent / "table.md"
 HEAD = """# Bad input, row by row
 
@@ -39,7 +30,6 @@ Codes: 0 done, 3 unusable input, 4 corpus, 5 alignment, 6 model file, 7 output. 
 
 
 def rendered() -> str:
-    """Return the document: one table for each group of cases."""
     lines = [HEAD]
     for group, cases in groupby(sorted(CASES, key=lambda case: case.group), key=lambda case: case.group):
         lines += [f"### {group.capitalize()}", "", "| input | exit code | words of the message |", "|---|---|---|"]
@@ -51,7 +41,6 @@ def rendered() -> str:
 
 
 def main() -> None:
-    """Write the document."""
     DOCUMENT.write_text(rendered(), encoding="utf-8")
 
 

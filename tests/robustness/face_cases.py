@@ -1,7 +1,5 @@
 """Faces that are none, and what does not go with a face."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -21,29 +19,23 @@ def _copy(bench: Bench, changes: dict[str, bytes | None], /, **header: object) -
 def _face(
     name: str, code: int, messages: tuple[str, ...], changes: dict[str, bytes | None], /, **header: object
 ) -> None:
-    @case(GROUP, name, code, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--face", _copy(bench, changes, **header), output="a.mp4")
+    case(GROUP, name, code, *messages)(
+        lambda bench: bench.animate(None, "--face", _copy(bench, changes, **header), output="a.mp4")
+    )
 
 
-@case(GROUP, "no such face", 3, "no.face: no such file")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--face", bench.folder / "no.face", output="a.mp4")
-
-
-@case(GROUP, "an empty face", 3, "the file is empty; give a face")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--face", bench.file("a.face", b""), output="a.mp4")
-
-
-@case(GROUP, "a model named .face", 6, "not a face; give a file that `lipmotion face build` wrote")
-def _(bench: Bench) -> list[object]:
-    return ["face", "info", shutil.copy(bench.model, bench.folder / "a.face")]
-
-
-@case(GROUP, "cut off", 6, "not a face", "give a file that `lipmotion face build` wrote")
-def _(bench: Bench) -> list[object]:
-    return ["face", "info", bench.file("a.face", bench.face.read_bytes()[:-1000])]
+case(GROUP, "no such face", 3, "no.face: no such file")(
+    lambda bench: bench.animate(None, "--face", bench.folder / "no.face", output="a.mp4")
+)
+case(GROUP, "an empty face", 3, "the file is empty; give a face")(
+    lambda bench: bench.animate(None, "--face", bench.file("a.face", b""), output="a.mp4")
+)
+case(GROUP, "a model named .face", 6, "not a face; give a file that `lipmotion face build` wrote")(
+    lambda bench: ["face", "info", shutil.copy(bench.model, bench.folder / "a.face")]
+)
+case(GROUP, "cut off", 6, "not a face", "give a file that `lipmotion face build` wrote")(
+    lambda bench: ["face", "info", bench.file("a.face", bench.face.read_bytes()[:-1000])]
+)
 
 
 _face("a newer face", 6, ("face version 9, this lipmotion reads version 1; upgrade lipmotion",), {}, version=9)
@@ -59,9 +51,9 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--face", _copy(bench, {"background/data.npy": cut}), output="a.mp4")
 
 
-@case(GROUP, "an overlay on a sound", 3, "has no pictures, and an overlay shows them; give a video as speech")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--face", bench.face, "--overlay", "inset", output="a.mp4")
+case(GROUP, "an overlay on a sound", 3, "has no pictures, and an overlay shows them; give a video as speech")(
+    lambda bench: bench.animate(None, "--face", bench.face, "--overlay", "inset", output="a.mp4")
+)
 
 
 @case(GROUP, "an overlay and a background", 3, "give a video as speech, and no background")
@@ -101,9 +93,9 @@ def _(bench: Bench) -> list[object]:
     return ["face", "build", bench.folder, "-o", "a.face"]
 
 
-@case(GROUP, "a corpus without its recordings", 3, "not of faces; name the folder of its videos as well: --recordings")
-def _(bench: Bench) -> list[object]:
-    return ["face", "build", bench.corpus, "-o", "a.face"]
+case(GROUP, "a corpus without its recordings", 3, "not of faces; name the folder of its videos as well: --recordings")(
+    lambda bench: ["face", "build", bench.corpus, "-o", "a.face"]
+)
 
 
 @case(GROUP, "a corpus with other recordings", 3, "holds none of the videos of", "give the folder that they are in")

@@ -1,7 +1,3 @@
-"""Damaged model files."""
-
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Callable
 from typing import Any
@@ -18,17 +14,13 @@ DAMAGED = ("damaged", "train or download")
 
 
 def _file(name: str, content: bytes, *messages: str) -> None:
-    @case(GROUP, name, 6, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--model", bench.file("m.lipmotion", content))
+    case(GROUP, name, 6, *messages)(lambda bench: bench.animate(None, "--model", bench.file("m.lipmotion", content)))
 
 
 _file("an empty zip", b"PK\5\6" + bytes(18), *NO_MODEL)
-
-
-@case(GROUP, "cut off", 6, *NO_MODEL)
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--model", bench.file("m.lipmotion", bench.model.read_bytes()[:-99]))
+case(GROUP, "cut off", 6, *NO_MODEL)(
+    lambda bench: bench.animate(None, "--model", bench.file("m.lipmotion", bench.model.read_bytes()[:-99]))
+)
 
 
 @case(GROUP, "flipped bytes in a member", 6, *DAMAGED)
@@ -42,9 +34,7 @@ def _(bench: Bench) -> list[object]:
 
 
 def _header(name: str, *messages: str, **header: object) -> None:
-    @case(GROUP, name, 6, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--model", bench.changed_model({}, **header))
+    case(GROUP, name, 6, *messages)(lambda bench: bench.animate(None, "--model", bench.changed_model({}, **header)))
 
 
 _header("a newer version", "model version 9, this lipmotion reads version 3; upgrade lipmotion", version=9)
@@ -63,9 +53,9 @@ _header("eigenlips that it has not", "the model says visual 'both', which its ei
 
 
 def _changed(name: str, member: str, content: bytes | None, *messages: str) -> None:
-    @case(GROUP, name, 6, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--model", bench.changed_model({member: content}))
+    case(GROUP, name, 6, *messages)(
+        lambda bench: bench.animate(None, "--model", bench.changed_model({member: content}))
+    )
 
 
 _changed("a header of 100,000 brackets", "header.json", b"[" * 100_000, *NO_MODEL)
@@ -96,13 +86,5 @@ _changed_array("coupled: one state less", "engine/chain_0/advance", lambda a: a[
 _changed_array("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest pose of", of="coupled")
 LIPS = ("the eigenlips are damaged", "train the model again")
 _changed_array("eigenlips: a colour less", "eigenlips/basis", lambda a: a[:2], *LIPS, "basis of shape", of="pictured")
-
-
-@case(GROUP, "a device", 3, "no such model; train one")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--model", "/dev/zero")
-
-
-@case(GROUP, "info of a damaged one", 6, *NO_MODEL)
-def _(bench: Bench) -> list[object]:
-    return ["info", bench.file("m.lipmotion", "hello")]
+case(GROUP, "a device", 3, "no such model; train one")(lambda bench: bench.animate(None, "--model", "/dev/zero"))
+case(GROUP, "info of a damaged one", 6, *NO_MODEL)(lambda bench: ["info", bench.file("m.lipmotion", "hello")])

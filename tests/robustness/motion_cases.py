@@ -1,7 +1,3 @@
-"""Motion files with bad units or bad values."""
-
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -32,10 +28,9 @@ def _unit(start_s: object, end_s: object, phone: object = "p") -> dict[str, obje
 
 def _json(name: str, text: str | dict[str, object], code: int, *messages: str) -> None:
     content = text if isinstance(text, str) else json.dumps(GOOD | text)
-
-    @case(GROUP, f"json: {name}", code, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--units", bench.file("units.json", content))
+    case(GROUP, f"json: {name}", code, *messages)(
+        lambda bench: bench.animate(None, "--units", bench.file("units.json", content))
+    )
 
 
 _json("units that overlap", {"units": [_unit(0, 0.5), _unit(0.4, 0.6)]}, 3,
@@ -60,9 +55,9 @@ _json("100,000 brackets", '{"values": ' + "[" * 100_000, 3, "not JSON", "export 
 
 
 def _csv(name: str, content: str, *messages: str) -> None:
-    @case(GROUP, f"csv: {name}", 3, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--units", bench.file("units.csv", content))
+    case(GROUP, f"csv: {name}", 3, *messages)(
+        lambda bench: bench.animate(None, "--units", bench.file("units.csv", content))
+    )
 
 
 _csv("a good one, which has no units", "time_s,opening\n0,1\n0.1,2\n", "the units are an empty list")
@@ -93,14 +88,12 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.folder / "units.json")
 
 
-@case(GROUP, "a file that does not exist", 3, "units.json: cannot be read: No such file")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--units", bench.folder / "units.json")
-
-
-@case(GROUP, "a recording as units", 3, "is a recording, required a units file")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--units", bench.speech)
+case(GROUP, "a file that does not exist", 3, "units.json: cannot be read: No such file")(
+    lambda bench: bench.animate(None, "--units", bench.folder / "units.json")
+)
+case(GROUP, "a recording as units", 3, "is a recording, required a units file")(
+    lambda bench: bench.animate(None, "--units", bench.speech)
+)
 
 
 def _compared(name: str, content: str, *messages: str) -> None:

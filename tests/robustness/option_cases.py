@@ -1,7 +1,3 @@
-"""Bad values of options, and outputs that cannot be written."""
-
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -11,9 +7,7 @@ GROUP = "options"
 
 
 def _option(name: str, code: int, message: str, *more: object) -> None:
-    @case(GROUP, name, code, message)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, *more)
+    case(GROUP, name, code, message)(lambda bench: bench.animate(None, *more))
 
 
 _option("--fps inf", 3, "the frame rate is inf a second, required 1 to 1000 a second", "--fps=inf")
@@ -29,11 +23,11 @@ _option("--anticipation-ms 2000", 3, "the anticipation is 2000 ms, required -100
 _option("--offset-ms that leaves nothing", 3, "nothing is left; give a smaller one", "--offset-ms=-60000")
 _option("--posteriors of a model without chains", 3, "'trajectory' has no chains", "--posteriors", "a.png")
 _option("--posteriors as .jpg", 7, "unknown format '.jpg'; required: .png", "--posteriors", "a.jpg")
-
-
-@case(GROUP, "cues --hold 1000000000", 0)
-def _(bench: Bench) -> list[object]:
-    return ["cues", bench.speech, "--model", bench.model, "--recogniser", "own", "--hold", "1000000000", "-o", "a.json"]
+case(GROUP, "cues --hold 1000000000", 0)(
+    lambda bench: [
+        "cues", bench.speech, "--model", bench.model, "--recogniser", "own", "--hold", "1000000000", "-o", "a.json",
+    ]
+)  # fmt: skip
 
 
 for _name, _options, _message in [
@@ -49,9 +43,9 @@ for _name, _options, _message in [
         return ["train", bench.corpus, "-o", "m", *options]
 
 
-@case(GROUP, "corpus prompts --text of 30 million bytes", 3, "30000000 bytes, required at most 4194304")
-def _(bench: Bench) -> list[object]:
-    return ["corpus", "prompts", "--text", bench.file("text.txt", b"a " * 15_000_000)]
+case(GROUP, "corpus prompts --text of 30 million bytes", 3, "30000000 bytes, required at most 4194304")(
+    lambda bench: ["corpus", "prompts", "--text", bench.file("text.txt", b"a " * 15_000_000)]
+)
 
 
 @case(GROUP, "corpus prepare --workers -1", 3, "-1 processes, required 1 or more")
@@ -64,9 +58,7 @@ OUTPUTS = "outputs"
 
 
 def _output(name: str, output: str, *messages: str) -> None:
-    @case(OUTPUTS, name, 7, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(output=output)
+    case(OUTPUTS, name, 7, *messages)(lambda bench: bench.animate(output=output))
 
 
 _output("a folder that does not exist", "none/a.json", "the folder none does not exist; create it first")
@@ -82,11 +74,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(output=bench.folder / "a.json")
 
 
-@case(OUTPUTS, "one name twice", 7, "is given twice; give every output another")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "-o", Path("./a.json"), output=Path.cwd() / "a.json")
-
-
-@case(OUTPUTS, "a name that is no UTF-8", 0)
-def _(bench: Bench) -> list[object]:
-    return bench.animate(output=os.fsdecode(b"a\xff.json"))
+case(OUTPUTS, "one name twice", 7, "is given twice; give every output another")(
+    lambda bench: bench.animate(None, "-o", Path("./a.json"), output=Path.cwd() / "a.json")
+)
+case(OUTPUTS, "a name that is no UTF-8", 0)(lambda bench: bench.animate(output=os.fsdecode(b"a\xff.json")))

@@ -1,7 +1,3 @@
-"""Unusable and damaged recordings."""
-
-from __future__ import annotations
-
 import os
 import struct
 from pathlib import Path
@@ -42,16 +38,12 @@ def _cut(suffix: str, codec: str, share: float) -> None:
 for _suffix, (_codec, _cuts) in CONTAINERS.items():
     for _share in _cuts:
         _cut(_suffix, _codec, _share)
-
-
-@case(GROUP, "an empty file", 3, "the file is empty", "give a recording")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.file("a.wav", b""))
-
-
-@case(GROUP, "a header only", 3, "holds 0 ms of sound", "required at least 100 ms")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.sound(np.zeros(0, np.int16)))
+case(GROUP, "an empty file", 3, "the file is empty", "give a recording")(
+    lambda bench: bench.animate(bench.file("a.wav", b""))
+)
+case(GROUP, "a header only", 3, "holds 0 ms of sound", "required at least 100 ms")(
+    lambda bench: bench.animate(bench.sound(np.zeros(0, np.int16)))
+)
 
 
 @case(GROUP, "a header that promises more than there is", 0)
@@ -68,9 +60,9 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.sound(samples))
 
 
-@case(GROUP, "samples a million times full scale", 3, "full scale 1, found a peak of")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.sound(bench.samples() * np.float32(1e8)))
+case(GROUP, "samples a million times full scale", 3, "full scale 1, found a peak of")(
+    lambda bench: bench.animate(bench.sound(bench.samples() * np.float32(1e8)))
+)
 
 
 for _name, _rate_hz, _code, _messages in [
@@ -84,9 +76,7 @@ for _name, _rate_hz, _code, _messages in [
         return bench.animate(bench.sound(samples, rate_hz))
 
 
-@case(GROUP, "64 channels", 0)
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.sound(np.tile(bench.samples()[:, None], (1, 64))))
+case(GROUP, "64 channels", 0)(lambda bench: bench.animate(bench.sound(np.tile(bench.samples()[:, None], (1, 64)))))
 
 
 for _name, _samples in {
@@ -107,14 +97,12 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(path.rename(bench.folder / "a.wav"))
 
 
-@case(GROUP, "a web page", 3, "is a web page, required a recording", "fetch the file itself")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.file("a.wav", b"<!DOCTYPE html><html><body>404 Not Found</body></html>\n" * 20))
-
-
-@case(GROUP, "random bytes", 3, *NO_RECORDING)
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.file("a.wav", np.random.default_rng(1).bytes(5000)))
+case(GROUP, "a web page", 3, "is a web page, required a recording", "fetch the file itself")(
+    lambda bench: bench.animate(bench.file("a.wav", b"<!DOCTYPE html><html><body>404 Not Found</body></html>\n" * 20))
+)
+case(GROUP, "random bytes", 3, *NO_RECORDING)(
+    lambda bench: bench.animate(bench.file("a.wav", np.random.default_rng(1).bytes(5000)))
+)
 
 
 @case(GROUP, "a picture", 3, "is a picture, required a recording")
@@ -123,14 +111,12 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.folder / "a.png")
 
 
-@case(GROUP, "a video without sound", 3, "has no sound track")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(write_pictures(bench.folder / "a.mp4"))
-
-
-@case(GROUP, "a folder", 3, "no sounds and no videos in it; give a folder of recordings")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.folder)
+case(GROUP, "a video without sound", 3, "has no sound track")(
+    lambda bench: bench.animate(write_pictures(bench.folder / "a.mp4"))
+)
+case(GROUP, "a folder", 3, "no sounds and no videos in it; give a folder of recordings")(
+    lambda bench: bench.animate(bench.folder)
+)
 
 
 @case(GROUP, "a link to itself", 3, "a.wav")
@@ -145,14 +131,8 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.folder / "a.wav")
 
 
-@case(GROUP, "/dev/zero", 3, "is a pipe or a device, required a file")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(Path("/dev/zero"))
-
-
-@case(GROUP, "a name that is too long", 3, "required a path")
-def _(bench: Bench) -> list[object]:
-    return bench.animate("x" * 300 + ".wav")
+case(GROUP, "/dev/zero", 3, "is a pipe or a device, required a file")(lambda bench: bench.animate(Path("/dev/zero")))
+case(GROUP, "a name that is too long", 3, "required a path")(lambda bench: bench.animate("x" * 300 + ".wav"))
 
 
 @case(GROUP, "a name that is no UTF-8", 0)
@@ -162,14 +142,12 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(path)
 
 
-@case(GROUP, "time stamps that alternate", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(write_stamped(bench.folder / "a.mkv", [598.0 * (n % 2) + n / 50 for n in range(400)]))
-
-
-@case(GROUP, "a day of sound in 164 KB", 3, "bytes of sound last 664 s, required at most 661 s (20 bytes a second)")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(write_constant_flac(bench.folder / "a.flac", 80_000))
+case(GROUP, "time stamps that alternate", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")(
+    lambda bench: bench.animate(write_stamped(bench.folder / "a.mkv", [598.0 * (n % 2) + n / 50 for n in range(400)]))
+)
+case(GROUP, "a day of sound in 164 KB", 3, "bytes of sound last 664 s, required at most 661 s (20 bytes a second)")(
+    lambda bench: bench.animate(write_constant_flac(bench.folder / "a.flac", 80_000))
+)
 
 
 for _name, _content in {
@@ -184,6 +162,4 @@ for _name, _content in {
         return bench.animate(bench.file("a.idx", content).rename(bench.folder / "a.m3u8"))
 
 
-@case(GROUP, "a name like an address", 3, "no such file")
-def _(bench: Bench) -> list[object]:
-    return bench.animate("concat:a.wav|b.wav")
+case(GROUP, "a name like an address", 3, "no such file")(lambda bench: bench.animate("concat:a.wav|b.wav"))

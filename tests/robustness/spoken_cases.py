@@ -1,17 +1,13 @@
 """Texts that nobody can speak, and voices that nobody has."""
 
-from __future__ import annotations
-
-from robustness.case import Bench, case
+from robustness.case import case
 
 GROUP = "texts to speak"
 NO_WORD = ("holds no word", "give the words to be spoken")
 
 
 def _text(name: str, text: str, code: int, messages: tuple[str, ...] = (), *more: object) -> None:
-    @case(GROUP, name, code, *messages)
-    def _(bench: Bench) -> list[object]:
-        return ["speak", text, "--model", bench.model, "-o", "a.json", *more]
+    case(GROUP, name, code, *messages)(lambda bench: ["speak", text, "--model", bench.model, "-o", "a.json", *more])
 
 
 _text("an empty text to speak", "", 3, NO_WORD)
@@ -29,15 +25,13 @@ _text("one word of 10,000 letters to speak", "ab" * 5000, 3, ("a word of 10000 c
 
 
 def _file(name: str, content: bytes, code: int, *messages: str) -> None:
-    @case(GROUP, name, code, *messages)
-    def _(bench: Bench) -> list[object]:
-        return ["speak", "--text", bench.file("text.txt", content), "--model", bench.model, "-o", "a.json"]
+    case(GROUP, name, code, *messages)(
+        lambda bench: ["speak", "--text", bench.file("text.txt", content), "--model", bench.model, "-o", "a.json"]
+    )
 
 
 _file("a text file in Latin-1", "pâpa".encode("latin-1"), 3, "not a readable UTF-8 text", "save it as UTF-8 text")
 _file("a text file of a million bytes", b"papa " * 200_000, 3, "1000000 bytes, required at most 200000: is it a text?")
-
-
-@case(GROUP, "a text file that is not there", 3, "no such text file")
-def _(bench: Bench) -> list[object]:
-    return ["speak", "--text", "text.txt", "--model", bench.model, "-o", "a.json"]
+case(GROUP, "a text file that is not there", 3, "no such text file")(
+    lambda bench: ["speak", "--text", "text.txt", "--model", bench.model, "-o", "a.json"]
+)

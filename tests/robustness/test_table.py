@@ -1,20 +1,16 @@
-from __future__ import annotations
-
 import json
 import sys
-from pathlib import Path
 
 import pytest
 
-from cli.conftest import RunCommand
-from robustness.case import CASES, Bench, Case
+from robustness.case import CASES
 from robustness.document import DOCUMENT, rendered
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="pipes, devices and names as Linux has them")
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.group}: {case.name}")
-def test_bad_input(case: Case, bench: Bench, run: RunCommand, here: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_bad_input(case, bench, run, here, caplog):
     if case.group == "videos":
         pytest.importorskip("mediapipe")
     done = run(*case.make(bench))
@@ -37,12 +33,12 @@ def test_bad_input(case: Case, bench: Bench, run: RunCommand, here: Path, caplog
             json.loads(path.read_text(encoding="utf-8"), parse_constant=pytest.fail)
 
 
-def test_there_are_many_and_none_twice() -> None:
+def test_there_are_many_and_none_twice():
     names = [(case.group, case.name) for case in CASES]
     assert len(names) >= 150
     assert len(set(names)) == len(names)
 
 
-def test_the_document_has_all_of_them() -> None:
+def test_the_document_has_all_of_them():
     """To update it, run ``python -m robustness.document`` with the folder ``tests`` in PYTHONPATH."""
     assert rendered() == DOCUMENT.read_text(encoding="utf-8")

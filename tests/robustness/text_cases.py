@@ -1,7 +1,5 @@
 """Unusual and unusable transcripts and lexicons."""
 
-from __future__ import annotations
-
 import os
 
 from robustness.case import Bench, case
@@ -13,9 +11,7 @@ TOO_MUCH = ("words take at least", "frames of 10 ms, found", "too short for what
 
 
 def _transcript(name: str, text: str, code: int, *messages: str) -> None:
-    @case(GROUP, name, code, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--transcript", text)
+    case(GROUP, name, code, *messages)(lambda bench: bench.animate(None, "--transcript", text))
 
 
 _transcript("an empty text", "", 3, *NO_WORD)
@@ -32,9 +28,9 @@ _transcript("more than fits in a name", "papa mama " * 40 + "/", 5, *TOO_MUCH)
 
 
 def _transcript_file(name: str, content: bytes | str, code: int, *messages: str) -> None:
-    @case(GROUP, name, code, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--transcript", bench.file("words.txt", content))
+    case(GROUP, name, code, *messages)(
+        lambda bench: bench.animate(None, "--transcript", bench.file("words.txt", content))
+    )
 
 
 _transcript_file("a file in Latin-1", "papa, “mama”".encode("cp1252"), 0,
@@ -79,18 +75,18 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--transcript", path)
 
 
-@case(GROUP, "words of another sentence", 0, "the transcript seems not to be what is said", "check it, or leave it out")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--transcript", "squash six fish chefs", "--recogniser", "auto")
+case(GROUP, "words of another sentence", 0, "the transcript seems not to be what is said", "check it, or leave it out")(
+    lambda bench: bench.animate(None, "--transcript", "squash six fish chefs", "--recogniser", "auto")
+)
 
 
 LEXICONS = "lexicons"
 
 
 def _lexicon(name: str, content: bytes, code: int, *messages: str) -> None:
-    @case(LEXICONS, name, code, *messages)
-    def _(bench: Bench) -> list[object]:
-        return bench.animate(None, "--transcript", "papa", "--lexicon", bench.file("lexicon.txt", content))
+    case(LEXICONS, name, code, *messages)(
+        lambda bench: bench.animate(None, "--transcript", "papa", "--lexicon", bench.file("lexicon.txt", content))
+    )
 
 
 _lexicon("an unknown phone", b"papa P AA\nmama M QQ M\n", 3, "line 2: unknown phone 'QQ'; the phones are:")
@@ -101,8 +97,6 @@ _lexicon("Latin-1", "bübchen B UW\n".encode("latin-1"), 3, "not a readable UTF-
 _lexicon("a line of 900 phones", b"papa" + b" P" * 900, 5, *TOO_MUCH)
 _lexicon("a million pronunciations", b"papa P AA\n" * 1_000_000, 3, "line 33: more than 32 pronunciations of 'papa'")
 _lexicon("two million lines", b"papa P\n" * 2_000_000, 3, "2000001 lines, required at most 1048576; keep the words")
-
-
-@case(LEXICONS, "a folder", 3, "is a folder; give one lexicon file")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(None, "--transcript", "papa", "--lexicon", bench.folder)
+case(LEXICONS, "a folder", 3, "is a folder; give one lexicon file")(
+    lambda bench: bench.animate(None, "--transcript", "papa", "--lexicon", bench.folder)
+)

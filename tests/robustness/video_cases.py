@@ -1,7 +1,5 @@
 """Videos from which no corpus can be prepared."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

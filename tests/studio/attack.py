@@ -1,7 +1,5 @@
 """What hostile requests get of a studio that is served."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from studio.hostile import FOREIGN, hostile_requests

@@ -1,7 +1,5 @@
 """A studio with one line of the toy's speech, which requests are sent to in this process."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 import time
@@ -24,20 +22,15 @@ PATIENCE_S = 120.0
 
 
 class OpenStudio(NamedTuple):
-    """A studio, and the application that shows it."""
-
     folder: ProjectFolder
     studio: Studio
     application: Application
 
     def ask(self, path: str, content: Any = None, **headers: str) -> Reply:
-        """Return the reply to a request of the page."""
         sent = SENT | {name.replace("_", "-"): value for name, value in headers.items()}
         return ask(self.application, path, content, headers=sent)
 
     def ask_together(self, *requests: tuple[str, Any]) -> list[Reply]:
-        """Return the replies to requests that are sent at the same time."""
-
         async def replies() -> list[Reply]:
             sent = (answered(self.application, path, content, headers=SENT) for path, content in requests)
             return list(await asyncio.gather(*sent))
@@ -45,7 +38,6 @@ class OpenStudio(NamedTuple):
         return asyncio.run(replies())
 
     def ready(self, number: int = 1) -> dict[str, Any]:
-        """Return the state of a line once it is understood."""
         ends_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < ends_s:
             state = self.ask(f"/api/lines/{number}").content
@@ -55,7 +47,6 @@ class OpenStudio(NamedTuple):
         raise AssertionError(f"line {number} is not ready after {PATIENCE_S} s")
 
     def row(self, number: int = 1) -> dict[str, Any]:
-        """Return what the list says of a line."""
         return self.studio.row(self.folder.recording(number))
 
     def change(self, what: str, number: int = 1, **content: Any) -> Reply:

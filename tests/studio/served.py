@@ -1,7 +1,5 @@
 """``lipmotion studio`` as a process: its address, requests to it, random edits that a page could make."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import time
@@ -27,8 +25,6 @@ WORDS = ("bob", "we may", "so", "put a map")
 
 
 class Served(NamedTuple):
-    """A studio that is served: its process, its port and its token."""
-
     process: Child
     port: int
     token: str
@@ -52,7 +48,6 @@ class Served(NamedTuple):
             connection.close()
 
     def ready(self, number: int = 1) -> dict[str, Any]:
-        """Return the state of a line once it is understood."""
         ends_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < ends_s:
             state = self.ask(f"/api/lines/{number}")[1]

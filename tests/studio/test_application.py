@@ -1,7 +1,3 @@
-"""The studio's application: a line from its sound to an export, and whoever asks for something else."""
-
-from __future__ import annotations
-
 import io
 import json
 import shutil
@@ -21,7 +17,6 @@ from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.testing.toy import ToySentence
 from lipmotion.units import Lexicon
 from lipmotion_faces.video.mp4 import write_mp4
 
@@ -42,9 +37,7 @@ OTHER_DIGEST = "1" * 64
 
 
 @pytest.fixture(scope="module")
-def place(
-    toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[OpenStudio]:
+def place(toy_speech, toy_sentence, toy_model, tmp_path_factory) -> Iterator[OpenStudio]:
     folder = tmp_path_factory.mktemp("studio")
     with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, folder) as opened:
         yield opened
@@ -59,7 +52,7 @@ def studio(place: OpenStudio) -> OpenStudio:
     return place
 
 
-def test_an_edit_is_made_stored_and_taken_back(studio: OpenStudio) -> None:
+def test_an_edit_is_made_stored_and_taken_back(studio):
     before = studio.ready()
     assert before["transcript"] == (studio.folder.path.parent / "line.txt").read_text(encoding="utf-8")
     reply = studio.edit("phone 3 is p", "pin opening 0.1 at 1.0")
@@ -75,7 +68,7 @@ def test_an_edit_is_made_stored_and_taken_back(studio: OpenStudio) -> None:
     assert (redone["steps"], redone["redo"]) == (["phone 3 is p"], 1)
 
 
-def test_phones_that_edits_have_touched_are_told(studio: OpenStudio) -> None:
+def test_phones_that_edits_have_touched_are_told(studio):
     def edited(state: dict[str, Any]) -> list[int]:
         return [number for number, phone in enumerate(state["phones"], 1) if phone["edited"]]
 
@@ -88,7 +81,7 @@ def test_phones_that_edits_have_touched_are_told(studio: OpenStudio) -> None:
     assert edited(studio.edit("split phone 1 at 0.02").content) == [1, 2, 6, 7]
 
 
-def test_while_something_is_dragged_each_edit_replaces_the_one_before(studio: OpenStudio) -> None:
+def test_while_something_is_dragged_each_edit_replaces_the_one_before(studio):
     end_s = studio.ready()["phones"][2]["end_s"]
     for way_s in (0.01, 0.02):
         state = studio.edit(f"phone 3 ends {end_s - way_s:.3f}", instead=0 if way_s == 0.01 else 1).content
@@ -96,7 +89,7 @@ def test_while_something_is_dragged_each_edit_replaces_the_one_before(studio: Op
     assert state["redo"] == 0
 
 
-def test_two_tabs_do_not_overwrite_one_another(studio: OpenStudio) -> None:
+def test_two_tabs_do_not_overwrite_one_another(studio):
     first = studio.ready()
     assert studio.edit("phone 3 is p").status == 200
     late = studio.ask("/api/lines/1/edits", {"revision": first["revision"], "steps": ["phone 3 is m"]})
@@ -106,17 +99,12 @@ def test_two_tabs_do_not_overwrite_one_another(studio: OpenStudio) -> None:
 @pytest.mark.parametrize(
     ("content", "status"),
     [
-        ({"revision": None, "steps": ["phone 3 is p"]}, 422),
-        ({"steps": ["phone 99 is p"]}, 422),
-        ({"steps": ["jump"]}, 422),
-        ({"steps": "phone 3 is p"}, 422),
-        ({"steps": [], "instead": 1}, 422),
-        ([], 422),
-        (b"{", 400),
-        (b" " * (1 << 21), 413),
+        ({"revision": None, "steps": ["phone 3 is p"]}, 422), ({"steps": ["phone 99 is p"]}, 422),
+        ({"steps": ["jump"]}, 422), ({"steps": "phone 3 is p"}, 422), ({"steps": [], "instead": 1}, 422), ([], 422),
+        (b"{", 400), (b" " * (1 << 21), 413),
     ],
-)
-def test_edits_that_are_refused_change_nothing(studio: OpenStudio, content: object, status: int) -> None:
+)  # fmt: skip
+def test_edits_that_are_refused_change_nothing(studio, content, status):
     before = studio.ready()
     if isinstance(content, dict):
         content = {"revision": before["revision"]} | content
@@ -125,28 +113,23 @@ def test_edits_that_are_refused_change_nothing(studio: OpenStudio, content: obje
     assert studio.ready() == before
 
 
-def test_words_are_corrected_where_they_are_said(studio: OpenStudio) -> None:
+def test_words_are_corrected_where_they_are_said(studio):
     word = studio.ready()["words"][0]
     content = {
-        "text": " mama ",
-        "start_s": word["start_s"],
-        "end_s": word["end_s"],
-        "revision": studio.ready()["revision"],
-    }
+        "text": " mama ", "start_s": word["start_s"], "end_s": word["end_s"], "revision": studio.ready()["revision"],
+    }  # fmt: skip
     state = studio.ask("/api/lines/1/transcript", content).content
     assert "mama" in [found["label"] for found in state["words"]]
     assert state["words"][1:] == studio.ready()["words"][1:]
     assert state["steps"][0].startswith("say mama from")
 
 
-def test_numbers_are_those_of_the_motion(studio: OpenStudio) -> None:
+def test_numbers_are_those_of_the_motion(studio):
     state = studio.ready()
     reply = studio.ask("/api/lines/1/motion?start_s=0.5&end_s=1.0")
     names = json.loads(reply.headers["x-lipmotion-names"])
     found = np.frombuffer(reply.body, "<f4").reshape(-1, len(names))
     work = studio.studio.workspace.work(1)
-    assert work is not None
-    assert work.recording is not None
     assert names == [channel["name"] for channel in state["channels"]]
     assert found == pytest.approx(work.recording.generation.motion.values[50:101], abs=1e-6)
     assert reply.headers["x-lipmotion-first"] == "50"
@@ -157,16 +140,12 @@ def test_numbers_are_those_of_the_motion(studio: OpenStudio) -> None:
     assert studio.ask("/api/lines/1/motion?start_s=99").status == 422
 
 
-def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(
-    studio: OpenStudio, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(studio, monkeypatch):
     assert studio.ready()["settled"]
     monkeypatch.setattr(recording_module, "LONG_S", 0.0)
     state = studio.edit("phone 3 is p").content
     assert not state["settled"]
     work = studio.studio.workspace.work(1)
-    assert work is not None
-    assert work.recording is not None
     assert studio.ask("/api/lines/1/settle", {"revision": state["revision"] + 1}).status == 409
     state = studio.ask("/api/lines/1/settle", {"revision": state["revision"]}).content
     assert state["settled"]
@@ -175,7 +154,7 @@ def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(
     assert found == pytest.approx(whole, abs=1e-6)
 
 
-def test_curves_that_are_asked_for_come_alone(studio: OpenStudio) -> None:
+def test_curves_that_are_asked_for_come_alone(studio):
     state, (all_of_it, some) = (
         studio.ready(),
         (studio.ask(f"/api/lines/1/motion{q}") for q in ("", "?names=width,opening")),
@@ -189,12 +168,12 @@ def test_curves_that_are_asked_for_come_alone(studio: OpenStudio) -> None:
     assert (refused.status, "'jump'" in refused.content["error"]) == (422, True)
 
 
-def test_the_sound_is_played(studio: OpenStudio) -> None:
+def test_the_sound_is_played(studio):
     part = studio.ask(studio.ready()["media"]["sound"], range="bytes=0-3")
     assert (part.status, part.body) == (206, b"RIFF")
 
 
-def test_why_and_doubts(studio: OpenStudio) -> None:
+def test_why_and_doubts(studio):
     doubts = studio.ask("/api/lines/1/doubts").content
     assert [row["confidence"] for row in doubts] == sorted(row["confidence"] for row in doubts)
     why = studio.ask(f"/api/lines/1/why?time={doubts[0]['time_s']}").content
@@ -204,7 +183,7 @@ def test_why_and_doubts(studio: OpenStudio) -> None:
     assert studio.ask("/api/lines/1/why?time=1000").status == 422
 
 
-def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
+def test_a_line_is_marked_exported_and_then_changed(studio):
     assert studio.change("mark", mark="approved").content["mark"] == "approved"
     assert studio.change("mark", mark="perhaps").status == 422
     assert studio.row()["marked"] == studio.row()["edits_digest"]
@@ -218,17 +197,14 @@ def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
     studio.edit("phone 3 is m")
     assert studio.row()["exported"] == "changed"
     wrongs: tuple[dict[str, object], ...] = (
-        {"files": ["/../x.csv"]},
-        {"files": []},
-        {"preset": "x"},
-        {"preset": "arkit", "only": "some"},
-    )
+        {"files": ["/../x.csv"]}, {"files": []}, {"preset": "x"}, {"preset": "arkit", "only": "some"},
+    )  # fmt: skip
     for wrong in wrongs:
         assert studio.ask("/api/export", wrong).status == 422
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
-def test_exports_do_not_follow_links(studio: OpenStudio, tmp_path: Path) -> None:
+def test_exports_do_not_follow_links(studio, tmp_path):
     (tmp_path / "precious.csv").write_text("precious")
     exports = studio.folder.path / "exports"
     exports.mkdir(exist_ok=True)
@@ -247,7 +223,7 @@ def test_exports_do_not_follow_links(studio: OpenStudio, tmp_path: Path) -> None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of files as POSIX has them")
-def test_a_recording_that_the_disk_cannot_take_is_refused(studio: OpenStudio) -> None:
+def test_a_recording_that_the_disk_cannot_take_is_refused(studio):
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -261,7 +237,7 @@ def test_a_recording_that_the_disk_cannot_take_is_refused(studio: OpenStudio) ->
     assert not [path for path in studio.folder.path.iterdir() if path.name.startswith(".part-") and path.name != LOCK]
 
 
-def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
+def test_pronunciations_are_offered_and_kept(studio):
     tear = studio.ask("/api/lexicon?word=Tear").content
     assert ["t", "eh", "r"] in tear["pronunciations"]
     seen = studio.ask("/api/lexicon?word=zenodo").content["revision"]
@@ -281,7 +257,7 @@ def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
         assert studio.ask("/api/lexicon", wrong | {"revision": 0}).status == 422
 
 
-def test_lists_and_forms_follow_from_the_registries(studio: OpenStudio) -> None:
+def test_lists_and_forms_follow_from_the_registries(studio):
     found = studio.ask("/api/project?from=0&count=5&order=doubt").content
     assert [row["name"] for row in found["lines"]] == ["line"]
     assert found["lines"][0]["duration_s"] == pytest.approx(studio.ready()["duration_s"])
@@ -292,7 +268,7 @@ def test_lists_and_forms_follow_from_the_registries(studio: OpenStudio) -> None:
     assert studio.ask("/api/progress").content["waiting"] == 0
 
 
-def test_only_the_page_itself_with_the_token_gets_an_answer(studio: OpenStudio) -> None:
+def test_only_the_page_itself_with_the_token_gets_an_answer(studio):
     assert studio.ask("/api/project", **{TOKEN_HEADER: "other"}).status == 401
     assert studio.ask("/api/project", host="example.org").status == 403
     assert studio.ask("/api/project", origin="http://example.org").status == 403
@@ -314,7 +290,7 @@ def test_only_the_page_itself_with_the_token_gets_an_answer(studio: OpenStudio) 
     assert studio.ask("/api/faces/portrait.glb").status == 404
 
 
-def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None:
+def test_what_is_dropped_is_read_by_the_same_readers(studio):
     for name in ("../../speech.txt", "speech", ""):
         assert studio.ask(f"/api/lines?name={name}", b"RIFF").status == 422
     reply = studio.ask("/api/lines?name=../no%20sound.wav", b"no sound", x_lipmotion_transcript="mama%20papa")
@@ -327,14 +303,12 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None
     assert studio.ask("/api/project").content["count"] == 1
 
 
-def test_a_model_is_called_as_its_file(toy_model: Model, tmp_path: Path) -> None:
+def test_a_model_is_called_as_its_file(toy_model, tmp_path):
     save_model(replace(toy_model, about={**toy_model.about, "name": "trajectory"}), tmp_path / "Sam.lipmotion")
     assert known_model(tmp_path / "Sam.lipmotion").name == "Sam"
 
 
-def test_a_project_outlives_its_model(
-    tmp_path: Path, toy_model: Model, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_project_outlives_its_model(tmp_path, toy_model, monkeypatch, caplog):
     asked: list[Path | None] = []
 
     def loaded(path: Path | None) -> Model:
@@ -349,9 +323,7 @@ def test_a_project_outlives_its_model(
     assert "the model of the project is not there" in caplog.text
 
 
-def test_what_the_list_says_of_a_line_outlives_a_kill(
-    tmp_path: Path, toy_speech: Path, toy_sentence: ToySentence, toy_model: Model
-) -> None:
+def test_what_the_list_says_of_a_line_outlives_a_kill(tmp_path, toy_speech, toy_sentence, toy_model):
     for _ in range(2):
         with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, tmp_path) as studio:
             duration_s = studio.ready()["duration_s"]
@@ -362,9 +334,7 @@ def test_what_the_list_says_of_a_line_outlives_a_kill(
 
 
 @pytest.mark.long
-def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(
-    studio: OpenStudio, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(studio, toy_speech, monkeypatch):
     monkeypatch.setattr("lipmotion_studio.workspace.MAX_OPEN", 1)
     edited = studio.edit("phone 3 is p").content
     reply = studio.ask("/api/lines?name=other.wav", toy_speech.read_bytes())
@@ -383,7 +353,7 @@ def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(
 
 
 @pytest.mark.long
-def test_the_weights_of_the_page_are_those_of_the_file(studio: OpenStudio) -> None:
+def test_the_weights_of_the_page_are_those_of_the_file(studio):
     studio.edit("phone 3 is p", "pin jawOpen 0.7 at 1.0")
     reply = studio.ask("/api/lines/1/weights?face=head")
     names = json.loads(reply.headers["x-lipmotion-names"])
@@ -403,13 +373,8 @@ def test_the_weights_of_the_page_are_those_of_the_file(studio: OpenStudio) -> No
 
 @pytest.mark.long
 def test_a_filmed_face_the_real_video_and_another_model(
-    tmp_path: Path,
-    toy_speech: Path,
-    toy_sentence: ToySentence,
-    toy_model: Model,
-    coupled_model: Model,
-    filmed_face_file: Path,
-) -> None:
+    tmp_path, toy_speech, toy_sentence, toy_model, coupled_model, filmed_face_file
+):
     sound = tmp_path / "line.wav"
     shutil.copy(toy_speech, sound)
     sound.with_suffix(".txt").write_text(" ".join(toy_sentence.words), encoding="utf-8")
@@ -476,7 +441,7 @@ def _compared(studio: OpenStudio) -> None:
     _voted(studio)
 
 
-def test_versions_are_kept_shown_and_gone_back_to(studio: OpenStudio) -> None:
+def test_versions_are_kept_shown_and_gone_back_to(studio):
     """What was there when one goes back is kept, too."""
     assert studio.edit("pin opening 0.3 at 0.5").status == 200
     first = studio.ready()

@@ -1,7 +1,3 @@
-"""Folders of projects: what is added, dropped and changed is there again; one process at a time."""
-
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -15,6 +11,7 @@ from lipmotion.storage.files import portable_name
 from lipmotion.testing.toy import ToySentence
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, project_path
 from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, project_document
+from lipmotion_studio.votes import Side, Vote, read_votes, tally, votes_text
 
 LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}
 RECORD = ExportRecord("arkit", {"exports/a.livelink.csv": "1"}, "exports/a.edits.json", "2", "3", "0.1.0")
@@ -29,7 +26,7 @@ def lines(tmp_path: Path, toy_sentence: ToySentence) -> Path:
     return folder
 
 
-def test_a_project_is_there_again(lines: Path) -> None:
+def test_a_project_is_there_again(lines):
     with open_folder(lines) as folder:
         assert [line.name for line in folder.project.lines.values()] == ["a", "b", "inner/a"]
         for content in ("sound", "other"):
@@ -55,26 +52,26 @@ def test_a_project_is_there_again(lines: Path) -> None:
     assert document["lines"][0]["sound"] == "../lines/a.wav"
 
 
-def test_a_second_one_is_told(lines: Path) -> None:
+def test_a_second_one_is_told(lines):
     with open_folder(lines), pytest.raises(ExportError, match="another lipmotion"), open_folder(lines):
         pass
 
 
-def test_the_folder_of_a_project(tmp_path: Path, lines: Path) -> None:
+def test_the_folder_of_a_project(tmp_path, lines):
     assert project_path(lines / "a.wav") == lines / "a.studio"
     assert project_path(lines, tmp_path / "x") == tmp_path / "x"
     with pytest.raises(InputError, match="no such file"):
         project_path(tmp_path / "nothing")
 
 
-def test_a_project_that_is_not_there_is_an_empty_one(tmp_path: Path) -> None:
+def test_a_project_that_is_not_there_is_an_empty_one(tmp_path):
     for _ in range(2):
         with open_folder(tmp_path / "hero.studio") as folder:
             assert (folder.path, folder.project) == (tmp_path / "hero.studio", Project())
     assert (tmp_path / "hero.studio" / PROJECT).is_file()
 
 
-def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_written_is_not_kept(lines, monkeypatch):
     with open_folder(lines) as folder:
         before = folder.project
 
@@ -88,7 +85,7 @@ def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.Mon
         monkeypatch.undo()
 
 
-def test_a_project_is_what_its_document_says() -> None:
+def test_a_project_is_what_its_document_says():
     project = Project(
         {1: ProjectRecording(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
     )
@@ -98,22 +95,13 @@ def test_a_project_is_what_its_document_says() -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"format": "other"},
-        {"version": 2},
-        {"lines": [LINE, LINE]},
-        {"lines": [LINE, LINE | {"number": 2}]},
-        {"lines": [LINE | {"name": "../a"}]},
-        {"lines": [LINE | {"mark": "perhaps"}]},
-        {"lines": [LINE | {"number": "1"}]},
-        {"lines": [LINE | {"sound": 3}]},
-        {"lines": [LINE | {"unknown": 3}]},
-        {"lines": 3},
-        {"model": 3},
-        {"characters": []},
-        {"more": 1},
+        {"format": "other"}, {"version": 2}, {"lines": [LINE, LINE]}, {"lines": [LINE, LINE | {"number": 2}]},
+        {"lines": [LINE | {"name": "../a"}]}, {"lines": [LINE | {"mark": "perhaps"}]},
+        {"lines": [LINE | {"number": "1"}]}, {"lines": [LINE | {"sound": 3}]}, {"lines": [LINE | {"unknown": 3}]},
+        {"lines": 3}, {"model": 3}, {"characters": []}, {"more": 1},
     ],
-)
-def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -> None:
+)  # fmt: skip
+def test_documents_that_are_refused(tmp_path, change):
     document = project_document(Project()) | {"lines": [LINE]}
     assert list(parse_project(document).lines) == [1]
     (tmp_path / PROJECT).write_text(json.dumps(document | change), encoding="utf-8")
@@ -122,7 +110,7 @@ def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -
 
 
 @pytest.mark.parametrize("name", ["CON.wav", "nul .wav", "Aux..wav", "com1.take.wav"])
-def test_what_is_called_as_a_device_gets_another_name(lines: Path, tmp_path: Path, name: str) -> None:
+def test_what_is_called_as_a_device_gets_another_name(lines, tmp_path, name):
     sound = (lines / "a.wav").rename(tmp_path / name)
     assert portable_name(project_path(sound).name) == project_path(sound).name
     with open_folder(sound, tmp_path / "own") as folder:
@@ -134,8 +122,62 @@ def test_what_is_called_as_a_device_gets_another_name(lines: Path, tmp_path: Pat
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
-def test_the_usual_folder_of_a_project_is_no_link(lines: Path, tmp_path: Path) -> None:
+def test_the_usual_folder_of_a_project_is_no_link(lines, tmp_path):
     (lines / "a.studio").symlink_to(tmp_path)
     with pytest.raises(InputError, match="is a link"):
         project_path(lines / "a.wav")
     assert project_path(lines / "a.wav", lines / "a.studio") == lines / "a.studio"
+
+
+A, B, C = (Side(name, digest * 64, "e" * 64) for name, digest in (("voice", "a"), ("voice", "b"), ("other", "c")))
+KEPT = Side("voice", "a" * 64, "f" * 64)
+OLD = [
+    {"line": "one", "shown": ["now", "the model b"], "better": "now", "edits": "e" * 64},
+    {"line": "two", "shown": ["the model b", "now"], "better": "", "edits": "f" * 64},
+]
+
+
+def test_models_of_one_name_have_tallies_of_their_own():
+    votes = [Vote("one", (A, C), 0), Vote("two", (C, A), 0), Vote("one", (B, C), 1), Vote("one", (A, C))]
+    assert tally(votes, Vote("three", (A, C))) == {"better": [1, 1], "neither": 1}
+    assert tally(votes, Vote("three", (C, B))) == {"better": [1, 0], "neither": 0}
+
+
+def test_edits_count_where_they_differ_and_names_do_not():
+    renamed = Side("renamed", A.model, "d" * 64)
+    votes = [Vote("one", (A, C), 0), Vote("one", (A, KEPT), 1)]
+    assert tally(votes, Vote("two", (renamed, Side("other", C.model, "d" * 64)))) == {"better": [1, 0], "neither": 0}
+    assert tally(votes, Vote("two", (KEPT, A))) == {"better": [1, 0], "neither": 0}
+
+
+def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_path):
+    path = tmp_path / "votes.json"
+    assert read_votes(path) == ()
+    path.write_text(json.dumps(OLD), encoding="utf-8")
+    old = read_votes(path)
+    assert [[side.name for side in vote.shown] for vote in old] == [vote["shown"] for vote in OLD]
+    assert [vote.better for vote in old] == [0, None]
+    assert tally(old, old[0]) == {"better": [1, 0], "neither": 1}
+    votes = (*old, Vote("one", (A, KEPT), 1))
+    path.write_text(votes_text(votes), encoding="utf-8")
+    assert read_votes(path) == votes
+
+
+@pytest.mark.parametrize(
+    "content", ["[1]", '["x"]', "{", '[{"line": "one", "shown": ["a", "b"], "better": "c", "edits": ""}]']
+)
+def test_other_files_are_refused(content, tmp_path):
+    path = tmp_path / "votes.json"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=r"votes\.json"):
+        read_votes(path)
+
+
+def test_a_vote_is_between_two_motions_that_differ():
+    for shown in ((A,), (A, A), (A, Side("renamed", A.model, A.edits))):
+        with pytest.raises(InputError, match="differ"):
+            Vote("one", shown)
+    with pytest.raises(InputError, match="better"):
+        Vote("one", (A, B), 2)
+    with pytest.raises(InputError, match="digests"):
+        Side("voice", "A", "")

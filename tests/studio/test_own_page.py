@@ -1,15 +1,12 @@
 """A voice of one's own in a real browser: trained on toy recordings, its report read, the voice used and taken back."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from children import wait_until
-from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
+from study.browser import BROWSER, DRIVER, MISSING, browser, check_screens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
@@ -17,13 +14,10 @@ from lipmotion_studio.folder import open_folder
 from studio.test_page import LIMIT_S, SCREENS, WEBGL, WELCOME, Page, served
 from studio.toy_recordings import SENTENCES, write_recordings
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING),
-]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
 
 
-def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:
+def test_a_voice_is_trained_and_used_from_the_page(tmp_path):
     project = tmp_path / "project"
     recordings = os.path.relpath(write_recordings(tmp_path / "recordings"), project)
     (tmp_path / "home").mkdir()
@@ -53,10 +47,7 @@ def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:
         wait_until(lambda: "uses this voice" in window.text("#own-job"), LIMIT_S)
         wait_until(lambda: page.of(motion) not in (None, before), LIMIT_S)
         page.ready()
-        for width, height, scheme in SCREENS:
-            window.show_as(width, height, scheme, mobile=width < 600)
-            check_screen(window, "own", width, scheme)
-        window.show_as(1200, 900)
+        check_screens(window, "own", SCREENS)
         window.run("const used = document.getElementById('own-choice'); used.value = ''; used.onchange()")
         wait_until(lambda: "Use this voice" in window.text("#own-job"), LIMIT_S)
         wait_until(lambda: page.of(motion) == before, LIMIT_S)

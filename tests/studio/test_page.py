@@ -1,7 +1,5 @@
 """The studio's page in a real browser: each edit reaches the project, sound and face are in step, all can use it."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Callable, Iterator
@@ -20,8 +18,22 @@ from lipmotion.pipeline.model import shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
 from lipmotion_faces.video.mp4 import write_mp4
-from studio.late_sound import shifted
-from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
+from studio.test_recorded_videos import shifted
+from study.browser import (
+    CONTROL,
+    DELETE,
+    ENTER,
+    ESCAPE,
+    RIGHT,
+    SHIFT,
+    SPACE,
+    TAB,
+    UP,
+    WINDOW_S,
+    Browser,
+    check_screen,
+    check_screens,
+)
 from study.firefox import BOTH, Opens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
@@ -87,20 +99,16 @@ class Page:
     project: Path
 
     def of(self, expression: str) -> Any:
-        """Return what an expression of the page gives."""
         return self.window.run(f"return {expression}")
 
     def ready(self) -> None:
-        """Wait until the line is shown, and every edit is on the disk."""
         wait_until(lambda: self.window.run(READY), LIMIT_S)
 
     @property
     def steps(self) -> list[str]:
-        """The edits, as the page shows them."""
         return list(self.of("studio.store.recording.steps"))
 
     def reload(self) -> None:
-        """Load the page anew, and wait until its line is shown."""
         self.window.run("document.documentElement.dataset.old = 'yes'; location.reload()")
         wait_until(lambda: self.of("document.documentElement?.dataset.old === undefined"), LIMIT_S)
         self.ready()
@@ -170,7 +178,7 @@ def page(opened: Page) -> Page:
     return opened
 
 
-def test_each_edit_by_pointer_and_keys(page: Page) -> None:
+def test_each_edit_by_pointer_and_keys(page):
     window = page.window
 
     def type_over(text: str) -> None:
@@ -217,7 +225,7 @@ def test_each_edit_by_pointer_and_keys(page: Page) -> None:
     assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []
 
 
-def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows(page: Page) -> None:
+def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows(page):
     marked = "[...document.querySelectorAll('.phones .edited')].map((phone) => [phone.dataset.index, phone.title])"
     assert page.of(marked) == []
     page.choose(9)
@@ -232,7 +240,7 @@ def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows
     wait_until(lambda: "the stronger" in page.window.text("#message"), LIMIT_S)
 
 
-def test_sound_and_face_are_in_step(page: Page) -> None:
+def test_sound_and_face_are_in_step(page):
     wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
     page.window.press(ESCAPE, ESCAPE)
     page.window.run(
@@ -259,7 +267,7 @@ def test_sound_and_face_are_in_step(page: Page) -> None:
         assert page.of("[studio.store.speed, studio.store.playing]") == [speed, False]
 
 
-def test_what_was_refused_is_told_until_something_succeeds(page: Page) -> None:
+def test_what_was_refused_is_told_until_something_succeeds(page):
     page.window.run("studio.store.set({ selected: null })")
     page.window.press("s")
     wait_until(lambda: "phone first" in page.window.text("#message"), LIMIT_S)
@@ -270,7 +278,7 @@ def test_what_was_refused_is_told_until_something_succeeds(page: Page) -> None:
     wait_until(lambda: page.of("studio.store.recordings[0].mark") == "none", LIMIT_S)
 
 
-def test_an_edit_waits_for_a_border_that_is_on_its_way(page: Page) -> None:
+def test_an_edit_waits_for_a_border_that_is_on_its_way(page):
     """It neither takes the place of the border's last place nor is lost; and the face stays known everywhere."""
     wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
     before, ends_s = page.steps, page.of("studio.store.recording.phones[4].end_s")
@@ -293,7 +301,7 @@ def test_an_edit_waits_for_a_border_that_is_on_its_way(page: Page) -> None:
 
 
 @pytest.mark.parametrize("opens", BOTH)
-def test_a_dropped_line_is_read_corrected_and_exported(opens: Opens, tmp_path: Path) -> None:
+def test_a_dropped_line_is_read_corrected_and_exported(opens, tmp_path):
     said = WELCOME.with_suffix(".txt").read_text(encoding="utf-8")
     with shown(opens, tmp_path) as page:
         window = page.window
@@ -320,7 +328,7 @@ def test_a_dropped_line_is_read_corrected_and_exported(opens: Opens, tmp_path: P
         wait_until(lambda: page.of("studio.store.recordings.at(-1).exported") == "yes", LIMIT_S)
 
 
-def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> None:
+def test_the_weights_of_the_page_are_those_of_the_exported_file(page):
     page.window.run("window.touching = setInterval(() => dispatchEvent(new PointerEvent('pointermove')), 100)")
     page.choose(9)
     page.edit(lambda: page.window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
@@ -344,7 +352,7 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> N
         assert values[:, names.index(name)] == pytest.approx(read[name], abs=1e-5), name
 
 
-def test_versions_are_kept_compared_and_gone_back_to(page: Page) -> None:
+def test_versions_are_kept_compared_and_gone_back_to(page):
     window = page.window
     page.choose(9)
     page.edit(lambda: window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
@@ -364,12 +372,7 @@ def test_versions_are_kept_compared_and_gone_back_to(page: Page) -> None:
     window.run("studio.player.seek(1.2)")
     window.click("#compare-over")
     wait_until(lambda: page.of(GHOST_PIXELS) > 1000, LIMIT_S)
-    for width, height, scheme in SCREENS:
-        window.show_as(width, height, scheme, mobile=width < 600)
-        window.run("studio.showPlace('panel')")
-        window.run_until_done("setTimeout(arguments[0], 100)")
-        check_screen(window, "versions", width, scheme)
-    window.show_as(1200, 900)
+    check_screens(window, "versions", SCREENS, "studio.showPlace('panel')")
     window.click("#version-1-back")
     page.wait_for_steps(1)
     assert page.steps == ["phone 9 is aa"]
@@ -378,7 +381,7 @@ def test_versions_are_kept_compared_and_gone_back_to(page: Page) -> None:
     wait_until(lambda: page.of("studio.store.recording.versions.length") == 1, LIMIT_S)
 
 
-def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
+def test_only_curves_that_are_shown_are_asked_for(page):
     page.window.run("performance.clearResourceTimings()")
     first = page.of(NOT_SHOWN)
     page.window.run("studio.showCurves([...studio.store.channels, arguments[0]])", first)
@@ -399,7 +402,7 @@ def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
     wait_until(lambda: page.of("studio.store.motion.names.length") == 3, LIMIT_S)
 
 
-def test_a_line_that_is_opened_while_the_timeline_is_hidden_is_shown_later(page: Page) -> None:
+def test_a_line_that_is_opened_while_the_timeline_is_hidden_is_shown_later(page):
     page.window.run("document.getElementById('timeline').style.display = 'none'")
     wait_until(lambda: page.of("studio.timeline.width") == 0, LIMIT_S)
     page.window.run("const id = studio.store.recordingId; studio.store.set({ recordingId: '' }); studio.open(id)")
@@ -410,7 +413,7 @@ def test_a_line_that_is_opened_while_the_timeline_is_hidden_is_shown_later(page:
     assert page.of("studio.timeline.least_px_s <= studio.timeline.px_s && studio.timeline.px_s < 1000")
 
 
-def test_what_another_window_did_is_shown(page: Page) -> None:
+def test_what_another_window_did_is_shown(page):
     """What was not made can be made then; words that were typed stay in their field; a mark is refused, too."""
     before = page.steps
 
@@ -444,7 +447,7 @@ def test_what_another_window_did_is_shown(page: Page) -> None:
     assert (page.steps, page.of("studio.store.recordings[0].mark")) == (before, "redo")
 
 
-def test_damaged_edits_are_restored(page: Page) -> None:
+def test_damaged_edits_are_restored(page):
     page.edit(lambda: page.window.click("#mood-set"), r"mood \S+ at \S+")
     steps, (file,) = page.steps, page.project.glob("edits/*.edits.json")
     file.write_text("{", encoding="utf-8")
@@ -457,7 +460,7 @@ def test_damaged_edits_are_restored(page: Page) -> None:
     assert [each.read_text(encoding="utf-8") for each in page.project.glob("edits/*.damaged-*")] == ["{"]
 
 
-def test_ten_thousand_lines_scroll(page: Page) -> None:
+def test_ten_thousand_lines_scroll(page):
     page.window.run(
         """const [line] = studio.store.recordings;
         const made = (_, n) => ({ ...line, id: n + 1, name: `line ${n}`, doubt: (n * 7919 % 997) / 997 });
@@ -472,7 +475,7 @@ def test_ten_thousand_lines_scroll(page: Page) -> None:
     assert shown == sorted(shown, reverse=True)
 
 
-def test_every_screen(page: Page) -> None:
+def test_every_screen(page):
     window = page.window
     states: tuple[tuple[str, str], ...] = (
         ("phone", "studio.choose('phone', 8); studio.showPlace('panel')"),
@@ -498,27 +501,7 @@ def test_every_screen(page: Page) -> None:
 
 
 @pytest.mark.parametrize("opens", BOTH)
-def test_a_killed_studio_has_every_edit(opens: Opens, tmp_path: Path) -> None:
-    (tmp_path / "home").mkdir()
-    with opens(tmp_path / "home", *WEBGL) as window:
-        page = Page(window, tmp_path / "project")
-        with served(tmp_path / "project", WELCOME) as address:
-            window.open(address)
-            page.ready()
-            page.choose(3)
-            page.edit(lambda: window.press("s"), r"split phone 3 at \S+")
-            steps = page.steps
-        window.open("about:blank")
-        with served(tmp_path / "project") as address:
-            window.open(address)
-            page.ready()
-            assert page.steps == steps
-            window.press_together(CONTROL, "z")
-            wait_until(lambda: page.steps == [], LIMIT_S)
-
-
-@pytest.mark.parametrize("opens", BOTH)
-def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, filmed_face_file: Path) -> None:
+def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file):
     (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))

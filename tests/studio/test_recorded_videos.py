@@ -1,9 +1,6 @@
-"""Real videos beside faces: when in them the sound of a line begins, and which are played as they are."""
-
-from __future__ import annotations
-
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 
@@ -12,7 +9,6 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
-from studio.late_sound import shifted
 
 LATE_S = 0.3
 
@@ -25,11 +21,11 @@ def video(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -
     return path
 
 
-def test_sound_that_begins_with_the_video_is_in_step(video: Path, toy_speech: Path) -> None:
+def test_sound_that_begins_with_the_video_is_in_step(video, toy_speech):
     assert sound_begins_s(video, video) == sound_begins_s(video, toy_speech) == 0
 
 
-def test_a_later_sound_is_found_in_the_video(video: Path, toy_speech: Path, tmp_path: Path) -> None:
+def test_a_later_sound_is_found_in_the_video(video, toy_speech, tmp_path):
     late = shifted(video, tmp_path / "late.mp4", sound_s=LATE_S)
     assert sound_begins_s(late, late) == 0  # the readers have silence before it
     assert sound_begins_s(late, toy_speech) == pytest.approx(LATE_S, abs=0.03)  # and the silence of the encoder
@@ -38,10 +34,23 @@ def test_a_later_sound_is_found_in_the_video(video: Path, toy_speech: Path, tmp_
     assert sound_begins_s(late, with_silence) == 0
 
 
-def test_what_begins_later_than_0_is_written_anew(video: Path, tmp_path: Path) -> None:
+def test_what_begins_later_than_0_is_written_anew(video, tmp_path):
     assert media_type(video) == MP4
     later = shifted(video, tmp_path / "later.mp4", all_s=1.0)
     assert find_real_video(later) == later
     assert media_type(later) is None
     write_playable(later, later, tmp_path / "playable.mp4")
     assert media_type(tmp_path / "playable.mp4") == MP4
+
+
+def shifted(video: Path, path: Path, *, sound_s: float = 0.0, all_s: float = 0.0) -> Path:
+    """Write a video with its sound so much later, or all of it [s]; return where."""
+    with av.open(str(video)) as source, av.open(str(path), "w") as target:
+        streams = {stream.index: target.add_stream_from_template(stream) for stream in source.streams}
+        for packet in source.demux():
+            if packet.dts is None:
+                continue
+            late = round((all_s + (sound_s if packet.stream.type == "audio" else 0.0)) / packet.time_base)
+            packet.pts, packet.dts, packet.stream = packet.pts + late, packet.dts + late, streams[packet.stream.index]
+            target.mux(packet)
+    return path

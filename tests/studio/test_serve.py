@@ -1,7 +1,5 @@
 """``lipmotion studio`` as a process: kills while it is edited, hostile requests, edits undone to the first bytes."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from random import Random
@@ -15,6 +13,7 @@ pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
 from studio.attack import attacked
 from studio.served import edits_of_all_kinds, lost_edits, served, undone_edits
+from study.small_study import small_study
 
 
 @pytest.fixture
@@ -24,7 +23,7 @@ def line(toy_speech: Path, tmp_path: Path) -> Path:
 
 
 @pytest.mark.long
-def test_kills_in_the_middle_lose_at_most_the_last_edit(line: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_kills_in_the_middle_lose_at_most_the_last_edit(line, toy_model_file, tmp_path):
     errors = tmp_path / "errors.txt"
     found = lost_edits(line, toy_model_file, errors, kills=3, each_s=1.5)
     assert (found["kills"], found["lost"]) == (3, 0)
@@ -33,7 +32,7 @@ def test_kills_in_the_middle_lose_at_most_the_last_edit(line: Path, toy_model_fi
 
 
 @pytest.mark.long
-def test_hostile_requests_get_no_file_and_leave_no_traceback(line: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_hostile_requests_get_no_file_and_leave_no_traceback(line, toy_model_file, tmp_path):
     errors = tmp_path / "errors.txt"
     with served(line, errors, toy_model_file) as server:
         server.ready()
@@ -46,25 +45,28 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(line: Path, toy_mod
 
 
 @pytest.mark.long
-def test_edits_taken_back_over_http_give_the_first_bytes(line: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_edits_taken_back_over_http_give_the_first_bytes(line, toy_model_file, tmp_path):
     errors = tmp_path / "errors.txt"
     found = undone_edits(line, toy_model_file, errors, 40)
     assert (found["edits"], found["kinds"] > 8) == (40, True)
     assert "Traceback" not in errors.read_text(encoding="utf-8")
 
 
-def test_random_edits_are_of_all_kinds() -> None:
+def test_random_edits_are_of_all_kinds():
     phones = [{"start_s": n / 5, "end_s": (n + 1) / 5} for n in range(9)]
     state = {"phones": phones, "words": [{}], "steps": ["lock from 0.2 to 0.4"]}
     assert {parse_step(edit).form for edit in edits_of_all_kinds(Random(1), state)} == {*STEPS}
 
 
 @pytest.mark.long
-def test_without_the_extra_the_error_says_what_to_install(line: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", [("studio",), ("study", "serve")])
+def test_without_the_extra_the_error_says_what_to_install(line, tmp_path, command):
+    small_study(tmp_path / "study")
     (tmp_path / "without").mkdir()
     (tmp_path / "without" / "uvicorn.py").write_text("raise ImportError('no uvicorn here')", encoding="utf-8")
     variables = environment()
     variables["PYTHONPATH"] = f"{tmp_path / 'without'}:{variables.get('PYTHONPATH', '')}"
-    done = run_child([*LIPMOTION, "studio", line], variables=variables)
+    given = line if command == ("studio",) else tmp_path / "study"
+    done = run_child([*LIPMOTION, *command, given], variables=variables)
     assert done.returncode == 8
-    assert "[studio]" in done.stderr
+    assert f"[{command[0]}]" in done.stderr

@@ -1,7 +1,3 @@
-"""Voices that are trained from the page: of toy recordings, in a process of its own, measured, used and taken back."""
-
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -46,13 +42,12 @@ def job(studio: OpenStudio) -> dict[str, Any]:
 
 
 def ended(studio: OpenStudio) -> dict[str, Any]:
-    """Return how what is made has ended, once it has."""
     wait_until(lambda: job(studio)["state"] != "working" and studio.studio.trainer._thread is None)
     return job(studio)
 
 
 @pytest.mark.long
-def test_a_voice_is_trained_measured_used_and_taken_back(studio: OpenStudio) -> None:
+def test_a_voice_is_trained_measured_used_and_taken_back(studio):
     state = studio.ready()
     studio.edit("phone 3 is p")
     studio.ask("/api/lines/1/export", {"files": [".csv"]})
@@ -93,7 +88,7 @@ def test_a_voice_is_trained_measured_used_and_taken_back(studio: OpenStudio) -> 
 
 
 @pytest.mark.long
-def test_what_is_stopped_or_killed_goes_on(studio: OpenStudio) -> None:
+def test_what_is_stopped_or_killed_goes_on(studio):
     assert studio.ask("/api/training/again", {}).status == 422
     studio.ask("/api/training", {"kind": "voice", "name": "me", "options": OPTIONS})
     wait_until(lambda: job(studio)["share"] > 0)
@@ -101,7 +96,6 @@ def test_what_is_stopped_or_killed_goes_on(studio: OpenStudio) -> None:
     assert studio.ask("/api/training/again", {}).content["job"]["state"] == "working"
     wait_until(lambda: job(studio)["share"] > 0.6)  # the recordings are prepared
     process = studio.studio.trainer._process
-    assert process is not None
     assert process.pid is not None
     os.kill(process.pid, signal.SIGKILL)
     told = ended(studio)
@@ -140,7 +134,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_what_cannot_be_made_is_refused(studio: OpenStudio) -> None:
+def test_what_cannot_be_made_is_refused(studio):
     for content, said in REFUSED:
         reply = studio.ask("/api/training", content)
         assert (reply.status, said in reply.content["error"]) == (422, True), reply.content
@@ -152,7 +146,7 @@ def test_what_cannot_be_made_is_refused(studio: OpenStudio) -> None:
     assert not (studio.folder.path / TRAINING).exists()
 
 
-def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> None:
+def test_videos_of_the_project_are_gathered_with_their_words(tmp_path):
     """What the readers refuse is told as a sentence, and nothing is left of what was gathered."""
     from lipmotion_studio.training import TrainingRecording, gather_recordings
 
@@ -167,12 +161,9 @@ def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> 
     with gather_recordings(order) as place:
         found = {path.name: path.read_text(encoding="utf-8") for path in place.iterdir()}
     assert found == {
-        "a-take.mp4": "take.mp4",
-        "a-take.srt": "take.srt",
-        "a-take-2.mp4": "take.mp4",
-        "a-take-2.txt": "so typed",
+        "a-take.mp4": "take.mp4", "a-take.srt": "take.srt", "a-take-2.mp4": "take.mp4", "a-take-2.txt": "so typed",
         "other.mp4": "other.mp4",
-    }
+    }  # fmt: skip
     told: list[Any] = []
     run_training(order, told.append)
     assert list(told[-1]) == ["error"]
@@ -180,7 +171,7 @@ def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> 
     assert not any(path.is_file() for path in order.work.glob("recordings/**/*"))
 
 
-def test_some_recordings_are_kept_back(toy_corpus: Corpus) -> None:
+def test_some_recordings_are_kept_back(toy_corpus):
     names = toy_corpus.names()
     assert split_names(toy_corpus, names, held_out=False) == (sorted(names), [])
     learned, kept_back = split_names(toy_corpus, names, held_out=True)
@@ -190,7 +181,7 @@ def test_some_recordings_are_kept_back(toy_corpus: Corpus) -> None:
     assert split_names(toy_corpus, without_list[:9], held_out=True) == (without_list[:9], [])
 
 
-def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_left_counts_down_and_reports_are_kept(tmp_path, monkeypatch):
     folder, now_s, (pipe, tells) = ProjectFolder(tmp_path), [0.0], Pipe(duplex=False)
     folder.change(lambda project: replace(project, recordings="."))
     process = SimpleNamespace(join=lambda: None, kill=tells.close)
@@ -232,16 +223,13 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypa
 
 
 DAMAGES = (
-    "",
-    "[]",
-    "{}",
-    '{"format": "lipmotion.training", "version": 2}',
+    "", "[]", "{}", '{"format": "lipmotion.training", "version": 2}',
     '{"format": "lipmotion.training", "version": 1}',
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path: Path, damage: str) -> None:
+def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path, damage):
     file = tmp_path / TRAINING / "state.json"
     wanted = {"kind": "voice", "name": "me", "lines": [], "options": {}}
     told = {"state": "failed", "error": "no memory"}
@@ -265,7 +253,7 @@ def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path: Path, damage: str
         trainer.restore()
 
 
-def test_a_damaged_state_without_a_copy_is_an_error(tmp_path: Path) -> None:
+def test_a_damaged_state_without_a_copy_is_an_error(tmp_path):
     (tmp_path / TRAINING).mkdir()
     (tmp_path / TRAINING / "state.json").write_text("{", encoding="utf-8")
     trainer = Trainer(ProjectFolder(tmp_path))

@@ -1,7 +1,5 @@
 """Lines are what their sounds are, changes name what they saw, damaged edits are an error: two clients of a studio."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Iterator
@@ -29,7 +27,7 @@ def studio(toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_pa
         yield opened
 
 
-def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line(studio: OpenStudio) -> None:
+def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line(studio):
     sound = (studio.folder.path.parent / "line.wav").read_bytes()
     first = studio.ask("/api/lines?name=take.wav", sound, x_lipmotion_transcript="mama").content
     studio.ready(first["id"])
@@ -44,7 +42,7 @@ def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line
     assert studio.folder.sound(studio.folder.recording(second["id"])).read_bytes() == other
 
 
-def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(studio: OpenStudio) -> None:
+def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(studio):
     sound = studio.folder.sound(studio.folder.recording(1))
     assert studio.edit("phone 3 is p").status == 200
     assert studio.change("remove").status == 200
@@ -57,7 +55,7 @@ def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(stu
 
 
 @pytest.mark.parametrize("change", ["edits", "undo", "transcript", "mark", "versions", "remove", "restore"])
-def test_every_change_names_the_revision_that_it_saw(studio: OpenStudio, change: str) -> None:
+def test_every_change_names_the_revision_that_it_saw(studio, change):
     """Also the first one of a line; and the revision outlives a restart."""
     content = {"steps": ["phone 2 is p"], "text": "mama", "mark": "redo"}
     assert studio.ask(f"/api/lines/1/{change}", content).status == 422
@@ -69,7 +67,7 @@ def test_every_change_names_the_revision_that_it_saw(studio: OpenStudio, change:
     assert (state["steps"], state["mark"], state["versions"]) == (["phone 3 is p"], "none", [])
 
 
-def test_the_voice_and_the_lexicon_name_the_revision_that_they_saw(studio: OpenStudio) -> None:
+def test_the_voice_and_the_lexicon_name_the_revision_that_they_saw(studio):
     tear = {"word": "tear", "phones": ["t", "eh", "r"]}
     for path, content in (("/api/voice", {"voice": ""}), ("/api/lexicon", tear)):
         seen = studio.ask("/api/training" if path == "/api/voice" else f"{path}?word=tear").content["revision"]
@@ -82,7 +80,7 @@ def test_the_voice_and_the_lexicon_name_the_revision_that_they_saw(studio: OpenS
     assert (late.status, len(studio.folder.lexicon().user["tear"])) == (409, 1)
 
 
-def test_two_windows_lose_nothing_of_what_was_acknowledged(studio: OpenStudio) -> None:
+def test_two_windows_lose_nothing_of_what_was_acknowledged(studio):
     """Six changes at once, all of the line as it was: one is made, and is there."""
     seen = studio.ready()["revision"]
     ways: list[tuple[str, Any]] = [("transcript", {"text": "mama"}), ("remove", {}), ("mark", {"mark": "redo"})]
@@ -96,7 +94,7 @@ def test_two_windows_lose_nothing_of_what_was_acknowledged(studio: OpenStudio) -
         assert studio.ready()["steps"] == made[0]["steps"]
 
 
-def test_damaged_edits_are_an_error_with_a_way_back(studio: OpenStudio) -> None:
+def test_damaged_edits_are_an_error_with_a_way_back(studio):
     assert studio.edit("phone 3 is p").status == 200
     seen, file = studio.row(), studio.folder.edits(studio.folder.recording(1))
     damage = file.read_bytes()[:-40]
@@ -118,7 +116,7 @@ def test_damaged_edits_are_an_error_with_a_way_back(studio: OpenStudio) -> None:
     assert studio.change("restore").status == 422
 
 
-def test_edits_that_others_make_of_an_open_line_are_seen(studio: OpenStudio) -> None:
+def test_edits_that_others_make_of_an_open_line_are_seen(studio):
     state, line = studio.ready(), studio.folder.recording(1)
     file = read_edits(studio.folder.edits(line))
     write_edits(file.then("phone 3 is p"), studio.folder.edits(line))
@@ -127,7 +125,7 @@ def test_edits_that_others_make_of_an_open_line_are_seen(studio: OpenStudio) -> 
     assert studio.ready()["steps"] == ["phone 3 is p"]
 
 
-def test_a_sound_that_was_exchanged_is_neither_opened_nor_played_nor_exported(studio: OpenStudio) -> None:
+def test_a_sound_that_was_exchanged_is_neither_opened_nor_played_nor_exported(studio):
     sound = studio.folder.sound(studio.folder.recording(1))
     assert studio.ask("/api/lines/1/sound.wav").status == 200
     sound.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
@@ -138,9 +136,7 @@ def test_a_sound_that_was_exchanged_is_neither_opened_nor_played_nor_exported(st
     assert not (studio.folder.path / "exports" / "line.csv").exists()
 
 
-def test_a_project_of_an_earlier_version_adopts_its_sounds(
-    toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_project_of_an_earlier_version_adopts_its_sounds(toy_speech, toy_sentence, toy_model, tmp_path, caplog):
     """It had no digests: what lies there at the first opening is taken, with a warning; another one is refused then."""
     words = " ".join(toy_sentence.words)
     with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
@@ -160,13 +156,13 @@ def test_a_project_of_an_earlier_version_adopts_its_sounds(
     assert (project.parent / "copies" / file.name).read_bytes() == file.read_bytes()
 
 
-def test_nothing_that_was_acknowledged_is_lost(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_nothing_that_was_acknowledged_is_lost(toy_model, toy_sentence, tmp_path):
     found = walk(toy_model, toy_sentence, tmp_path, 2, 10)
     assert found.steps > 10
 
 
 @pytest.mark.long
-def test_hundreds_of_steps_lose_nothing(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+def test_hundreds_of_steps_lose_nothing(toy_model, toy_sentence, tmp_path):
     found = walk(toy_model, toy_sentence, tmp_path, 6, 60)
     assert found.steps > 300
     assert min(found.acknowledged, found.late, found.refused) > 10

@@ -1,7 +1,5 @@
 """Recordings that a voice can be trained on without tracking: sounds of the toy, with their motion and words."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@ A shadow of the project holds what was acknowledged. A change is made exactly wh
 is; what is refused changes nothing; sounds and edits of lines that were removed stay as they were.
 """
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
@@ -16,13 +14,7 @@ from typing import Any
 
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import (
-    RuleBasedStateMachine,
-    initialize,
-    invariant,
-    rule,
-    run_state_machine_as_test,
-)
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from lipmotion import Model
 from lipmotion.formats.sound import write_sound
@@ -117,7 +109,6 @@ class TwoClients(RuleBasedStateMachine):
         return reply
 
     def ready(self, line: Shadow) -> dict[str, Any]:
-        """Return the state of a line; it is that of its shadow."""
         state = self.studio.ready(line.number)
         assert (state["name"], state["mark"], state["transcript"] or line.words) == (line.name, line.mark, line.words)
         if line.damage:
@@ -392,14 +383,9 @@ def walk(model: Model, sentence: ToySentence, folder: Path, examples: int, steps
     """Let two clients make some steps, the same ones every time; return what they did and how often."""
     first, second = " ".join(sentence.words[:2]), sentence.words[1]
     members = {
-        "model": model,
-        "sounds": sounds_of(sentence, folder),
-        "words": (first, second),
-        "steps": 0,
-        "acknowledged": 0,
-        "late": 0,
-        "refused": 0,
-    }
+        "model": model, "sounds": sounds_of(sentence, folder), "words": (first, second), "steps": 0,
+        "acknowledged": 0, "late": 0, "refused": 0,
+    }  # fmt: skip
     machine = type("Walk", (TwoClients,), members)
     run_state_machine_as_test(
         machine,

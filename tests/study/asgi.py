@@ -1,7 +1,5 @@
 """Requests to an ASGI application in this process, without a server and without a client library."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections.abc import Callable

@@ -1,13 +1,11 @@
 """A real browser without a window: Chromium, driven over the WebDriver protocol (W3C), without a client library."""
 
-from __future__ import annotations
-
 import base64
 import http.client
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
@@ -161,6 +159,17 @@ def check_screen(window: Browser, name: str, width: int, scheme: str) -> None:
         window.run(axe)
         found = window.run_until_done("axe.run().then(arguments[0])")["violations"]
         assert [(each["id"], each["nodes"][0]["html"]) for each in found] == [], (name, width, scheme)
+
+
+def check_screens(window: Browser, name: str, screens: Iterable[tuple[int, int, str]], script: str = "") -> None:
+    """Check a page on screens of some widths, heights and colours; a script runs on each of them first."""
+    for width, height, scheme in screens:
+        window.show_as(width, height, scheme, mobile=width < 600)
+        if script:
+            window.run(script)
+            window.run_until_done("setTimeout(arguments[0], 100)")
+        check_screen(window, name, width, scheme)
+    window.show_as(1200, 900)
 
 
 @cache

@@ -5,8 +5,6 @@ parameters are those of WebDriver, which Firefox itself answers only through a f
 draws no WebGL, so it gets one that nobody sees.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import re
@@ -35,19 +33,13 @@ NAMES = {
 }
 """What WebDriver's addresses are called here."""
 PREFERENCES = {
-    "app.update.disabledForTesting": True,
-    "browser.shell.checkDefaultBrowser": False,
-    "browser.startup.homepage_override.mstone": "ignore",
-    "browser.tabs.remote.unloadOnLowMemory": False,
-    "datareporting.policy.dataSubmissionEnabled": False,
-    "marionette.port": 0,
-    "media.autoplay.blocking_policy": 0,
-    "media.autoplay.default": 0,
-    "network.captive-portal-service.enabled": False,
-    "network.connectivity-service.enabled": False,
-    "toolkit.telemetry.reportingpolicy.firstRun": False,
+    "app.update.disabledForTesting": True, "browser.shell.checkDefaultBrowser": False,
+    "browser.startup.homepage_override.mstone": "ignore", "browser.tabs.remote.unloadOnLowMemory": False,
+    "datareporting.policy.dataSubmissionEnabled": False, "marionette.port": 0, "media.autoplay.blocking_policy": 0,
+    "media.autoplay.default": 0, "network.captive-portal-service.enabled": False,
+    "network.connectivity-service.enabled": False, "toolkit.telemetry.reportingpolicy.firstRun": False,
     "webgl.force-enabled": True,
-}
+}  # fmt: skip
 SCHEMES = {"dark": 0, "light": 1}
 SHOW_AS = """const [width, height, scheme] = arguments, { style } = gBrowser.selectedBrowser;
 Services.prefs.setIntPref("layout.css.prefers-color-scheme.content-override", scheme);
@@ -129,14 +121,8 @@ def firefox(folder: Path, *switches: str) -> Iterator[Browser]:
     rows = (f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in PREFERENCES.items())
     (profile / "user.js").write_text("".join(rows), encoding="utf-8")
     command = [
-        PROGRAM,
-        "--headless",
-        "--marionette",
-        "--remote-allow-system-access",
-        "--no-remote",
-        "--profile",
-        profile,
-    ]
+        PROGRAM, "--headless", "--marionette", "--remote-allow-system-access", "--no-remote", "--profile", profile,
+    ]  # fmt: skip
     size = {"MOZ_HEADLESS_WIDTH": "1200", "MOZ_HEADLESS_HEIGHT": "1000"}
     with ExitStack() as stack:
         screen = stack.enter_context(

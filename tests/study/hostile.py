@@ -1,7 +1,5 @@
 """Hostile requests, the same every time: wrong paths, methods, bodies, headers and tokens."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from random import Random

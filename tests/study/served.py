@@ -1,7 +1,5 @@
 """A study that a process of its own serves, and raters written as programs, who speak HTTP to it."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import socket

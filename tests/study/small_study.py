@@ -1,7 +1,5 @@
 """A small study of each kind, and raters written as programs: nobody watches anything here."""
 
-from __future__ import annotations
-
 from hashlib import sha256
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,3 @@
-"""The application: a rater from the first page to the last, and whoever asks for something else."""
-
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -19,14 +15,7 @@ from study.small_study import scripted_answer, small_study
 
 starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
 
-from lipmotion_studio.study.application import (  # noqa: E402
-    ANSWER_BURST,
-    JOIN_BURST,
-    PAGE,
-    RateLimit,
-    check_sheet,
-    study_application,
-)
+from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, PAGE, RateLimit, check_sheet, study_application  # noqa: E402
 from lipmotion_studio.web.replies import HEADERS  # noqa: E402
 
 SENT = {"trial": 4, "values": ["second"], "plays": [1, 2], "seconds": 1.25}
@@ -56,7 +45,7 @@ def place(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Open]:
 
 
 @pytest.mark.parametrize("place", KINDS, indirect=True)
-def test_a_rater_from_the_first_page_to_the_last(place: Open, tmp_path: Path) -> None:
+def test_a_rater_from_the_first_page_to_the_last(place, tmp_path):
     now = place.join()
     token, rater = now["token"], now["rater"]
     assert "token" not in ask(place.application, "/api/state", token=token).content
@@ -79,7 +68,7 @@ def test_a_rater_from_the_first_page_to_the_last(place: Open, tmp_path: Path) ->
     assert forget_rater(place.folder, rater) == len({(row.trial, row.question, row.condition) for row in rows})
 
 
-def test_nothing_that_raters_get_names_a_condition(place: Open) -> None:
+def test_nothing_that_raters_get_names_a_condition(place):
     now = place.join()
     texts = [ask(place.application, "/api/study").body, ask(place.application, "/api/state", token=now["token"]).body]
     texts += [ask(place.application, f"/{name}").body for name in PAGE]
@@ -87,20 +76,20 @@ def test_nothing_that_raters_get_names_a_condition(place: Open) -> None:
         assert not [name for name in ("visemes", "phones", "recording by", "anchor") if name.encode() in text]
 
 
-def test_the_first_answer_stands_however_often_it_is_sent(place: Open) -> None:
+def test_the_first_answer_stands_however_often_it_is_sent(place):
     now = place.join()
     for value in ("first", "second", "first"):
         assert place.send(now["token"], scripted_answer(place.study, now, value)).content["trial"] == 1
     assert [sheet.values for sheet in place.store.sheets()] == [("first",)]
 
 
-def test_no_trial_is_skipped(place: Open) -> None:
+def test_no_trial_is_skipped(place):
     now = place.join()
     reply = place.send(now["token"], scripted_answer(place.study, now) | {"trial": 1})
     assert (reply.status, place.store.sheets()) == (409, [])
 
 
-def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place: Open) -> None:
+def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place):
     now = place.join()
     for token in ("", "x", now["token"][:-1], now["token"] + "é"):
         assert ask(place.application, "/api/state", token=token).status == 401
@@ -111,34 +100,30 @@ def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place: Open) -> 
 @pytest.mark.parametrize(
     ("content", "headers", "status"),
     [
-        (b"{", {}, 400),
-        (b"\xff", {}, 400),
-        (b"[" * 10_000, {}, 400),
-        (b" " * 20_000, {}, 413),
-        ({"trial": 0}, {}, 422),
-        ({"trial": 0}, {"content-type": "text/plain"}, 415),
+        (b"{", {}, 400), (b"\xff", {}, 400), (b"[" * 10_000, {}, 400), (b" " * 20_000, {}, 413),
+        ({"trial": 0}, {}, 422), ({"trial": 0}, {"content-type": "text/plain"}, 415),
     ],
-)
-def test_bodies_that_are_refused(place: Open, content: object, headers: dict[str, str], status: int) -> None:
+)  # fmt: skip
+def test_bodies_that_are_refused(place, content, headers, status):
     token = place.join()["token"]
     reply = ask(place.application, "/api/answers", content, token=token, headers=headers)
     assert (reply.status, list(reply.content)) == (status, ["error"])
     assert place.store.sheets() == []
 
 
-def test_nobody_joins_without_agreeing(place: Open) -> None:
+def test_nobody_joins_without_agreeing(place):
     assert ask(place.application, "/api/raters", {"agrees": False}).status == 422
     assert place.join()["rater"] == "r001"
 
 
-def test_too_many_requests_of_one_rater_do_not_stop_another(place: Open) -> None:
+def test_too_many_requests_of_one_rater_do_not_stop_another(place):
     first, second = place.join()["token"], place.join()["token"]
     found = [ask(place.application, "/api/state", token=first).status for _ in range(ANSWER_BURST + 30)]
     assert 429 in found
     assert ask(place.application, "/api/state", token=second).status == 200
 
 
-def test_too_many_raters_at_once_have_to_wait(place: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_raters_at_once_have_to_wait(place, monkeypatch):
     monkeypatch.setattr("lipmotion_studio.study.application.JOIN_BURST", 3)
     assert JOIN_BURST >= 20
     application = study_application(place.study, {}, place.store)
@@ -147,7 +132,7 @@ def test_too_many_raters_at_once_have_to_wait(place: Open, monkeypatch: pytest.M
     assert 429 in found
 
 
-def test_a_disk_that_is_full_is_a_reason_to_try_again(place: Open, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_disk_that_is_full_is_a_reason_to_try_again(place, caplog):
     now = place.join()
     place.store._writer.execute("PRAGMA query_only = ON")
     assert place.send(now["token"], scripted_answer(place.study, now)).status == 503
@@ -156,7 +141,7 @@ def test_a_disk_that_is_full_is_a_reason_to_try_again(place: Open, caplog: pytes
     assert "cannot be written" in caplog.text
 
 
-def test_videos_are_served_whole_and_in_parts_and_nothing_else_is(place: Open) -> None:
+def test_videos_are_served_whole_and_in_parts_and_nothing_else_is(place):
     video = place.study.videos[0]
     data = (place.folder / "videos" / video.file).read_bytes()
     whole = ask(place.application, f"/videos/{video.file}")
@@ -173,7 +158,7 @@ def test_videos_are_served_whole_and_in_parts_and_nothing_else_is(place: Open) -
         assert ask(place.application, path).status == 404
 
 
-def test_every_reply_has_the_headers_that_keep_others_out(place: Open) -> None:
+def test_every_reply_has_the_headers_that_keep_others_out(place):
     paths = ["/", "/study.js", "/api/study", "/api/state", "/nothing", f"/videos/{place.study.videos[0].file}"]
     for path in paths:
         headers = ask(place.application, path).headers
@@ -202,15 +187,13 @@ def test_every_reply_has_the_headers_that_keep_others_out(place: Open) -> None:
         ({"host": "127.0.0.1:8000", "sec-fetch-site": "cross-site"}, 403),
     ],
 )
-def test_only_the_page_itself_by_its_own_names_gets_an_answer(
-    place: Open, headers: dict[str, str], status: int
-) -> None:
+def test_only_the_page_itself_by_its_own_names_gets_an_answer(place, headers, status):
     application = study_application(place.study, {}, place.store, ["study.example.org"])
     assert ask(application, "/api/study", headers=headers).status == status
     assert ask(application, "/api/raters", {"agrees": True}, headers=headers).status == (201 if status == 200 else 403)
 
 
-def test_the_page_has_no_resource_from_elsewhere(place: Open) -> None:
+def test_the_page_has_no_resource_from_elsewhere(place):
     for name in PAGE:
         text = ask(place.application, f"/{name}").body.decode()
         assert [word for word in text.split() if "://" in word and "www.w3.org/2000/svg" not in word] == []
@@ -218,52 +201,28 @@ def test_the_page_has_no_resource_from_elsewhere(place: Open) -> None:
         assert "<style" not in text
 
 
-def test_an_answer_is_taken_as_it_is(tmp_path: Path) -> None:
+def test_an_answer_is_taken_as_it_is(tmp_path):
     study = small_study(tmp_path / "study")
     assert check_sheet(study, order_trials(study, 7), 7, SENT) == AnswerSheet(7, 4, ("second",), 1.25, 3)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"trial": -1},
-        {"trial": 1000},
-        {"trial": True},
-        {"trial": "4"},
-        {"trial": 4.0},
-        {"values": []},
-        {"values": ["third"]},
-        {"values": ["first", "first"]},
-        {"values": "first"},
-        {"values": [1]},
-        {"values": None},
-        {"plays": [1]},
-        {"plays": [1, 0]},
-        {"plays": [1, True]},
-        {"plays": [1, 10**9]},
-        {"plays": {}},
-        {"seconds": 0.8},  # two videos of half a second
-        {"seconds": -1},
-        {"seconds": 10**400},
-        {"seconds": "1.25"},
-        {"seconds": None},
-        {"more": 1},
-    ],
-)
-def test_anything_else_is_refused(tmp_path: Path, change: dict[str, Any]) -> None:
+WRONG: list[dict[str, Any]] = [
+    {"trial": -1}, {"trial": 1000}, {"trial": True}, {"trial": "4"}, {"trial": 4.0}, {"values": []}, {"values": [1]},
+    {"values": ["third"]}, {"values": ["first", "first"]}, {"values": "first"}, {"values": None}, {"plays": [1]},
+    {"plays": [1, 0]}, {"plays": [1, True]}, {"plays": [1, 10**9]}, {"plays": {}}, {"seconds": -1},
+    {"seconds": 10**400}, {"seconds": "1.25"}, {"seconds": None}, {"more": 1}, {"seconds": 0.8},
+]  # fmt: skip
+"""In place of an answer's own; two videos last a second."""
+
+
+@pytest.mark.parametrize("changed", [*(SENT | each for each in WRONG), None, [], "text", 7, {}, {"trial": 0}])
+def test_anything_else_is_refused(tmp_path, changed):
     study = small_study(tmp_path / "study")
     with pytest.raises(InputError):
-        check_sheet(study, order_trials(study, 7), 7, SENT | change)
+        check_sheet(study, order_trials(study, 7), 7, changed)
 
 
-@pytest.mark.parametrize("content", [None, [], "text", 7, {}, {"trial": 0}])
-def test_only_the_object_is_taken(tmp_path: Path, content: Any) -> None:
-    study = small_study(tmp_path / "study")
-    with pytest.raises(InputError, match="required a"):
-        check_sheet(study, order_trials(study, 7), 7, content)
-
-
-def test_every_scale_and_every_slider_has_a_value(tmp_path: Path) -> None:
+def test_every_scale_and_every_slider_has_a_value(tmp_path):
     opinions, ranking = small_study(tmp_path / "m", MOS), small_study(tmp_path / "r", RANKING)
     sent = {"trial": 0, "values": ["01", "2", "3", "4", "5"], "plays": [1], "seconds": 0.5}
     sheet = check_sheet(opinions, order_trials(opinions, 1), 1, sent)
@@ -277,7 +236,7 @@ def test_every_scale_and_every_slider_has_a_value(tmp_path: Path) -> None:
         check_sheet(ranking, order_trials(ranking, 1), 1, sent | {"values": ["0", "50", "101", "7"]})
 
 
-def test_a_burst_and_then_a_rate() -> None:
+def test_a_burst_and_then_a_rate():
     now_s = [100.0]
     limit = RateLimit(2.0, 5, lambda: now_s[0])
     assert [limit.allows("a") for _ in range(7)] == [True] * 5 + [False] * 2
@@ -288,7 +247,7 @@ def test_a_burst_and_then_a_rate() -> None:
     assert [limit.allows("a") for _ in range(7)] == [True] * 5 + [False] * 2
 
 
-def test_nothing_is_kept_of_those_who_have_gone() -> None:
+def test_nothing_is_kept_of_those_who_have_gone():
     now_s = [0.0]
     limit = RateLimit(1.0, 2, lambda: now_s[0])
     for asker in range(20_000):

@@ -1,8 +1,3 @@
-"""Studies from conditions and sentences: which videos are made, of what, and how they are named."""
-
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,7 +40,7 @@ def here(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_paired_study_of_recordings_and_finished_videos(here: Path) -> None:
+def test_a_paired_study_of_recordings_and_finished_videos(here):
     folder = here / "study"
     study = design_study(folder, PAIRED, ["recording", f"ours={here / 'ours'}"], [here / "said"], PLAIN)
     assert read_study(folder) == study
@@ -64,7 +59,7 @@ def test_a_paired_study_of_recordings_and_finished_videos(here: Path) -> None:
     assert study.made_by["anchor_ms"] == "100"
 
 
-def test_videos_are_what_browsers_play_and_their_names_say_nothing(here: Path) -> None:
+def test_videos_are_what_browsers_play_and_their_names_say_nothing(here):
     study = design_study(here / "study", MOS, ["recording", f"ours={here / 'ours'}"], [here / "said"], PLAIN)
     assert len({video.file for video in study.videos}) == len(study.videos) == 5
     for video in study.videos:
@@ -76,7 +71,7 @@ def test_videos_are_what_browsers_play_and_their_names_say_nothing(here: Path) -
         assert video.seconds == pytest.approx(0.4, abs=0.05)
 
 
-def test_every_page_of_a_ranking_has_the_anchor(here: Path) -> None:
+def test_every_page_of_a_ranking_has_the_anchor(here):
     conditions = ["recording", f"ours={here / 'ours'}"]
     study = design_study(here / "study", RANKING, conditions, [here / "said"], PLAIN)
     assert {len(trial.videos) for trial in study.trials} == {3}
@@ -84,7 +79,7 @@ def test_every_page_of_a_ranking_has_the_anchor(here: Path) -> None:
     assert {len(trial.videos) for trial in without.trials} == {2}
 
 
-def test_a_study_is_the_same_when_it_is_designed_again(here: Path) -> None:
+def test_a_study_is_the_same_when_it_is_designed_again(here):
     conditions = ["recording", f"ours={here / 'ours'}"]
     first, second = (design_study(here / name, PAIRED, conditions, [here / "said"], PLAIN) for name in ("a", "b"))
     assert first == second
@@ -93,7 +88,7 @@ def test_a_study_is_the_same_when_it_is_designed_again(here: Path) -> None:
 
 
 @pytest.mark.long
-def test_motion_is_drawn_with_the_sound_of_the_sentence(here: Path) -> None:
+def test_motion_is_drawn_with_the_sound_of_the_sentence(here):
     for name in ("one", "two"):
         (here / "motion").mkdir(exist_ok=True)
         rows = "".join(f"{n / 25},{0.1 * (n % 3)},0.5\n" for n in range(11))
@@ -105,7 +100,7 @@ def test_motion_is_drawn_with_the_sound_of_the_sentence(here: Path) -> None:
     assert read_audio(here / "study" / VIDEOS / drawn[0].file).duration_s == pytest.approx(0.4, abs=0.1)
 
 
-def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here: Path) -> None:
+def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here):
     source = here / "said" / "one.mp4"
     seconds = [encode_video(source, here / f"{ms}.mp4", source, Region(), ms) for ms in (0.0, 200.0)]
     assert seconds[0] == seconds[1]
@@ -118,7 +113,7 @@ def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here: Path) -> None
         encode_video(source, here / "late.mp4", source, Region(), 5000.0)
 
 
-def test_the_mark_of_a_synthetic_video_stays(here: Path) -> None:
+def test_the_mark_of_a_synthetic_video_stays(here):
     source, mark = here / "said" / "one.mp4", mark_metadata()
     picture = np.zeros((48, 64, 3), np.uint8)
     write_mp4(here / "a.mp4", [picture] * 10, fps=25, audio=read_audio(source), tags=mark.tags, xmp=mark.xmp)
@@ -129,7 +124,7 @@ def test_the_mark_of_a_synthetic_video_stays(here: Path) -> None:
         assert (SOURCE_TYPE.encode() in (here / "shown.mp4").read_bytes()) == is_marked
 
 
-def test_only_the_region_is_shown(here: Path) -> None:
+def test_only_the_region_is_shown(here):
     picture = np.arange(48 * 64 * 3, dtype=np.uint32).astype(np.uint8).reshape(48, 64, 3)
     np.testing.assert_array_equal(Region(0.25, 0.5, 0.5, 0.5).cut(picture), picture[24:48, 16:48])
     settings = replace(PLAIN, region="0,0,0.5,0.5")
@@ -144,15 +139,12 @@ def test_only_the_region_is_shown(here: Path) -> None:
 @pytest.mark.parametrize(
     ("conditions", "says"),
     [
-        (["recording"], "at least 2"),
-        (["recording", "recording"], "two conditions are called"),
-        (["recording", "ours"], "required NAME=SOURCE"),
-        (["recording", "=ours"], "required NAME=SOURCE"),
-        (["anchor=x", "recording"], "no other"),
-        (["real=recording", "recording"], "no other"),
+        (["recording"], "at least 2"), (["recording", "recording"], "two conditions are called"),
+        (["recording", "ours"], "required NAME=SOURCE"), (["recording", "=ours"], "required NAME=SOURCE"),
+        (["anchor=x", "recording"], "no other"), (["real=recording", "recording"], "no other"),
     ],
-)
-def test_conditions_that_are_refused(conditions: list[str], says: str) -> None:
+)  # fmt: skip
+def test_conditions_that_are_refused(conditions, says):
     with pytest.raises(InputError, match=says):
         parse_conditions(conditions)
 
@@ -167,7 +159,7 @@ def test_conditions_that_are_refused(conditions: list[str], says: str) -> None:
         (lambda here: (here / "ours" / "one.mkv").touch(), "ours", "move one away"),
     ],
 )
-def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], object], source: str, says: str) -> None:
+def test_sources_that_lack_something(here, prepare, source, says):
     prepare(here)
     said = read_sentences([here / "said"])
     if not says:
@@ -177,13 +169,13 @@ def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], objec
         make_condition(str(here / source), said, DRAWN)
 
 
-def test_recordings_without_pictures_cannot_be_shown() -> None:
+def test_recordings_without_pictures_cannot_be_shown():
     said = read_sentences([Path("examples/welcome.flac")])
     with pytest.raises(InputError, match="has no pictures"):
         make_condition("recording", said, DRAWN)
 
 
-def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) -> None:
+def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here):
     (here / "study").mkdir()
     with pytest.raises(ExportError, match="exists"):
         design_study(here / "study", PAIRED, ["recording", f"ours={here / 'ours'}"], [here / "said"])
@@ -194,13 +186,13 @@ def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) 
     assert set(here.iterdir()) == before
 
 
-def test_two_sentences_of_one_name_are_refused(here: Path) -> None:
+def test_two_sentences_of_one_name_are_refused(here):
     with pytest.raises(InputError, match="two sentences are called 'one'"):
         read_sentences([here / "said", here / "ours" / "one.mp4"])
 
 
 @pytest.mark.long
-def test_models_and_job_files_speak_the_sentences(tmp_path: Path) -> None:
+def test_models_and_job_files_speak_the_sentences(tmp_path):
     (tmp_path / "still.toml").write_text('[request]\nrecogniser = "fast"\n[delivery]\nintensity = 0.2\n', "utf-8")
     conditions = ["full=shipped", f"weak={tmp_path / 'still.toml'}"]
     settings = replace(PLAIN, recogniser="fast", fps=10.0)

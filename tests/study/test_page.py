@@ -1,7 +1,5 @@
 """The page in a real browser: videos play, keys work, answers land, nobody is kept out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from hashlib import sha256
@@ -16,7 +14,7 @@ from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
 from lipmotion_studio.study.conduct import collect_answers
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo
-from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screen
+from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screens
 from study.firefox import BOTH, Opens
 from study.served import Server, served
 from study.small_study import CONDITIONS, planned
@@ -94,30 +92,22 @@ def answers(tmp_path: Path) -> list[Answer]:
     return [row for row in collect_answers(tmp_path / "study") if not row.practice]
 
 
-def look(window: Browser, name: str) -> None:
-    """Check a page on every screen."""
-    for width, height, scheme in SCREENS:
-        window.show_as(width, height, scheme, mobile=width < 600)
-        check_screen(window, name, width, scheme)
-    window.show_as(1200, 900)
-
-
-def test_pairs_by_keys(opens: Opens, tmp_path: Path) -> None:
+def test_pairs_by_keys(opens, tmp_path):
     with at_work(opens, tmp_path, PAIRED) as (window, _, study):
-        look(window, "welcome")
+        check_screens(window, "welcome", SCREENS)
         window.click("#agree")
         wait_for(window, "guide")
-        look(window, "guide")
+        check_screens(window, "guide", SCREENS)
         window.click("#begin")
         wait_for(window, "trial")
-        look(window, "pair")
+        check_screens(window, "pair", SCREENS)
         keys = iter("12" + LEFT + RIGHT + "12" * len(study.trials))
         answer(window, lambda: window.press(next(keys)))
         for _ in study.trials[1:]:
             window.press("2")  # before the videos were played: nothing is chosen
             answer(window, lambda: window.press(next(keys)))
         wait_for(window, "thanks")
-        look(window, "thanks")
+        check_screens(window, "thanks", SCREENS)
         assert [each for each in window.problems() if "favicon" not in each] == []
     rows = answers(tmp_path)
     assert [row.value for row in sorted(rows, key=lambda row: row.trial)][:4] == ["second", "first", "second", "first"]
@@ -125,21 +115,21 @@ def test_pairs_by_keys(opens: Opens, tmp_path: Path) -> None:
     assert all(row.plays == 2 and row.seconds >= 0.9 for row in rows)
 
 
-def test_opinions_by_keys(opens: Opens, tmp_path: Path) -> None:
+def test_opinions_by_keys(opens, tmp_path):
     with at_work(opens, tmp_path, MOS) as (window, _, study):
         join(window)
-        look(window, "opinions")
+        check_screens(window, "opinions", SCREENS)
         take_part(window, study, lambda: window.press("1", "2", "3", "4", "5"))
     values = {row.question: row.value for row in answers(tmp_path)}
     assert values == {"smoothness": "1", "closure": "2", "protrusion": "3", "turning": "4", "overall": "5"}
 
 
-def test_a_ranking_by_sliders(opens: Opens, tmp_path: Path) -> None:
+def test_a_ranking_by_sliders(opens, tmp_path):
     moves = """for (const [n, input] of [...document.querySelectorAll('input[type=range]')].entries()) {
         input.value = 20 * n; input.dispatchEvent(new Event('input', { bubbles: true })); }"""
     with at_work(opens, tmp_path, RANKING) as (window, _, study):
         join(window)
-        look(window, "ranking")
+        check_screens(window, "ranking", SCREENS)
         window.press(SPACE)
         wait_until(lambda: is_open(window), LIMIT_S)
         window.run("document.querySelector('input[type=range]').focus()")
@@ -151,7 +141,7 @@ def test_a_ranking_by_sliders(opens: Opens, tmp_path: Path) -> None:
     assert {row.condition for row in counted} == {*CONDITIONS, "anchor"}
 
 
-def test_an_answer_outlives_the_server_and_the_page(opens: Opens, tmp_path: Path) -> None:
+def test_an_answer_outlives_the_server_and_the_page(opens, tmp_path):
     """The server is killed before an answer comes; the page keeps it, sends it again, and also after a reload."""
     with ExitStack() as stack:
         window, server, _ = stack.enter_context(at_work(opens, tmp_path, PAIRED))

@@ -1,15 +1,12 @@
 """``lipmotion study serve`` as a process: many scripted raters, kills in the middle, and hostile requests."""
 
-from __future__ import annotations
-
 import socket
 import sqlite3
 from contextlib import ExitStack, closing
-from pathlib import Path
 
 import pytest
 
-from children import LIPMOTION, environment, run_child, wait_until
+from children import wait_until
 from lipmotion.errors import InputError
 from lipmotion_studio.study.conduct import collect_answers, serve_study
 from lipmotion_studio.study.manifest import VIDEOS
@@ -23,7 +20,7 @@ RATERS, KILLS = 20, 3
 
 
 @pytest.mark.long
-def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path: Path) -> None:
+def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path):
     """Whatever was acknowledged is in the database, once; every rater comes to the end."""
     folder, errors = tmp_path / "study", tmp_path / "errors.txt"
     study = small_study(folder)
@@ -61,7 +58,7 @@ def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path: Path) -> None:
+def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
     folder, errors = tmp_path / "study", tmp_path / "errors.txt"
     study = small_study(folder)
     for foreign in (folder / "foreign.mp4", folder / VIDEOS / "foreign.mp4", tmp_path / "foreign.mp4"):
@@ -98,7 +95,7 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path: Path) -> 
 
 
 @pytest.mark.long
-def test_a_server_that_is_interrupted_ends_by_itself(tmp_path: Path) -> None:
+def test_a_server_that_is_interrupted_ends_by_itself(tmp_path):
     folder, errors = tmp_path / "study", tmp_path / "errors.txt"
     small_study(folder)
     with served(folder, errors) as server:
@@ -107,21 +104,9 @@ def test_a_server_that_is_interrupted_ends_by_itself(tmp_path: Path) -> None:
     assert "Traceback" not in errors.read_text(encoding="utf-8")
 
 
-def test_a_port_that_is_taken_is_said(tmp_path: Path) -> None:
+def test_a_port_that_is_taken_is_said(tmp_path):
     small_study(tmp_path / "study")
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(InputError, match="another --port"):
         serve_study(tmp_path / "study", port=taken.getsockname()[1])
     with pytest.raises(InputError, match="another --port"):
         serve_study(tmp_path / "study", port=70_000)
-
-
-@pytest.mark.long
-def test_without_the_extra_the_error_says_what_to_install(tmp_path: Path) -> None:
-    small_study(tmp_path / "study")
-    (tmp_path / "without").mkdir()
-    (tmp_path / "without" / "uvicorn.py").write_text("raise ImportError('no uvicorn here')", encoding="utf-8")
-    variables = environment()
-    variables["PYTHONPATH"] = f"{tmp_path / 'without'}:{variables.get('PYTHONPATH', '')}"
-    done = run_child([*LIPMOTION, "study", "serve", tmp_path / "study"], variables=variables)
-    assert done.returncode == 8
-    assert "[study]" in done.stderr

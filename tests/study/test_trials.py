@@ -1,10 +1,5 @@
-"""Which trials a study has, and in which order raters see them."""
-
-from __future__ import annotations
-
 from collections import Counter
 from itertools import permutations
-from pathlib import Path
 
 import pytest
 
@@ -22,7 +17,7 @@ from study.small_study import CONDITIONS, SENTENCES, small_study
 VIDEOS = {(sentence, name): n for n, (sentence, name) in enumerate((s, c) for s in SENTENCES for c in CONDITIONS)}
 
 
-def test_the_trials_of_hofer_2008() -> None:
+def test_the_trials_of_hofer_2008():
     """Three conditions and six sentences: every pair in both orders, 36 trials, no two alike."""
     trials = main_trials(PAIRED, CONDITIONS, SENTENCES, VIDEOS)
     assert len({trial.videos for trial in trials}) == len(trials) == 36
@@ -35,19 +30,19 @@ def test_the_trials_of_hofer_2008() -> None:
     assert set(firsts.values()) == {12}
 
 
-def test_every_video_once_for_opinions() -> None:
+def test_every_video_once_for_opinions():
     late = VIDEOS | {("two", ANCHOR): 99}
     trials = main_trials(MOS, CONDITIONS, SENTENCES, late)
     assert sorted(trial.videos[0] for trial in trials) == sorted(late.values())
 
 
-def test_all_conditions_of_a_sentence_on_a_page_of_a_ranking() -> None:
+def test_all_conditions_of_a_sentence_on_a_page_of_a_ranking():
     late = VIDEOS | {(sentence, ANCHOR): 100 + n for n, sentence in enumerate(SENTENCES)}
     trials = main_trials(RANKING, CONDITIONS, SENTENCES, late)
     assert [len(trial.videos) for trial in trials] == [4] * 6
 
 
-def test_the_condition_in_step_is_expected_first_and_second() -> None:
+def test_the_condition_in_step_is_expected_first_and_second():
     late = VIDEOS | {("one", ANCHOR): 100, ("two", ANCHOR): 101}
     first, second = anchor_trials("phones", ("one", "two"), late)
     assert (first.videos, first.expected) == ((VIDEOS["one", "phones"], 100), "first")
@@ -55,7 +50,7 @@ def test_the_condition_in_step_is_expected_first_and_second() -> None:
 
 
 @pytest.mark.parametrize("kind", [PAIRED, MOS, RANKING])
-def test_a_check_of_attention_tells_the_answer_that_it_expects(kind: str) -> None:
+def test_a_check_of_attention_tells_the_answer_that_it_expects(kind):
     trials = main_trials(kind, CONDITIONS, SENTENCES, VIDEOS)
     checks = attention_trials(kind, trials, 2, seed=1)
     assert len({check.expected for check in checks}) == 2
@@ -63,7 +58,7 @@ def test_a_check_of_attention_tells_the_answer_that_it_expects(kind: str) -> Non
         assert check.expected in check.note
 
 
-def test_each_rater_has_an_order_that_stays(tmp_path: Path) -> None:
+def test_each_rater_has_an_order_that_stays(tmp_path):
     study = small_study(tmp_path / "study")
     orders = [order_trials(study, rater) for rater in range(1, 30)]
     assert orders == [order_trials(study, rater) for rater in range(1, 30)]
@@ -73,7 +68,7 @@ def test_each_rater_has_an_order_that_stays(tmp_path: Path) -> None:
         assert Counter(order) == Counter(study.trials)
 
 
-def test_orders_are_balanced_over_raters(tmp_path: Path) -> None:
+def test_orders_are_balanced_over_raters(tmp_path):
     """A trial comes as often in the first half as chance has it: of 400 raters, 200 ± 4 standard deviations of 10."""
     study = small_study(tmp_path / "study")
     counted = [trial for trial in study.trials if not trial.practice]
@@ -81,21 +76,21 @@ def test_orders_are_balanced_over_raters(tmp_path: Path) -> None:
     assert all(160 <= early[trial] <= 240 for trial in counted)
 
 
-def test_every_order_of_three_is_equally_likely() -> None:
+def test_every_order_of_three_is_equally_likely():
     """Of 6000, 1000 each: chi-squared of five degrees of freedom is under 20.5 in 99.9 % of draws."""
     counts = Counter("".join(shuffled("abc", "seed", n)) for n in range(6000))
     assert len(counts) == 6
     assert sum((count - 1000) ** 2 / 1000 for count in counts.values()) < 20.5
 
 
-def test_a_ranking_shuffles_the_videos_of_a_page(tmp_path: Path) -> None:
+def test_a_ranking_shuffles_the_videos_of_a_page(tmp_path):
     study = small_study(tmp_path / "study", RANKING)
     pages = {order_trials(study, rater)[0].videos for rater in range(40)}
     assert len(pages) > 10
     assert len({tuple(sorted(page)) for page in pages}) == 1
 
 
-def test_what_is_asked_names_the_conditions_as_they_are_shown(tmp_path: Path) -> None:
+def test_what_is_asked_names_the_conditions_as_they_are_shown(tmp_path):
     paired, opinions = small_study(tmp_path / "p"), small_study(tmp_path / "m", MOS)
     trial = paired.trials[3]
     assert list_questions(paired, trial) == [("preference", *(video.condition for video in paired.shown(trial)))]

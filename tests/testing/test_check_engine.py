@@ -1,7 +1,3 @@
-"""The checks of the engine contract: each of them fails for an engine that breaks what it checks."""
-
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -107,12 +103,12 @@ RESULTS: list[tuple[Callable[[Broken, Generation], Generation], str]] = [
 ]
 
 
-def test_an_engine_that_keeps_the_contract_passes() -> None:
+def test_an_engine_that_keeps_the_contract_passes():
     check_engine(MeanPoses(Settings()))
 
 
 @pytest.mark.parametrize(("change", "check"), RESULTS)
-def test_a_wrong_result_is_noticed(change: Any, check: str) -> None:
+def test_a_wrong_result_is_noticed(change, check):
     class Changed(MeanPoses):
         def generate(self, *arguments: Any) -> Generation:
             return change(Broken(), super().generate(*arguments))
@@ -128,7 +124,7 @@ def broken(**methods: Any) -> TrainedEngine:
     return TrainedEngine(type("Changed", (MeanPoses,), methods)(Settings()))
 
 
-def test_pins_that_are_ignored_are_noticed() -> None:
+def test_pins_that_are_ignored_are_noticed():
     def generate(self: Any, model: Any, speech: Any, constraints: Any = None) -> Generation:  # noqa: ARG001
         return MeanPoses.generate(self, model, speech)
 
@@ -137,7 +133,7 @@ def test_pins_that_are_ignored_are_noticed() -> None:
             ENGINE_CHECKS[check](broken(generate=generate))
 
 
-def test_arrays_that_are_not_checked_are_noticed() -> None:
+def test_arrays_that_are_not_checked_are_noticed():
     def from_arrays(_: Any, arrays: Any) -> Any:
         return learned_motion_from_arrays(arrays), arrays["means"]
 
@@ -145,7 +141,7 @@ def test_arrays_that_are_not_checked_are_noticed() -> None:
         ENGINE_CHECKS["damaged arrays are format errors"](broken(from_arrays=from_arrays))
 
 
-def test_arrays_of_nobody_are_noticed() -> None:
+def test_arrays_of_nobody_are_noticed():
     def from_arrays(self: Any, arrays: Any) -> Any:
         known = {name: array for name, array in arrays.items() if name in (*LEARNED_MOTION_ARRAYS, *MEANS)}
         return MeanPoses.from_arrays(self, known)
@@ -154,7 +150,7 @@ def test_arrays_of_nobody_are_noticed() -> None:
         ENGINE_CHECKS["damaged arrays are format errors"](broken(from_arrays=from_arrays))
 
 
-def test_a_model_that_does_not_come_back_is_noticed() -> None:
+def test_a_model_that_does_not_come_back_is_noticed():
     def to_arrays(self: Any, model: Any) -> Any:
         return MeanPoses.to_arrays(self, (model[0], model[1] + 0.1))
 
@@ -162,7 +158,7 @@ def test_a_model_that_does_not_come_back_is_noticed() -> None:
         ENGINE_CHECKS["a model comes back from arrays"](broken(to_arrays=to_arrays))
 
 
-def test_learning_from_frames_that_are_not_valid_is_noticed() -> None:
+def test_learning_from_frames_that_are_not_valid_is_noticed():
     def fit(self: Any, examples: Any, monitor: Any, checkpoint: Any = None) -> Any:
         everything = [replace(one, valid=np.ones_like(one.valid)) for one in examples]
         return MeanPoses.fit(self, everything, monitor, checkpoint)
@@ -173,7 +169,7 @@ def test_learning_from_frames_that_are_not_valid_is_noticed() -> None:
 
 
 @pytest.mark.parametrize("error", [InputError, CorpusError, ModelFormatError])
-def test_an_error_of_the_engine_names_the_check(error: type[Exception]) -> None:
+def test_an_error_of_the_engine_names_the_check(error):
     def generate(*_: Any) -> Any:
         raise error("out of order")
 
@@ -181,6 +177,6 @@ def test_an_error_of_the_engine_names_the_check(error: type[Exception]) -> None:
         check_engine(broken(generate=generate).engine)
 
 
-def test_a_configuration_that_is_none_is_noticed() -> None:
+def test_a_configuration_that_is_none_is_noticed():
     with pytest.raises(ContractError, match="configuration can be stored"):
         check_engine(MeanPoses(None))  # type: ignore[arg-type]

@@ -1,7 +1,3 @@
-"""The checks of faces and motion formats: each fails for something that breaks it."""
-
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -39,12 +35,12 @@ def draw(frames: Callable[[list[Any]], list[Any]], *, checked: bool = True) -> F
     return Changed()
 
 
-def test_faces_that_keep_the_contract() -> None:
+def test_faces_that_keep_the_contract():
     check_face(Bars())
     check_face(make_face("portrait"))
 
 
-def test_faces_that_break_it() -> None:
+def test_faces_that_break_it():
     for face, words in (
         (draw(lambda frames: frames[1:]), "frames, required"),
         (draw(lambda frames: [frame[:63] for frame in frames]), "H and W even"),
@@ -60,7 +56,7 @@ def test_faces_that_break_it() -> None:
             check_face(face)
 
 
-def test_formats_that_keep_the_contract() -> None:
+def test_formats_that_keep_the_contract():
     for name in MOTION_FORMATS.built_in:
         check_exporter(MOTION_FORMATS.load(name))
 
@@ -75,7 +71,7 @@ def by_chance(path: Path, *_: Any) -> None:
     path.write_bytes(np.random.default_rng().bytes(16))
 
 
-def test_formats_that_break_it() -> None:
+def test_formats_that_break_it():
     npz = MOTION_FORMATS.load("npz")
 
     def wrong(path: Path) -> Any:

@@ -1,7 +1,3 @@
-"""The formant synthesiser: exact times, quiet silence, and phones that sound like themselves."""
-
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -44,7 +40,7 @@ def measured_formants(samples: NDArray[np.float32], order: int = 18) -> NDArray[
     return np.sort(np.angle(roots[width_hz < 400]) * RATE_HZ / 2 / np.pi)
 
 
-def test_times_are_exact() -> None:
+def test_times_are_exact():
     for rate_hz in (16000, 44100):
         phones = [("sil", 0.25), ("m", 0.0831), ("aa", 0.2), ("sil", 0.001)]
         audio, timeline = synthesise(phones, rate_hz=rate_hz)
@@ -57,7 +53,7 @@ def test_times_are_exact() -> None:
         assert audio.samples.dtype == np.float32
 
 
-def test_the_sound_begins_and_ends_with_its_phone() -> None:
+def test_the_sound_begins_and_ends_with_its_phone():
     audio, timeline = synthesise([("sil", 0.2), ("aa", 0.2), ("sil", 0.2), ("s", 0.2), ("sil", 0.2)])
     frames = audio.samples.reshape(-1, RATE_HZ // 200)
     loud_s = np.flatnonzero(np.sqrt(np.square(frames).mean(axis=1)) > 0.01) / 200
@@ -66,7 +62,7 @@ def test_the_sound_begins_and_ends_with_its_phone() -> None:
     assert edges_s == pytest.approx(spoken_s, abs=0.015)
 
 
-def test_silence_is_quiet_and_speech_is_not_clipped() -> None:
+def test_silence_is_quiet_and_speech_is_not_clipped():
     assert level_db(spoken("sil")) == pytest.approx(-70, abs=0.5)
     for phone in sorted(set(PHONE_TARGETS) - {"sil", "sp"})[::3]:
         samples = spoken(phone)
@@ -74,27 +70,27 @@ def test_silence_is_quiet_and_speech_is_not_clipped() -> None:
         assert np.abs(samples).max() < 0.9, phone
 
 
-def test_the_seed_is_all_the_chance_there_is() -> None:
+def test_the_seed_is_all_the_chance_there_is():
     phones = [("sil", 0.1), ("s", 0.1), ("iy", 0.1)]
     first, again, other = (synthesise(phones, seed=seed)[0].samples for seed in (3, 3, 4))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
 
 
-def test_vowels_have_their_formants() -> None:
+def test_vowels_have_their_formants():
     for phone in ("iy", "ae", "aa", "uw"):
         formants = PHONE_TARGETS[phone][0].formants
         assert formants is not None
         assert measured_formants(spoken(phone)[800:-800])[:2] == pytest.approx(formants[:2], rel=0.12)
 
 
-def test_diphthongs_move() -> None:
+def test_diphthongs_move():
     samples = spoken("ay", 0.4)
     assert measured_formants(samples[800:2400])[1] < 1400
     assert measured_formants(samples[-2400:-800])[1] > 1800
 
 
-def test_pitch() -> None:
+def test_pitch():
     for pitch_hz in (90.0, 210.0):
         audio, _ = synthesise([("aa", 0.5)], pitch_hz=pitch_hz)
         middle = audio.samples[3200:4800].astype(float)
@@ -104,13 +100,13 @@ def test_pitch() -> None:
         assert RATE_HZ / period == pytest.approx(pitch_hz, rel=0.03)
 
 
-def test_voice_tells_twins_apart() -> None:
+def test_voice_tells_twins_apart():
     for voiceless, voiced in TWINS:
         assert share_of_power(spoken(voiceless), 60, 300) < 0.2
         assert share_of_power(spoken(voiced), 60, 300) > 0.4
 
 
-def test_stops_are_silent_then_burst() -> None:
+def test_stops_are_silent_then_burst():
     audio, timeline = synthesise([("aa", 0.2), ("k", 0.2), ("aa", 0.2)])
     start = round(timeline.spans[1].start_s * RATE_HZ)
     closure, burst = audio.samples[start + 400 : start + 1000], audio.samples[start + 1600 : start + 2400]
@@ -118,14 +114,14 @@ def test_stops_are_silent_then_burst() -> None:
     assert level_db(burst) > -50
 
 
-def test_moving_formants_do_not_click() -> None:
+def test_moving_formants_do_not_click():
     audio, _ = synthesise([("aa", 0.15), ("w", 0.12), ("aa", 0.12), ("r", 0.12), ("iy", 0.15)])
     hertz, _, power = spectrogram(audio.samples[800:-800], RATE_HZ, nperseg=320)
     high, low = power[hertz > 5000].max(), power[hertz < 1000].max()
     assert 10 * np.log10(high / low) < -60
 
 
-def test_no_two_phones_sound_the_same() -> None:
+def test_no_two_phones_sound_the_same():
     names = sorted(set(PHONE_TARGETS) - {"sil", "sp"})
 
     def picture(phone: str, seed: int) -> NDArray[np.float64]:
@@ -141,7 +137,7 @@ def test_no_two_phones_sound_the_same() -> None:
         assert distance[second] > 1.5 * distance[nearest], (name, names[second])
 
 
-def test_it_says_what_is_wrong() -> None:
+def test_it_says_what_is_wrong():
     for phones, options, message in (
         ([], {}, "at least one"),
         ([("aa", 0.1), ("AA", 0.1)], {}, "'AA'"),

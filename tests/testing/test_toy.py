@@ -1,14 +1,8 @@
-"""The toy corpus: known words, known times, known motion; and videos that can be tracked."""
-
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from lipmotion import Lexicon
 from lipmotion.errors import ExportError, InputError
@@ -16,6 +10,7 @@ from lipmotion.testing.toy import LIP_LEAD_S, LIPS_TOUCH, WORDS, ToySentence, to
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units.phones import SILENCE
 from lipmotion_faces.testing import write_toy_recordings
+from lipmotion_faces.tracking.track import track
 
 FPS = 25.0
 
@@ -32,13 +27,13 @@ def spelled(*phones: tuple[str, float]) -> Timeline[Unit]:
     )
 
 
-def test_words_are_pronounced_as_in_the_dictionary() -> None:
+def test_words_are_pronounced_as_in_the_dictionary():
     for word in WORDS:
         assert Lexicon().known(word)
         assert WORDS[word] in Lexicon().pronunciations(word)
 
 
-def test_sentences_say_their_words(sentences: list[ToySentence]) -> None:
+def test_sentences_say_their_words(sentences):
     for sentence in sentences:
         phones = [span.label.phone for span in sentence.units]
         assert phones == [SILENCE, *(phone for word in sentence.words for phone in WORDS[word]), SILENCE]
@@ -47,7 +42,7 @@ def test_sentences_say_their_words(sentences: list[ToySentence]) -> None:
         assert len(sentence.words) >= 3
 
 
-def test_sentences_have_the_promised_lengths(sentences: list[ToySentence]) -> None:
+def test_sentences_have_the_promised_lengths(sentences):
     for sentence in sentences:
         assert 2 <= sentence.audio.duration_s <= 3.1
         assert sentence.units.spans[-1].end_s == pytest.approx(sentence.audio.duration_s, abs=1e-4)
@@ -56,7 +51,7 @@ def test_sentences_have_the_promised_lengths(sentences: list[ToySentence]) -> No
             assert silence.label.word == ""
 
 
-def test_the_splits(sentences: list[ToySentence]) -> None:
+def test_the_splits(sentences):
     assert [sentence.split for sentence in sentences] == ["train"] * 8 + ["val"] * 2 + ["test"] * 2
     assert [sentence.split for sentence in toy_sentences(3)] == ["train", "val", "test"]
     for seed in range(1):
@@ -64,21 +59,21 @@ def test_the_splits(sentences: list[ToySentence]) -> None:
         assert said == set(WORDS)
 
 
-def test_the_seed_decides_and_more_begins_with_the_same(sentences: list[ToySentence]) -> None:
+def test_the_seed_decides_and_more_begins_with_the_same(sentences):
     for few, many in zip(toy_sentences(4), sentences, strict=False):
         assert (few.name, few.words, few.units) == (many.name, many.words, many.units)
         assert np.array_equal(few.audio.samples, many.audio.samples)
     assert [s.words for s in toy_sentences(4, seed=1)] != [s.words for s in sentences[:4]]
 
 
-def test_a_corpus_needs_three_sentences() -> None:
+def test_a_corpus_needs_three_sentences():
     for make in (toy_sentences, toy_utterances):
         with pytest.raises(InputError, match="2 toy sentences asked for"):
             make(2)
 
 
 @pytest.mark.parametrize("rate_hz", [25.0, 30.0, 100.0])
-def test_the_mouth_is_shut_in_silence_and_touches_in_p_b_m(sentences: list[ToySentence], rate_hz: float) -> None:
+def test_the_mouth_is_shut_in_silence_and_touches_in_p_b_m(sentences, rate_hz):
     for sentence in sentences:
         motion = toy_motion(sentence.units, rate_hz)
         first, last = sentence.units.spans[0].end_s, sentence.units.spans[-1].start_s
@@ -93,14 +88,14 @@ def test_the_mouth_is_shut_in_silence_and_touches_in_p_b_m(sentences: list[ToySe
                 assert motion["opening"][inside].max() > 0.2
 
 
-def test_the_lips_lead_the_sound() -> None:
+def test_the_lips_lead_the_sound():
     motion = toy_motion(spelled(("sil", 0.5), ("aa", 0.2), ("sil", 0.5)), 100.0)
     middle_s = np.average(motion.time_s, weights=motion["opening"])
     assert middle_s == pytest.approx(0.6 - LIP_LEAD_S, abs=0.002)
     assert 0 < LIP_LEAD_S < 1 / FPS
 
 
-def test_motion_says_what_is_wrong() -> None:
+def test_motion_says_what_is_wrong():
     for units, rate_hz, message in (
         (Timeline(()), 25.0, "at least one"),
         (spelled(("aa", 0.1)), 0.0, "rate is 0.0 Hz"),
@@ -110,7 +105,7 @@ def test_motion_says_what_is_wrong() -> None:
             toy_motion(units, rate_hz)
 
 
-def test_utterances_are_the_sentences_perfectly_tracked(sentences: list[ToySentence]) -> None:
+def test_utterances_are_the_sentences_perfectly_tracked(sentences):
     for utterance, sentence in zip(toy_utterances(12), sentences, strict=True):
         assert (utterance.name, utterance.words, utterance.split) == (sentence.name, sentence.words, sentence.split)
         assert np.array_equal(utterance.audio.samples, sentence.audio.samples)
@@ -126,12 +121,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return write_toy_recordings(tmp_path_factory.mktemp("toy") / "new", sentences=3)
 
 
-def pictures(video: Path) -> list[NDArray[np.uint8]]:
-    with av.open(str(video)) as container:
-        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
-
-
-def test_recordings_come_with_transcripts_and_lists(recordings: list[Path]) -> None:
+def test_recordings_come_with_transcripts_and_lists(recordings):
     folder = recordings[0].parent
     sentences = toy_sentences(3)
     assert [path.name for path in recordings] == ["toy00.mp4", "toy01.mp4", "toy02.mp4"]
@@ -143,7 +133,7 @@ def test_recordings_come_with_transcripts_and_lists(recordings: list[Path]) -> N
         assert (folder / f"{sentence.split}.txt").read_text() == f"{sentence.name}\n"
 
 
-def test_recordings_say_what_is_wrong(tmp_path: Path) -> None:
+def test_recordings_say_what_is_wrong(tmp_path):
     with pytest.raises(InputError, match="2 toy sentences"):
         write_toy_recordings(tmp_path / "new", sentences=2)
     assert not (tmp_path / "new").exists()
@@ -155,28 +145,13 @@ def test_recordings_say_what_is_wrong(tmp_path: Path) -> None:
         write_toy_recordings(tmp_path / "file", sentences=3)
 
 
-def tracked_opening(video: Path) -> NDArray[np.float64]:
-    """Return |13 − 14| / |33 − 263| per frame, in pixels; NaN where no face is found."""
-    mediapipe = pytest.importorskip("mediapipe")
-    openings = []
-    with mediapipe.solutions.face_mesh.FaceMesh(max_num_faces=1, refine_landmarks=True) as mesh:
-        for picture in pictures(video):
-            found = mesh.process(picture).multi_face_landmarks
-            height, width, _ = picture.shape
-            points = (
-                {i: np.array([p.x * width, p.y * height]) for i, p in enumerate(found[0].landmark)} if found else {}
-            )
-            openings.append(
-                np.linalg.norm(points[13] - points[14]) / np.linalg.norm(points[33] - points[263]) if found else np.nan
-            )
-    return np.array(openings)
-
-
 @pytest.mark.long
 @pytest.mark.video
-def test_toy_faces_can_be_tracked(recordings: list[Path]) -> None:
+def test_toy_faces_can_be_tracked(recordings):
+    pytest.importorskip("mediapipe")
     for path, sentence in zip(recordings, toy_sentences(3), strict=True):
-        opening, known = tracked_opening(path), toy_motion(sentence.units, FPS)["opening"]
-        assert np.isfinite(opening).all()
+        tracked, known = track(path, crops=False), toy_motion(sentence.units, FPS)["opening"]
+        opening = tracked.motion["opening"]
+        assert tracked.seen.all()
         assert np.corrcoef(opening, known)[0, 1] > 0.9
         assert np.median(opening[known == 0]) < 0.3 * np.percentile(opening, 95)

@@ -3,15 +3,12 @@
 It shows nobody, it needs neither OpenCV nor MediaPipe, and where everything is in every picture is known.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
 from lipmotion.motion.mouth_region import CORNER as MOUTH_CORNER
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
@@ -59,31 +56,20 @@ NOISE = 1.2
 """Standard deviation of the noise of the camera, grey levels."""
 
 
-def toy_lower_faces(motion: Motion, scale: int = 1, *, noise: float = NOISE, seed: int = 0) -> Pictures:
-    """Return pictures of the lower face [shape=(T, 128 · scale, 128 · scale, 3)] of the toy motion, uint8.
+def toy_lower_faces(motion: Motion, *, noise: float = NOISE, seed: int = 0) -> Pictures:
+    """Return pictures of the lower face [shape=(T, 128, 128, 3)] of the toy motion, uint8.
 
     motion : ``opening``, ``width`` and ``outer``, of ``toy_motion``
-    scale  : samples a pixel
     noise  : standard deviation of the noise, grey levels
     """
-    rows, columns = np.mgrid[: HEIGHT * scale, : WIDTH * scale]
-    x, y = (columns + 0.5) / scale + CORNER[0], (rows + 0.5) / scale + CORNER[1]
-    draw = np.random.default_rng(seed)
-    return np.stack([_picture(x, y, shape, 1 / scale, noise, draw) for shape in _shapes(motion)])
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    x, y, draw = columns + 0.5 + CORNER[0], rows + 0.5 + CORNER[1], np.random.default_rng(seed)
+    return np.stack([_picture(x, y, shape, 1, noise, draw) for shape in _shapes(motion)])
 
 
 def toy_chin_px(motion: Motion) -> Array:
     """Return how far the tip of the toy's chin is below its eyes, px of the face [shape=(T,)]."""
     return CHIN_PX + CHIN_DROP_PX * np.asarray(motion["opening"], np.float64)
-
-
-def toy_footage_pictures(sentences: int = 4, scale: int = 1) -> FootagePictures:
-    """Return pictures of the lower face in toy sentences, at 25 frames a second, with motion and sound.
-
-    scale : samples a pixel of the finer pictures
-    Raises InputError: fewer than three sentences.
-    """
-    return _footage_pictures(toy_sentences(sentences), scale)
 
 
 def toy_places(frames: int, rate_hz: float = CAMERA_HZ) -> Array:
@@ -109,41 +95,33 @@ def toy_frames(motion: Motion, places: Array, *, noise: float = NOISE, seed: int
         yield _picture(position[..., 0], position[..., 1], shape, 1 / SCALE, noise, draw)
 
 
-def toy_face(sentences: int = 4, scale: int = 1, *, corpus: str = "toy", rate_hz: float = CAMERA_HZ) -> FilmedFace:
-    """Return the face of the toy person, learned from toy sentences in a second or two.
-
-    scale   : samples a pixel
-    corpus  : name of the corpus that it was learned from; a model of the toy corpus has ``toy``, if that is its folder
-    rate_hz : frame rate of the background
-    Raises InputError: fewer than three sentences, or a rate that is not positive.
-    """
-    if not rate_hz > 0:
-        raise InputError(f"a background of {rate_hz} frames a second, required more than 0")
+def toy_face(sentences: int = 4) -> FilmedFace:
+    """Return the face of the toy person, learned from toy sentences in a second or two."""
     spoken = toy_sentences(sentences)
-    count = round(BACKGROUND_S * rate_hz)
-    moved = toy_motion(spoken[0].units, rate_hz)
-    motion = Motion(moved.values[:count], rate_hz, moved.channels)
-    places = toy_places(count, rate_hz)
-    video = encode_video(toy_frames(motion, places), rate_hz)
+    count = round(BACKGROUND_S * CAMERA_HZ)
+    moved = toy_motion(spoken[0].units, CAMERA_HZ)
+    motion = Motion(moved.values[:count], CAMERA_HZ, moved.channels)
+    places = toy_places(count)
+    video = encode_video(toy_frames(motion, places), CAMERA_HZ)
     takes = tuple(_take(sentence) for sentence in spoken[:2])
-    about = {"name": "toy", "corpus": [corpus], "speaker": "", "licence": ["synthesised by lipmotion"]}
-    appearance = learn_appearance(_footage_pictures(spoken, scale))
+    about = {"name": "toy", "corpus": ["toy"], "speaker": "", "licence": ["synthesised by lipmotion"]}
+    appearance = learn_appearance(toy_footage_pictures(sentences))
     return FilmedFace(appearance, StoredBackground(video, places, toy_chin_px(motion)), takes, about)
 
 
-def _footage_pictures(spoken: Sequence[ToySentence], scale: int) -> FootagePictures:
+def toy_footage_pictures(sentences: int = 4) -> FootagePictures:
+    """Return pictures of the lower face in toy sentences, at 25 frames a second, with motion and sound."""
+    spoken = toy_sentences(sentences)
     motions = [toy_motion(sentence.units, CAMERA_HZ) for sentence in spoken]
     clips = tuple(toy_lower_faces(motion, seed=number) for number, motion in enumerate(motions))
     values = np.concatenate([motion.values for motion in motions])
     whole = Motion(values, CAMERA_HZ, motions[0].channels)
 
     def finer(frames: NDArray[np.intp]) -> Pictures:
-        return toy_lower_faces(Motion(values[frames], CAMERA_HZ, whole.channels), scale, seed=1000)
+        return toy_lower_faces(Motion(values[frames], CAMERA_HZ, whole.channels), seed=1000)
 
     levels = [_levels(sentence, len(motion.values)) for sentence, motion in zip(spoken, motions, strict=True)]
-    return FootagePictures(
-        clips, values, whole.channels, np.concatenate(levels), toy_chin_px(whole), SHAPE, scale, finer
-    )
+    return FootagePictures(clips, values, whole.channels, np.concatenate(levels), toy_chin_px(whole), SHAPE, 1, finer)
 
 
 def _take(sentence: ToySentence) -> SpokenTake:

@@ -1,8 +1,6 @@
-"""Clients that let a server wait: they are closed, and the others are served."""
-
-from __future__ import annotations
-
+import asyncio
 import socket
+import sqlite3
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -11,6 +9,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+
+from lipmotion.errors import ExportError, InputError
 
 uvicorn = pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
@@ -21,6 +21,7 @@ from starlette.routing import Route  # noqa: E402
 
 from lipmotion_studio.web import connections  # noqa: E402
 from lipmotion_studio.web.listening import open_socket  # noqa: E402
+from lipmotion_studio.web.replies import ERRORS  # noqa: E402
 
 LARGE, SMALL = 1 << 26, b"small"
 PATIENCE_S = 60.0
@@ -95,7 +96,7 @@ def is_closed(client: socket.socket) -> bool:
     ],
     ids=["nothing", "a letter", "no end", "half a header", "half a second request", "no body"],
 )
-def test_who_does_not_end_a_request_is_closed(port: int, sent: bytes) -> None:
+def test_who_does_not_end_a_request_is_closed(port, sent):
     with connected(port) as client:
         client.sendall(sent)
         if sent.endswith(b"9\r\n\r\n"):
@@ -104,7 +105,7 @@ def test_who_does_not_end_a_request_is_closed(port: int, sent: bytes) -> None:
         assert is_closed(client)
 
 
-def test_a_request_that_comes_drop_by_drop_is_closed(port: int) -> None:
+def test_a_request_that_comes_drop_by_drop_is_closed(port):
     """Each drop does not begin the time anew."""
     with connected(port) as client:
         client.sendall(ASKED)
@@ -112,7 +113,7 @@ def test_a_request_that_comes_drop_by_drop_is_closed(port: int) -> None:
             send_drops(client)
 
 
-def test_who_does_not_take_a_reply_is_closed(port: int) -> None:
+def test_who_does_not_take_a_reply_is_closed(port):
     with socket.socket() as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.settimeout(PATIENCE_S)
@@ -128,7 +129,7 @@ def test_who_does_not_take_a_reply_is_closed(port: int) -> None:
         assert 0 < taken < LARGE
 
 
-def test_many_connections_without_a_request_leave_room(port: int) -> None:
+def test_many_connections_without_a_request_leave_room(port):
     """The client that asks is served, over one connection and over new ones; the oldest without a request go."""
     with ExitStack() as stack, connected(port) as client:
         for _ in range(12):
@@ -161,9 +162,7 @@ class Clock:
 
 
 @pytest.mark.parametrize(("bytes_s", "is_served"), [(100, False), (3000, False), (50_000, True), (5_000_000, True)])
-def test_who_takes_a_reply_drop_by_drop_is_closed(
-    bytes_s: int, is_served: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_takes_a_reply_drop_by_drop_is_closed(bytes_s, is_served, monkeypatch):
     """A part of 64 KB is written whenever the one before is nearly taken, each sooner than what stands still may be."""
     monkeypatch.setattr(connections, "STALLED_S", 30.0)
     clock: Any = Clock()
@@ -186,3 +185,11 @@ def test_who_takes_a_reply_drop_by_drop_is_closed(
         if not is_paused:
             client.resume_writing()
     assert bool(ended) != is_served
+
+
+@pytest.mark.parametrize("kind", [ExportError, OSError, MemoryError, sqlite3.OperationalError, InputError])
+def test_a_full_disk_or_memory_is_a_refusal_that_says_nothing_of_the_machine(kind):
+    handler = next(ERRORS[each] for each in kind.__mro__ if each in ERRORS)
+    reply = asyncio.run(handler(None, kind("/home/ann: no space left")))  # type: ignore[arg-type]
+    assert reply.status_code == (422 if kind is InputError else 503)
+    assert (b"/home" in reply.body) == (kind is InputError)

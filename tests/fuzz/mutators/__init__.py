@@ -1,7 +1,5 @@
 """Mutations of inputs: of their bytes, and of formats."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import PurePosixPath
 from random import Random

@@ -1,7 +1,5 @@
 """Mutations of ``.npy`` files: of the header, and of the values."""
 
-from __future__ import annotations
-
 import io
 from random import Random
 from typing import Any
@@ -36,14 +34,9 @@ def _head(chance: Random, content: bytes) -> bytes:
     entry = chance.choice((b"'descr': ", b"'shape': ", b"'fortran_order': ", b"{", b"}"))
     shape = ", ".join(str(chance.choice(SHAPES)) for _ in range(chance.choice((0, 1, 1, 2, 2, 3, 40))))
     values = (
-        f"'{chance.choice(TYPES)}'",
-        f"({shape},)",
-        f"({shape})",
-        "True",
-        "[('a', '<f8'), ('b', '<i4')]",
-        "None",
+        f"'{chance.choice(TYPES)}'", f"({shape},)", f"({shape})", "True", "[('a', '<f8'), ('b', '<i4')]", "None",
         "-" * 500,
-    )
+    )  # fmt: skip
     before, found, after = head.partition(entry)
     changed = before + found + chance.choice(values).encode() + (b", " + after.partition(b", ")[2] if found else b"")
     new = chance.choice((changed, changed, raw.change(chance, head)))

@@ -1,7 +1,5 @@
 """JSON inside files: of text, of glTF's binary container, and of archives; and every hostile value in every place."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable, Iterator
@@ -19,13 +17,8 @@ HOSTILE = (
     *("1" + "0" * 30, "-1" + "0" * 30, "1" + "0" * 400, "9" * 5000, "4294967296", "9007199254740993", "1e9"),
     *('""', '"0"', '"' + "x" * 3000 + '"', '"\\ud800"', '"../../x"', '"\\u0000"', '"data:;base64,AAAA"', '"head.glb"'),
     *("[]", "[0]", "[-1]", "[null]", "[[0]]", "{}", '{"": null}', '{"a": 1, "a": 2}', "[" + "0," * 1000 + "0]"),
-    *(
-        "[" * NESTING + "]" * NESTING,
-        '{"a":' * NESTING + "0" + "}" * NESTING,
-        "[" * 100_000,
-        "[{}]",
-        "[[[0, 0], 1e308]]",
-    ),
+    *("[" * NESTING + "]" * NESTING, '{"a":' * NESTING + "0" + "}" * NESTING, "[" * 100_000),
+    *("[{}]", "[[[0, 0], 1e308]]"),
 )
 """Values as JSON spells them, and some that it does not."""
 OTHER_PARTS = 3

@@ -1,7 +1,5 @@
 """Mutations of JSON documents: other types, huge numbers, NaN, deep nesting, repeated keys."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from copy import deepcopy
@@ -11,23 +9,8 @@ from typing import Any
 from fuzz.mutators import raw, text
 
 NUMBERS = (
-    0,
-    -1,
-    1,
-    2,
-    -0.0,
-    0.5,
-    1e-320,
-    1e12,
-    1e300,
-    -1e300,
-    10**400,
-    2**53,
-    2**63,
-    float("nan"),
-    float("inf"),
-    -1e-9,
-)
+    0, -1, 1, 2, -0.0, 0.5, 1e-320, 1e12, 1e300, -1e300, 10**400, 2**53, 2**63, float("nan"), float("inf"), -1e-9,
+)  # fmt: skip
 VALUES: tuple[Any, ...] = (*NUMBERS, *NUMBERS, None, True, False, "", "0", "é\ud800", [], {}, [[]], [None], {"": None})
 NESTING = 100_000
 """Nested brackets; Python's own limit is far lower."""

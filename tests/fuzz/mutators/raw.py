@@ -1,7 +1,5 @@
 """Mutations of bytes, whatever the format."""
 
-from __future__ import annotations
-
 import struct
 from random import Random
 

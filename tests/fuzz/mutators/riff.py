@@ -1,7 +1,5 @@
 """Mutations of WAV and AVI files: chunks, their sizes and order, and the fields of the format."""
 
-from __future__ import annotations
-
 import struct
 from random import Random
 
@@ -9,13 +7,8 @@ from fuzz.mutators import raw
 
 Chunk = tuple[bytes, bytes]
 FIELDS = {
-    "tag": (0, "H"),
-    "channels": (2, "H"),
-    "rate": (4, "I"),
-    "bytes": (8, "I"),
-    "align": (12, "H"),
-    "bits": (14, "H"),
-}
+    "tag": (0, "H"), "channels": (2, "H"), "rate": (4, "I"), "bytes": (8, "I"), "align": (12, "H"), "bits": (14, "H"),
+}  # fmt: skip
 VALUES = (0, 1, 2, 3, 6, 7, 8, 11, 16, 24, 32, 64, 255, 4000, 8000, 44_100, 65_534, 10**6, 2**31, 2**32 - 1)
 
 

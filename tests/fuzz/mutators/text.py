@@ -1,7 +1,5 @@
 """Mutations of text: lines, words, numbers, characters and encodings."""
 
-from __future__ import annotations
-
 import re
 from random import Random
 
@@ -15,24 +13,10 @@ WORDS = (
     *("", "#", "=", ";", '"', "'", "\\", "//", "..", "../../x", "a/b", "/etc/passwd", "C:\\x", "~", "*", "%s", "{0}"),
     *("\x00", "\x1b[2J", "\x1b]52;c;eA==\x07", "\r", "\x85", "\u2028", "\ufeff", "\u202e", "\ud7ff", "e\u0301" * 30),
     *(
-        "ﬁ",
-        "İ",
-        "ß",
-        "ǆ",
-        "中文",
-        "😀",
-        "\U0010ffff",
-        "zzz",
-        "sil",
-        "SP",
-        "AH0",
-        "p",
-        "x" * 3000,
-        "don't",
-        "''",
+        "ﬁ", "İ", "ß", "ǆ", "中文", "😀", "\U0010ffff", "zzz", "sil", "SP", "AH0", "p", "x" * 3000, "don't", "''",
         "=1+1",
     ),
-)
+)  # fmt: skip
 POWERS = (2,) * 4 + (3,) * 4 + (4, 4, 5, 6)
 """Numbers of repetitions, as powers of ten."""
 BREAKS = ("\r\n", "\r", "\n\n", "\x0b", "\u2028", "\t", ",", ";", " ", "")

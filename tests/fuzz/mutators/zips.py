@@ -1,7 +1,5 @@
 """Mutations of zip files: members are changed with correct checksums, removed, doubled, renamed or added."""
 
-from __future__ import annotations
-
 import io
 import warnings
 import zipfile
@@ -30,7 +28,6 @@ def members_of(content: bytes) -> list[Member]:
 
 
 def zipped(members: list[Member], method: int) -> bytes:
-    """Return the content of a zip file."""
     stream = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(stream, "w", method) as file:
         warnings.simplefilter("ignore")  # names that come twice

@@ -1,7 +1,3 @@
-"""The fuzzed readers by name."""
-
-from __future__ import annotations
-
 from fuzz.inputs import Reader
 from fuzz.readers import (
     audio,

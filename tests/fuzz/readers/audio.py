@@ -1,7 +1,5 @@
 """Recordings and their acoustic features."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Characters: glTF with everything that is read of it, OBJ, tables of lip points and weights, bindings, rig tables."""
 
-from __future__ import annotations
-
 import io
 import json
 import tempfile

@@ -1,7 +1,5 @@
 """Prepared corpora."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from dataclasses import replace
@@ -13,11 +11,12 @@ from fuzz.inputs import Files, Good, picked_up
 from fuzz.readers.plausible import check_motion, require
 from lipmotion import Corpus
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.types import Audio, Motion, Timeline, Track, Utterance
+from lipmotion.types import Audio, Motion, Span, Timeline, Track, Unit, Utterance
 
 SAMPLES, FRAMES = 8000, 13
 PIXELS = (4, 6, 3)
 AGES_S = 1e11
+PHONES = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 0.5, Unit("b"))))
 
 
 def seeds(good: Good) -> list[Files]:
@@ -25,7 +24,7 @@ def seeds(good: Good) -> list[Files]:
     corpus = Corpus.open(good.corpus)
     small = _half_a_second(corpus.utterance(corpus.names()[0]))
     track = replace(small.track, crops=np.zeros((FRAMES, *PIXELS), np.uint8))
-    labelled = replace(small, speaker="anna", phones=_phones(), track=track)
+    labelled = replace(small, speaker="anna", phones=PHONES, track=track)
     return [_corpus(labelled), _corpus(small), _without_checksums(_corpus(small))]
 
 
@@ -42,12 +41,6 @@ def _half_a_second(utterance: Utterance) -> Utterance:
     motion = utterance.track.motion
     short = Motion(motion.values[:FRAMES], motion.rate_hz, motion.channels)
     return replace(utterance, audio=audio, features=analysed(audio).mfcc(), track=Track(short, np.ones(FRAMES, bool)))
-
-
-def _phones() -> Timeline:
-    from lipmotion.types import Span, Unit
-
-    return Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 0.5, Unit("b"))))
 
 
 def _corpus(utterance: Utterance) -> Files:

@@ -1,7 +1,5 @@
 """Motion that is supplied beside recordings: tables, documents, plain arrays."""
 
-from __future__ import annotations
-
 import io
 import json
 import tempfile

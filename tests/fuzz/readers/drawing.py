@@ -1,7 +1,5 @@
 """Drawings in layers, and folders of drawings, as characters of the user's own."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

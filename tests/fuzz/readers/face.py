@@ -1,7 +1,5 @@
 """Filmed faces, and frames that are made with them."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Files beside recordings: labels, subtitles, what recognisers write, word times, and the lists of the splits."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

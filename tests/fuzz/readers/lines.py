@@ -1,7 +1,5 @@
 """Lists of recordings for ``batch``, and the ledger and the marks that an earlier batch left."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Plausibility checks of results, and short speech for them."""
 
-from __future__ import annotations
-
 import json
 import math
 import tempfile
@@ -25,14 +23,12 @@ SHORT = slice(6000, 18_000)
 
 
 def require(holds: bool, text: str) -> None:
-    """Raise ImplausibleError unless a condition holds."""
     if not holds:
         raise ImplausibleError(text)
 
 
 @cache
 def short_speech(good: Good) -> Audio:
-    """Return 0.75 seconds of speech."""
     corpus = Corpus.open(good.corpus)
     audio = corpus.utterance(corpus.names()[0]).audio
     return Audio(audio.samples[SHORT].copy(), audio.rate_hz)
@@ -40,7 +36,6 @@ def short_speech(good: Good) -> Audio:
 
 @cache
 def good_model(good: Good) -> Model:
-    """Return the model of the default engine."""
     return load_model(good.models[0])
 
 
@@ -60,8 +55,8 @@ def check_generation(result: Generation) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.json"
         write(result, [path])
-        json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse)
+        json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse_constant)
 
 
-def _refuse(name: str) -> Any:
-    raise ImplausibleError(f"{name} in a file that was written")
+def refuse_constant(name: str) -> Any:
+    raise ImplausibleError(f"{name} in what was written")

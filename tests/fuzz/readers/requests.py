@@ -1,7 +1,5 @@
 """Bodies and queries of requests to the studio and to a study, which reply with JSON that every program reads."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from contextlib import ExitStack
@@ -10,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import good_model, require, short_speech
+from fuzz.readers.plausible import good_model, refuse_constant, require, short_speech
 from lipmotion.formats.sound import write_sound
 from lipmotion_studio.requests import TOKEN_HEADER
 from lipmotion_studio.study.application import study_application
@@ -66,11 +64,7 @@ def read(folder: Path, good: Good) -> None:
     reply = ask(application, address, body, headers=headers, token="" if headers else token)
     require(reply.status < 500 or reply.status == 503, f"the status {reply.status}")
     if reply.headers.get("content-type", "").startswith("application/json"):
-        json.loads(reply.body.decode("utf-8"), parse_constant=_refuse)
-
-
-def _refuse(name: str) -> Any:
-    require(False, f"{name} in a reply")
+        json.loads(reply.body.decode("utf-8"), parse_constant=refuse_constant)
 
 
 @cache

@@ -1,7 +1,5 @@
 """Jobs, edits, projects, studies and answers, votes, and what is stored of training: all that people may write."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from dataclasses import replace

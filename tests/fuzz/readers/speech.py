@@ -1,7 +1,5 @@
 """Readers of speech: models, phones, lexicons, transcripts, and the motion generated with them."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from pathlib import Path

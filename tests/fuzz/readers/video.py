@@ -1,7 +1,5 @@
 """Videos: their pictures, and the nominal frame rate."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 from fractions import Fraction

@@ -1,7 +1,3 @@
-"""The ledger: what is known of lines after a kill at any moment."""
-
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -40,14 +36,9 @@ DIGEST = hashlib.sha256(CONTENT).hexdigest()
 def record_of(line: BatchLine, run: str = "old") -> Record:
     inputs = [vars(each) for each in input_files(line)]
     return {
-        "name": line.name,
-        "recording": line.recording,
-        "run": run,
-        "fingerprint": fingerprint_line(line, "settings"),
-        "outcome": DONE,
-        "inputs": inputs,
-        "outputs": {f"{line.name}.json": DIGEST},
-    }
+        "name": line.name, "recording": line.recording, "run": run, "fingerprint": fingerprint_line(line, "settings"),
+        "outcome": DONE, "inputs": inputs, "outputs": {f"{line.name}.json": DIGEST},
+    }  # fmt: skip
 
 
 @pytest.fixture
@@ -66,7 +57,7 @@ def written(out: Path) -> list[str]:
     return [json.loads(row)["name"] for row in (out / "batch.jsonl").read_bytes().splitlines()]
 
 
-def test_a_line_is_kept_while_nothing_changes(line: BatchLine, out: Path) -> None:
+def test_a_line_is_kept_while_nothing_changes(line, out):
     (out / "a.json").write_bytes(CONTENT)
     with open_ledger(Place(str(out), "1"), [line]) as ledger:
         assert ledger.kept(line, "settings", out) is None
@@ -87,7 +78,7 @@ def test_a_line_is_kept_while_nothing_changes(line: BatchLine, out: Path) -> Non
     assert sorted(path.name for path in out.iterdir()) == ["batch.jsonl"]
 
 
-def test_a_row_that_was_cut_is_removed(line: BatchLine, out: Path) -> None:
+def test_a_row_that_was_cut_is_removed(line, out):
     with open_ledger(Place(str(out), "1"), [line]) as ledger:
         ledger.append(record_of(line))
     whole = (out / "batch.jsonl").read_bytes()
@@ -141,9 +132,7 @@ def damaged(record: Record) -> dict[str, bytes]:
     }
 
 
-def test_damaged_rows_are_said_once_and_their_lines_done_again(
-    line: BatchLine, out: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_damaged_rows_are_said_once_and_their_lines_done_again(line, out, caplog):
     (out / "a.json").write_bytes(CONTENT)
     good = json.dumps(record_of(line)).encode() + b"\n"
     for what, row in damaged(record_of(line)).items():
@@ -163,7 +152,7 @@ def test_damaged_rows_are_said_once_and_their_lines_done_again(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links, pipes and devices as POSIX has them")
-def test_what_is_no_file_of_a_batch_is_refused(line: BatchLine, out: Path) -> None:
+def test_what_is_no_file_of_a_batch_is_refused(line, out):
     """A batch writes into its folder alone, and waits for nobody."""
     elsewhere = out.parent / "elsewhere"
     (elsewhere / "work").mkdir(parents=True)
@@ -187,7 +176,7 @@ def test_what_is_no_file_of_a_batch_is_refused(line: BatchLine, out: Path) -> No
 
 
 @pytest.mark.parametrize("in_place", [True, False])
-def test_killed_after_the_receipt(line: BatchLine, out: Path, in_place: bool) -> None:
+def test_killed_after_the_receipt(line, out, in_place):
     """Outputs that were renamed are entered into the ledger, once; others are forgotten."""
     old = Place(str(out), "old")
     old.receipt("a").parent.mkdir(parents=True)
@@ -201,7 +190,7 @@ def test_killed_after_the_receipt(line: BatchLine, out: Path, in_place: bool) ->
     assert written(out) == ["a"] * in_place
 
 
-def test_killed_after_the_ledger(line: BatchLine, out: Path) -> None:
+def test_killed_after_the_ledger(line, out):
     """A receipt that is in the ledger already is not entered twice."""
     place = Place(str(out), "old")
     (out / "a.json").write_bytes(CONTENT)
@@ -214,7 +203,7 @@ def test_killed_after_the_ledger(line: BatchLine, out: Path) -> None:
     assert written(out) == ["a"]
 
 
-def test_a_later_run_ends_the_earlier_one(out: Path) -> None:
+def test_a_later_run_ends_the_earlier_one(out):
     first, second = Place(str(out), "1"), Place(str(out), "2")
     with open_ledger(first, []):
         assert first.is_current()
@@ -225,7 +214,7 @@ def test_a_later_run_ends_the_earlier_one(out: Path) -> None:
         assert not first.is_current()
 
 
-def test_settings_have_a_fingerprint(tmp_path: Path) -> None:
+def test_settings_have_a_fingerprint(tmp_path):
     (tmp_path / "words.txt").write_text("a AH")
     plain = Job()
     assert fingerprint_job(plain) == fingerprint_job(Job())
@@ -247,7 +236,7 @@ def test_settings_have_a_fingerprint(tmp_path: Path) -> None:
     assert fingerprint_job(drawn) != before
 
 
-def test_a_line_without_the_recogniser_of_phones_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_line_without_the_recogniser_of_phones_is_another_one(monkeypatch):
     found = set()
     for name in ("hama", None):
         monkeypatch.setattr(settings, "installed_phone_recogniser", lambda name=name: name)
@@ -256,6 +245,6 @@ def test_a_line_without_the_recogniser_of_phones_is_another_one(monkeypatch: pyt
 
 
 @pytest.mark.parametrize("kinds", [(), ("wav",), ("json", "json"), ("cues.json5",), ("",)])
-def test_kinds_that_cannot_be_written(kinds: tuple[str, ...]) -> None:
+def test_kinds_that_cannot_be_written(kinds):
     with pytest.raises(ExportError, match=r"required some of: json, csv|given twice"):
         check_kinds(kinds)

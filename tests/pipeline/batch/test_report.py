@@ -1,7 +1,3 @@
-"""The report: doubtful lines first, nothing that a name says gets out of its field."""
-
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -42,7 +38,7 @@ GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 
         ({"motion": 0.3}, {"motion": 0.6}),
     ],
 )
-def test_what_is_doubtful(worse: dict, better: dict) -> None:
+def test_what_is_doubtful(worse, better):
     assert rate_doubt(GOOD | worse) > rate_doubt(GOOD | better)
     assert rate_doubt(GOOD) == pytest.approx(0)
 
@@ -51,7 +47,7 @@ def rows_of(page: str) -> list[list]:
     return json.loads(page.partition('id="data">')[2].partition("</script>")[0])
 
 
-def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
+def test_both_reports_hold_all_lines(tmp_path):
     hostile = "</script><b>=1+1\u202e,\"'\n"
     names = ["a", "b/c", "d"]
     lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
@@ -80,7 +76,7 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+a", "-a", "@a"])
-def test_no_text_is_a_formula(tmp_path: Path, name: str) -> None:
+def test_no_text_is_a_formula(tmp_path, name):
     lines = [BatchLine(name, f"/x/{name}.wav")]
     record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": name, "outputs": {f"{name}.json": "0"}}
     with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
@@ -94,7 +90,7 @@ def test_no_text_is_a_formula(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("recording", ["", "/\ud800.wav"])
-def test_a_recording_without_an_address_is_not_played(tmp_path: Path, recording: str) -> None:
+def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
     lines = [BatchLine("a", "/a.wav")]
     record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": "a", "outputs": {"a.json": "0"}}
     with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
@@ -103,14 +99,11 @@ def test_a_recording_without_an_address_is_not_played(tmp_path: Path, recording:
     assert rows_of(page.read_text(encoding="utf-8"))[0][COLUMNS.index("mark") + 2] is None
 
 
-def test_they_are_read_as_they_were_written(tmp_path: Path) -> None:
+def test_they_are_read_as_they_were_written(tmp_path):
     marks = {
-        "a": Mark("approve", "2026-01-01"),
-        "=1+1": Mark("redo"),
-        'b, "c"': Mark("redo", "-2"),
-        "'d": Mark(""),
+        "a": Mark("approve", "2026-01-01"), "=1+1": Mark("redo"), 'b, "c"': Mark("redo", "-2"), "'d": Mark(""),
         "'=e ": Mark(""),
-    }
+    }  # fmt: skip
     write_marks(tmp_path / "marks.csv", marks)
     assert "'=1+1," in (tmp_path / "marks.csv").read_text()
     assert read_marks(tmp_path / "marks.csv") == marks
@@ -125,18 +118,18 @@ def test_they_are_read_as_they_were_written(tmp_path: Path) -> None:
         ("", "no column 'name'"),
     ],
 )
-def test_what_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_what_is_refused(tmp_path, text, said):
     (tmp_path / "marks.csv").write_text(text)
     with pytest.raises(InputError, match=said):
         read_marks(tmp_path / "marks.csv")
 
 
-def test_later_marks_are_ahead_and_may_take_back() -> None:
+def test_later_marks_are_ahead_and_may_take_back():
     kept = {"a": Mark("approve"), "b": Mark("redo"), "c": Mark("approve")}
     assert merge_marks(kept, {"a": Mark("redo", "2"), "b": Mark("")}) == {"a": Mark("redo", "2"), "c": Mark("approve")}
 
 
-def test_a_line_is_due_once_for_each_mark() -> None:
+def test_a_line_is_due_once_for_each_mark():
     assert is_due(Mark("redo"), None)
     assert is_due(Mark("redo"), {})
     assert not is_due(Mark("redo"), {"redone": ""})

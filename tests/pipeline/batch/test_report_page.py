@@ -1,8 +1,3 @@
-"""The report in a real browser: it plays, keys mark lines, marks are saved, thousands of lines stay quick."""
-
-from __future__ import annotations
-
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,19 +11,14 @@ from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.pipeline.batch.report import Mark, read_marks, write_reports
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
-from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, axe_script, browser
+from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, browser, check_screens
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)]
 SCREENS = ((1200, 800, "light"), (1200, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
 LINES = 10_000
 FOUND = {
-    "outcome": "done",
-    "words": "transcript",
-    "confidence": 0.95,
-    "range_db": 41.5,
-    "duration_s": 0.5,
-    "seconds": 0.1,
-}
+    "outcome": "done", "words": "transcript", "confidence": 0.95, "range_db": 41.5, "duration_s": 0.5, "seconds": 0.1,
+}  # fmt: skip
 FOUND |= {"run": "1", "fingerprint": "f", "inputs": [], "closures_heard": 2, "closures_made": 2, "widest": 0.21}
 LIMIT_S = 60.0
 
@@ -62,21 +52,6 @@ def report(folder: Path, speech: Path, count: int, *, film: bool) -> Path:
         return write_reports(lines, ledger, out, {"act/line00001": Mark("approve", "before")})[1]
 
 
-def look(window: Browser, name: str) -> None:
-    """Check the page on every screen: no scrolling to the side, and nothing that axe-core finds."""
-    axe, folder = axe_script(), os.environ.get("LIPMOTION_SCREENS")
-    for width, height, scheme in SCREENS:
-        window.show_as(width, height, scheme, mobile=width < 600)
-        if folder:
-            window.picture(Path(folder) / f"{name}-{width}-{scheme}.png")
-        assert window.run("return document.documentElement.scrollWidth") <= width, (name, width)
-        if axe is not None:
-            window.run(axe)
-            found = window.run_until_done("const done = arguments[0]; axe.run().then(r => done(r.violations))")
-            assert [(each["id"], each["nodes"][0]["html"][:200]) for each in found] == [], (name, width, scheme)
-    window.show_as(*SCREENS[0])
-
-
 def chosen(window: Browser) -> str:
     return window.text("#name").partition(",")[0]
 
@@ -85,7 +60,7 @@ def until(window: Browser, script: str) -> None:
     wait_until(lambda: window.run(f"return {script}"), LIMIT_S)
 
 
-def test_ten_thousand_lines_are_heard_and_marked(window: Browser, toy_speech: Path, tmp_path: Path) -> None:
+def test_ten_thousand_lines_are_heard_and_marked(window, toy_speech, tmp_path):
     page = report(tmp_path, toy_speech, LINES, film=False)
     window.open(page.as_uri())
     assert "10000 of 10000 lines, 0 failed, 1 approved, 0 to redo" in window.text("#count")
@@ -96,7 +71,7 @@ def test_ten_thousand_lines_are_heard_and_marked(window: Browser, toy_speech: Pa
     window.press("a", "j", "a", "j", "r", "j", "j", "k")
     assert chosen(window) == "act/line00003"
     assert "1 approved, 1 to redo" in window.text("#count")
-    look(window, "lines")
+    check_screens(window, "lines", SCREENS)
     window.run("view.scrollTop = body.offsetHeight")
     until(window, "[...list.children].some(row => row.textContent.includes('line09999'))")
     window.open(page.as_uri())  # what is not saved is kept in the browser
@@ -110,7 +85,7 @@ def test_ten_thousand_lines_are_heard_and_marked(window: Browser, toy_speech: Pa
     assert window.problems() == []
 
 
-def test_videos_of_lines_are_seen(window: Browser, toy_speech: Path, tmp_path: Path) -> None:
+def test_videos_of_lines_are_seen(window, toy_speech, tmp_path):
     window.open(report(tmp_path, toy_speech, 6, film=True).as_uri())
     until(window, "list.querySelector('video').videoWidth === 160")
     window.press("j", SPACE)
@@ -120,5 +95,5 @@ def test_videos_of_lines_are_seen(window: Browser, toy_speech: Path, tmp_path: P
     assert chosen(window) == "act/line00004"
     window.run("document.getElementById('filter').value = ''; choose()")
     until(window, "[...list.querySelectorAll('video')].every(each => each.readyState >= 2)")
-    look(window, "videos")
+    check_screens(window, "videos", SCREENS)
     assert window.problems() == []

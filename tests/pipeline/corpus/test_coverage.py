@@ -1,7 +1,3 @@
-"""What a corpus has of the sounds of a text."""
-
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import replace
@@ -30,7 +26,7 @@ def format_moods(path: Path, *lines: str) -> Path:
     return path
 
 
-def test_counts_and_shares(tmp_path: Path) -> None:
+def test_counts_and_shares(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab")
     found = coverage(corpus, format_moods(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
     phones, diphones, triphones = found.kinds
@@ -48,7 +44,7 @@ def test_counts_and_shares(tmp_path: Path) -> None:
     assert {unit.unit for unit in triphones.missing} == {"sil-t-iy", "t-iy-b", "iy-b-sil", "aa-b-t", "b-t-iy"}
 
 
-def test_what_stands_in(tmp_path: Path) -> None:
+def test_what_stands_in(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
     lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
     phones, diphones, triphones = coverage(corpus, format_moods(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
@@ -63,7 +59,7 @@ def test_what_stands_in(tmp_path: Path) -> None:
     assert {unit.unit: unit.stand_in for unit in triphones.missing}["d-iy-m"] == "t-iy-b"
 
 
-def test_the_nearest_has_the_least_distance(tmp_path: Path, toy_corpus: Corpus) -> None:
+def test_the_nearest_has_the_least_distance(tmp_path, toy_corpus):
     """Recomputed one by one, in plain Python."""
     distances, number = phone_distances(), {phone: n for n, phone in enumerate(PHONES)}
     lexicon = Lexicon()
@@ -84,7 +80,7 @@ def test_the_nearest_has_the_least_distance(tmp_path: Path, toy_corpus: Corpus) 
         assert unit.recorded == recorded[chosen]
 
 
-def test_labelled_phones_count_and_silence_divides_them(tmp_path: Path) -> None:
+def test_labelled_phones_count_and_silence_divides_them(tmp_path):
     corpus = Corpus.create(tmp_path / "corpus")
     utterance = toy_utterances(3)[0]
     names = ["sil", "p", "aa", "sp", "b", "sil"]
@@ -97,14 +93,14 @@ def test_labelled_phones_count_and_silence_divides_them(tmp_path: Path) -> None:
     assert "p-aa" not in {unit.unit for unit in diphones.missing}
 
 
-def test_everything_is_covered(tmp_path: Path) -> None:
+def test_everything_is_covered(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab tib")
     found = coverage(corpus, format_moods(tmp_path / "text", "pab tib"), lexicon=WORDS)
     assert [(kind.covered, kind.missing) for kind in found.kinds] == [(5, ()), (7, ()), (6, ())]
     assert all(kind.share == pytest.approx(1) for kind in found.kinds)
 
 
-def test_sentences_of_the_package_and_what_is_not_counted(tmp_path: Path) -> None:
+def test_sentences_of_the_package_and_what_is_not_counted(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "see bob", "qwrtzx", None)
     found = coverage(corpus)
     assert (found.utterances, found.unknown, found.left_out) == (3, 2, {})
@@ -112,7 +108,7 @@ def test_sentences_of_the_package_and_what_is_not_counted(tmp_path: Path) -> Non
     assert found.kinds[0].share > found.kinds[1].share > found.kinds[2].share > 0
 
 
-def test_text_is_bounded_and_json_holds_everything(tmp_path: Path) -> None:
+def test_text_is_bounded_and_json_holds_everything(tmp_path):
     found = coverage(corpus_of(tmp_path / "corpus", "see bob"))
     lines = list(coverage_lines(found, 5))
     assert len(lines) == 4 + 3 * (2 + 5 + 1)

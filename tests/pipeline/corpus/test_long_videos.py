@@ -1,8 +1,5 @@
-"""One long video becomes a corpus; face tracking is replaced, but for the real recordings at the end."""
-
-from __future__ import annotations
-
 import shutil
+from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,21 +24,15 @@ SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]
 DURATION_S = 46.0
 
 
-def write_talk(path: Path, sentences: list[tuple[float, float]] | None = None) -> Path:
-    """Write a video with bursts of noise for sentences, in pictures of one grey."""
+def write_video(path: Path, images: Iterable, size: tuple[int, int], samples: np.ndarray, **how) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
-    draw = np.random.default_rng(0)
-    samples = 1e-3 * draw.normal(size=round(DURATION_S * RATE))
-    for start_s, end_s in SENTENCES if sentences is None else sentences:
-        part = slice(round(start_s * RATE), round(end_s * RATE))
-        samples[part] += 0.1 * draw.normal(size=len(samples[part]))
     with av.open(str(path), "w") as container:
-        pictures = container.add_stream("libx264", rate=25, options={"g": "50"})
-        pictures.width, pictures.height, pictures.pix_fmt = 64, 48, "yuv420p"
+        pictures = container.add_stream("libx264", rate=25, options=how)
+        pictures.width, pictures.height, pictures.pix_fmt = *size, "yuv420p"
         sound = container.add_stream("flac", rate=RATE)
         sound.layout = "mono"
-        for n in range(round(DURATION_S * 25)):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 90, np.uint8), format="rgb24")
+        for n, image in enumerate(images):
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
             frame.pts, frame.time_base = n, Fraction(1, 25)
             container.mux(pictures.encode(frame))
         whole = np.round(samples * 32767).astype(np.int16)
@@ -52,6 +43,17 @@ def write_talk(path: Path, sentences: list[tuple[float, float]] | None = None) -
         container.mux(pictures.encode())
         container.mux(sound.encode())
     return path
+
+
+def write_talk(path: Path, sentences: list[tuple[float, float]] | None = None) -> Path:
+    """Write a video with bursts of noise for sentences, in pictures of one grey."""
+    draw = np.random.default_rng(0)
+    samples = 1e-3 * draw.normal(size=round(DURATION_S * RATE))
+    for start_s, end_s in SENTENCES if sentences is None else sentences:
+        part = slice(round(start_s * RATE), round(end_s * RATE))
+        samples[part] += 0.1 * draw.normal(size=len(samples[part]))
+    grey = (np.full((48, 64, 3), 90, np.uint8) for _ in range(round(DURATION_S * 25)))
+    return write_video(path, grey, (64, 48), samples, g="50")
 
 
 @pytest.fixture(scope="module")
@@ -87,15 +89,13 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
     monkeypatch.setattr(long_videos, "scan_video", scan)
     monkeypatch.setattr(module, "track", track)
     monkeypatch.setattr(
-        module,
-        "make_tracker",
-        lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"}),
+        module, "make_tracker", lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
     )
     return told
 
 
 @pytest.mark.usefixtures("scanned")
-def test_a_long_video_is_divided_at_its_pauses(talk: Path, tmp_path: Path):
+def test_a_long_video_is_divided_at_its_pauses(talk, tmp_path):
     report = prepare(talk.parent, tmp_path / "corpus", workers=1)
     assert len(report.prepared) == len(SENTENCES)
     assert report.prepared[0] == "talk-00h00m00.68s"
@@ -117,14 +117,14 @@ def test_a_long_video_is_divided_at_its_pauses(talk: Path, tmp_path: Path):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_it_is_kept_when_it_is_prepared_again(talk: Path, tmp_path: Path):
+def test_it_is_kept_when_it_is_prepared_again(talk, tmp_path):
     prepare(talk, tmp_path / "corpus", workers=1)
     again = prepare(talk, tmp_path / "corpus", workers=1)
     assert again.counts == {"prepared": 0, "kept": 10, "skipped": 0}
 
 
 @pytest.mark.usefixtures("scanned")
-def test_words_come_from_the_lines_in_time(talk: Path, tmp_path: Path):
+def test_words_come_from_the_lines_in_time(talk, tmp_path):
     lines = [f"{start_s}\t{end_s}\tSentence {n}." for n, (start_s, end_s) in enumerate(SENTENCES[:5])]
     talk.with_suffix(".txt").write_text("\n".join(lines))
     corpus = Corpus.open(prepare(talk, tmp_path / "corpus", workers=1).corpus)
@@ -133,14 +133,14 @@ def test_words_come_from_the_lines_in_time(talk: Path, tmp_path: Path):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_words_without_times_are_told_to_be_of_no_use(talk: Path, tmp_path: Path, caplog):
+def test_words_without_times_are_told_to_be_of_no_use(talk, tmp_path, caplog):
     talk.with_suffix(".txt").write_text("all that is said")
     corpus = Corpus.open(prepare(talk, tmp_path / "corpus", workers=1).corpus)
     assert {corpus.utterance(name).words for name in corpus.names()} == {None}
     assert "its transcript has no times" in caplog.text
 
 
-def test_cuts_divide_and_the_person_is_followed(talk: Path, tmp_path: Path, scanned):
+def test_cuts_divide_and_the_person_is_followed(talk, tmp_path, scanned):
     scanned |= {"cuts_s": (2.4,), "person": (3.0,)}
     report = prepare(talk, tmp_path / "corpus", workers=1)
     assert report.prepared[:3] == ("talk-00h00m00.68s", "talk-00h00m02.40s", "talk-00h00m05.16s")
@@ -148,7 +148,7 @@ def test_cuts_divide_and_the_person_is_followed(talk: Path, tmp_path: Path, scan
 
 
 @pytest.mark.usefixtures("scanned")
-def test_lists_and_other_recordings_decide_the_splits(talk: Path, talk_file: Path, tmp_path: Path):
+def test_lists_and_other_recordings_decide_the_splits(talk, talk_file, tmp_path):
     (talk.parent / "test.txt").write_text("talk\n")
     corpus = Corpus.open(prepare(talk.parent, tmp_path / "listed", workers=1).corpus)
     assert {corpus.utterance(name).split for name in corpus.names()} == {"test"}
@@ -160,7 +160,7 @@ def test_lists_and_other_recordings_decide_the_splits(talk: Path, talk_file: Pat
 
 
 @pytest.mark.usefixtures("scanned")
-def test_silence_is_refused(tmp_path: Path):
+def test_silence_is_refused(tmp_path):
     silent = write_talk(tmp_path / "talks" / "talk.mkv", [])
     silent.with_suffix(".txt").write_text("100.0\t101.0\tafter the end\n")
     with pytest.raises(CorpusError, match=r"the first, talk: .*talk\.mkv: no speech in it"):
@@ -169,7 +169,7 @@ def test_silence_is_refused(tmp_path: Path):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_progress_is_reported(talk: Path, tmp_path: Path):
+def test_progress_is_reported(talk, tmp_path):
     seen: list[Progress] = []
     prepare(
         talk, tmp_path / "corpus", workers=1, monitor=lambda event: isinstance(event, Progress) and seen.append(event)
@@ -180,7 +180,7 @@ def test_progress_is_reported(talk: Path, tmp_path: Path):
     assert (shares[0], shares[-1]) == pytest.approx((0.0, 1.0))
 
 
-def test_a_short_video_is_one_utterance(monkeypatch, tmp_path: Path, talk: Path, scanned):
+def test_a_short_video_is_one_utterance(monkeypatch, tmp_path, talk, scanned):
     del scanned
     monkeypatch.setattr(long_videos, "LONG_S", 100.0)
     report = prepare(talk, tmp_path / "corpus", workers=1)
@@ -190,7 +190,7 @@ def test_a_short_video_is_one_utterance(monkeypatch, tmp_path: Path, talk: Path,
 
 @pytest.mark.video
 @pytest.mark.recordings
-def test_clips_one_after_the_other(recordings: Path, tmp_path: Path):
+def test_clips_one_after_the_other(recordings, tmp_path):
     """Eleven sentences of one speaker and one of another in one file: the other is left out, motion is as it was."""
     pytest.importorskip("mediapipe")
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[:11]
@@ -218,22 +218,9 @@ def joined(clips: list[Path], path: Path) -> None:
     """Write clips of 75 frames one after the other, with their sound."""
     from vision.variants import frames_of
 
-    with av.open(str(path), "w") as container:
-        pictures = container.add_stream("libx264", rate=25, options={"crf": "8"})
-        pictures.width, pictures.height, pictures.pix_fmt = 360, 288, "yuv420p"
-        sound = container.add_stream("flac", rate=RATE)
-        sound.layout = "mono"
-        for number, clip in enumerate(clips):
-            frames = frames_of(clip)[:75]
-            for n, image in enumerate(frames + frames[-1:] * (75 - len(frames))):
-                frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-                frame.pts, frame.time_base = 75 * number + n, Fraction(1, 25)
-                container.mux(pictures.encode(frame))
-            samples = np.round(read_audio(clip).samples[: 3 * RATE] * 32767).astype(np.int16)
-            samples = np.pad(samples, (0, 3 * RATE - len(samples)))
-            for at in range(0, len(samples), 4000):
-                block = av.AudioFrame.from_ndarray(samples[None, at : at + 4000], format="s16", layout="mono")
-                block.sample_rate, block.pts, block.time_base = RATE, 3 * RATE * number + at, Fraction(1, RATE)
-                container.mux(sound.encode(block))
-        container.mux(pictures.encode())
-        container.mux(sound.encode())
+    images, samples = [], np.zeros(3 * RATE * len(clips))
+    for number, clip in enumerate(clips):
+        frames, sound = frames_of(clip)[:75], read_audio(clip).samples[: 3 * RATE]
+        images += frames + frames[-1:] * (75 - len(frames))
+        samples[3 * RATE * number :][: len(sound)] = sound
+    write_video(path, images, (360, 288), samples, crf="8")

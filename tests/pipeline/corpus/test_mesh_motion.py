@@ -1,6 +1,3 @@
-from __future__ import annotations
-
-import wave
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +8,7 @@ from lipmotion.corpora.captured_faces import FLAME_MARKERS, FLAME_VERTICES, read
 from lipmotion.corpora.folder import discover
 from lipmotion.errors import InputError
 from meshes.flame import head
+from pipeline.made import write_noise
 
 RATE_HZ, MESHES = 60.0, 30
 
@@ -23,15 +21,11 @@ def write_sentence(folder: Path, person: str, sentence: str) -> np.ndarray:
         each.mkdir(parents=True, exist_ok=True)
     for number, lowered in enumerate(jaw, 1):
         (meshes / f"{sentence}.{number:06}.ply").write_bytes(head(lowered, "<"))
-    with wave.open(str(sound), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(22_000)
-        file.writeframes(np.random.default_rng(1).integers(-9000, 9000, 11_000).astype("<i2").tobytes())
+    write_noise(sound, 0.5, 1, 22_000)
     return jaw
 
 
-def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path: Path) -> None:
+def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path):
     for person in ("FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"):
         jaw = write_sentence(tmp_path / "voca", person, "sentence01")
     (tmp_path / "voca/audio/FaceTalk_170725_00137_TA/sentence01.txt").write_text("Hello there.")
@@ -54,7 +48,7 @@ def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.ptp(motion["y_152"]), np.ptp(jaw) / 90, atol=1e-6)
 
 
-def test_a_changed_mesh_prepares_again_and_a_missing_one_is_bridged(tmp_path: Path) -> None:
+def test_a_changed_mesh_prepares_again_and_a_missing_one_is_bridged(tmp_path):
     jaw = write_sentence(tmp_path / "voca", "anna", "s01")
     prepare(tmp_path / "voca", tmp_path / "corpus", workers=1)
     assert prepare(tmp_path / "voca", tmp_path / "corpus", workers=1).kept == ("anna-s01",)
@@ -67,14 +61,14 @@ def test_a_changed_mesh_prepares_again_and_a_missing_one_is_bridged(tmp_path: Pa
     np.testing.assert_allclose(opening, (1 + jaw) / 90, atol=1e-6)
 
 
-def test_bytes_in_either_order_and_text(tmp_path: Path) -> None:
+def test_bytes_in_either_order_and_text(tmp_path):
     for order in ("<", ">", ""):
         (tmp_path / "a.ply").write_bytes(head(4, order))
         places = read_vertices(tmp_path / "a.ply", [FLAME_MARKERS["LIP_14"]])
         np.testing.assert_allclose(places, [[0, -0.065, 0.03]], atol=1e-6)
 
 
-def test_other_meshes_are_refused(tmp_path: Path) -> None:
+def test_other_meshes_are_refused(tmp_path):
     good = head(0, "<")
     nan = np.float32(np.nan).tobytes() * 3 * FLAME_VERTICES
     for content, message in (
@@ -93,7 +87,7 @@ def test_other_meshes_are_refused(tmp_path: Path) -> None:
             read_mesh_motion(tmp_path / "a.1.ply", RATE_HZ)
 
 
-def test_only_the_two_folders_are_vocaset(tmp_path: Path) -> None:
+def test_only_the_two_folders_are_vocaset(tmp_path):
     (tmp_path / "audio" / "anna").mkdir(parents=True)
     (tmp_path / "audio" / "anna" / "a.wav").touch()
     (tmp_path / "audio" / "anna" / "a.csv").touch()

@@ -1,14 +1,10 @@
-from __future__ import annotations
-
 from itertools import permutations
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion import Corpus
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.prompts import cover_greedily, find_units, prompts
 from lipmotion.units import Lexicon
@@ -93,7 +89,7 @@ def test_a_text_of_ones_own(tmp_path):
     assert (with_lexicon.left_out, with_lexicon.sentences) == ({}, 4)
 
 
-def test_what_is_recorded_is_not_asked_for_again(toy_corpus: Corpus, tmp_path: Path):
+def test_what_is_recorded_is_not_asked_for_again(toy_corpus, tmp_path):
     path = tmp_path / "mine.txt"
     said = [" ".join(toy_corpus.utterance(name).words or ()) for name in toy_corpus.names()]
     path.write_text("\n".join([*said, "tea now"]))

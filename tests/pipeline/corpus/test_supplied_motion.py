@@ -1,7 +1,3 @@
-from __future__ import annotations
-
-import re
-import wave
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,23 +13,14 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.formats.base import write_motion
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.tables import SPEECH_CURVES
-from lipmotion.motion import acoustic_network, posterior_network
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
 from lipmotion_faces.corpus import prepare as module
 from lipmotion_faces.corpus.supplied import read_supplied_phones, read_supplied_track, source_digests
 from meshes.live_link_app import write_take
+from pipeline.made import write_noise
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
-
-
-def write_sound(path: Path, seconds: float = 2.0, seed: int = 0) -> None:
-    samples = np.random.default_rng(seed).integers(-9000, 9000, int(seconds * 16_000)).astype("<i2")
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(16_000)
-        file.writeframes(samples.tobytes())
 
 
 def write_curves(path: Path, seconds: float = 2.0, rate_hz: float = 60.0, seed: int = 0) -> Motion:
@@ -55,7 +42,7 @@ def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "studio"
     (folder / "anna").mkdir(parents=True)
     for seed, (name, suffix) in enumerate((("a", ".npz"), ("b", ".json"), ("anna/c", ".csv"))):
-        write_sound(folder / f"{name}.wav", seed=seed)
+        write_noise(folder / f"{name}.wav", 2.0, seed)
         write_curves(folder / f"{name}{suffix}", seed=seed)
     return folder
 
@@ -97,7 +84,7 @@ def test_another_content_is_prepared_again(studio, tmp_path):
 def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
     write_curves(studio / "b.json", rate_hz=60, seconds=1.2)
     (studio / "anna" / "c.csv").write_text("frame,jaw\n1,2\n")
-    write_sound(studio / "d.wav")
+    write_noise(studio / "d.wav", 2.0)
     write_curves(studio / "d.npz")
     (studio / "d.lab").write_text("0 10000000 t\n10000000 90000000 uw\n")
     report = prepare(studio, tmp_path / "corpus", workers=1)
@@ -147,7 +134,6 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
     labelled = spans(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
     duration_s = max(float(edges[-1]) + longer_s, 0.1)
     found = read_supplied_phones(recording(labelled), duration_s)
-    assert found is not None
     assert found[0].start_s == 0
     assert found[-1].end_s == pytest.approx(duration_s)
     assert all(a.end_s == b.start_s for a, b in zip(found, found.spans[1:], strict=False))
@@ -164,51 +150,6 @@ def test_labels_that_go_on_after_the_sound():
     assert read_supplied_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
 
 
-def cut_array(content: bytes, rows: int) -> bytes:
-    """Return the first rows of an array; its header stays as Python 2 wrote it."""
-    length = 10 + int.from_bytes(content[8:10], "little")
-    header = re.sub(rb"\(\d+", lambda shape: (b"(%d" % rows).rjust(len(shape[0])), content[:length])
-    return header + content[length : length + rows * 116 * 8]
-
-
-@pytest.mark.long
-@pytest.mark.recordings
-def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
-    monkeypatch.setattr(acoustic_network, "MIN_STEPS", 100)
-    monkeypatch.setattr(posterior_network, "STEPS", 6.0)
-    from lipmotion import animate, evaluate, load_model, save_model, train
-
-    folder = recordings / "facegood"
-    if not folder.is_dir():
-        pytest.skip("no FACEGOOD recordings")
-    faces, length_s = tmp_path / "faces", 15
-    faces.mkdir()
-    for path in folder.iterdir():
-        if path.suffix == ".wav":
-            with wave.open(str(path)) as full, wave.open(str(faces / path.name), "wb") as cut:
-                cut.setparams(full.getparams())
-                cut.writeframes(full.readframes(length_s * full.getframerate()))
-        elif path.name.startswith("bs_value_"):
-            (faces / path.name).write_bytes(cut_array(path.read_bytes(), 30 * length_s))
-        else:
-            (faces / path.name).symlink_to(path.resolve())
-    (faces / "test.txt").write_text("1114_2_02\n")
-    report = prepare(faces, tmp_path / "corpus", workers=1)
-    assert (len(report.prepared), report.failed) == (3, {})
-    corpus = Corpus.open(report.corpus)
-    save_model(train(corpus)[0], tmp_path / "faces.lipmotion")
-    model = load_model(tmp_path / "faces.lipmotion")
-    figures = evaluate(model, corpus)
-    rows = figures["conditions"]["audio only"]["channels"]
-    assert len(rows) + len(figures["still_channels"]) == 116
-    assert rows["mouth_stretch_c"]["acc"] > 0.7  # 0.79 was measured
-    result = animate(faces / "1114_2_02.wav", model=model).resampled(30.0)
-    assert result.motion.values.shape == (30 * length_s + 1, 116)
-    assert result.motion.values.min() >= 0
-    assert "FACEGOOD" in " ".join(model.about["attribution"])
-
-
 def test_a_source_is_not_touched(studio):
     item = replace(recording(spans((0, 1, "aa"))), motion_file=MotionFile(studio / "a.npz"))
     assert set(source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
@@ -222,12 +163,12 @@ def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
     values = np.random.default_rng(3).uniform(size=(120, 3))
     names = ("JawOpen", "MouthPucker", "EyeBlinkLeft")
     write_take(takes / "a.csv", Motion(values, 60.0, tuple(Channel(name, "weight") for name in names)))
-    write_sound(takes / "a.wav")
+    write_noise(takes / "a.wav", 2.0)
     places = np.random.default_rng(4).normal(0, 5, (240, 4, 3)) * [0, 0, 0]
     places[:, 0, 0], places[:, 1, 0] = 44, -44
     places[:, 2:] = np.random.default_rng(5).normal(0, 3, (240, 2, 3)) - [0, 70, -20]
     write_c3d(takes / "b.c3d", C3dFile(("EYE_L", "EYE_R", "LIP_13", "LIP_14"), places, 120.0))
-    write_sound(takes / "b.wav")
+    write_noise(takes / "b.wav", 2.0)
     assert prepare(takes, tmp_path / "corpus", workers=1).prepared == ("a", "b")
     corpus = Corpus.open(tmp_path / "corpus")
     taken, marked = (corpus.utterance(name).track.motion for name in "ab")

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from itertools import pairwise
@@ -63,7 +61,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     return made
 
 
-def test_each_collection_has_its_own(corpus: Corpus) -> None:
+def test_each_collection_has_its_own(corpus):
     found = offsets(corpus)
     assert set(found.clips) == set(corpus.names())
     assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
@@ -72,7 +70,7 @@ def test_each_collection_has_its_own(corpus: Corpus) -> None:
     assert "ms), by 4 clips together, which corpus sync removes; 4 tell alone: median +1" in found.lines()[1]
 
 
-def test_sync_moves_what_is_late_once(corpus: Corpus) -> None:
+def test_sync_moves_what_is_late_once(corpus):
     before = {name: corpus.utterance(name).audio.samples.copy() for name in corpus.names()}
     late_s = offsets(corpus).collections["there"].late_s
     moved = sync(corpus)
@@ -91,7 +89,7 @@ def test_sync_moves_what_is_late_once(corpus: Corpus) -> None:
     assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
 
 
-def test_early_sound_gets_a_beginning(corpus: Corpus) -> None:
+def test_early_sound_gets_a_beginning(corpus):
     late = corpus.utterance("here0")
     moved = module.move_sound(late, -0.1)
     assert moved.audio.duration_s == pytest.approx(late.audio.duration_s + 0.1)
@@ -99,7 +97,7 @@ def test_early_sound_gets_a_beginning(corpus: Corpus) -> None:
     assert float(moved.source["offset_removed_ms"]) == -100
 
 
-def test_labels_move_with_the_sound(corpus: Corpus) -> None:
+def test_labels_move_with_the_sound(corpus):
     bounds = [0.0, 0.4, 1.2, 3.0]
     spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
     for late_s, expected in ((0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])):
@@ -109,14 +107,14 @@ def test_labels_move_with_the_sound(corpus: Corpus) -> None:
         assert found[-1].end_s == pytest.approx(moved.audio.duration_s)
 
 
-def test_curves_without_lips_are_passed_over(corpus: Corpus) -> None:
+def test_curves_without_lips_are_passed_over(corpus):
     one = corpus.utterance("here0")
     jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
     corpus.add(replace(one, name="jaw", track=jaw))
     assert set(offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
 
 
-def test_lips_that_do_not_follow_are_left_alone(corpus: Corpus) -> None:
+def test_lips_that_do_not_follow_are_left_alone(corpus):
     names = [name for name in corpus.names() if name.startswith("there")]
     still = [corpus.utterance(name) for name in names]
     for name, other in zip(names, [*still[1:], still[0]], strict=True):
@@ -134,7 +132,7 @@ def test_lips_that_do_not_follow_are_left_alone(corpus: Corpus) -> None:
 @pytest.mark.video
 @pytest.mark.recordings
 @pytest.mark.parametrize("late_s", [-0.06, 0.13])
-def test_other_speakers_on_video(recordings: Path, tmp_path: Path, late_s: float) -> None:
+def test_other_speakers_on_video(recordings, tmp_path, late_s):
     pytest.importorskip("mediapipe")
     corpus = Corpus.create(tmp_path / "corpus")
     for path in sorted((recordings / "grid-others").glob("*.mpg")):

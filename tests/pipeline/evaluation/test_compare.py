@@ -1,7 +1,4 @@
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +25,7 @@ def moved(changed: Motion, channel: str, values: np.ndarray) -> Motion:
     return replace(changed, values=every)
 
 
-def test_figures_are_those_of_the_measures() -> None:
+def test_figures_are_those_of_the_measures():
     late = replace(SPEECH, values=0.5 * np.roll(SPEECH.values, 3, axis=0))
     (pair,) = compare(SPEECH, late)["others"]
     columns = [SPEECH.column(name) for name in pair["channels"]]
@@ -44,7 +41,7 @@ def test_figures_are_those_of_the_measures() -> None:
     assert pair["acc"] == pytest.approx(np.mean(curves.pooled_correlation(*sides)))
 
 
-def test_points_are_compared_in_millimetres() -> None:
+def test_points_are_compared_in_millimetres():
     shifted = moved(SPEECH, "x_13", SPEECH["x_13"] + 0.1)
     points = compare(SPEECH, shifted)["others"][0]["points"]
     assert points["lip_vertex_error_mm"] == pytest.approx(9)
@@ -52,7 +49,7 @@ def test_points_are_compared_in_millimetres() -> None:
     assert points["upper_face_deviation_mm"] is None
 
 
-def test_rates_and_lengths_are_brought_together_and_said() -> None:
+def test_rates_and_lengths_are_brought_together_and_said():
     half = Motion(SPEECH.values[: len(SPEECH.values) // 2], SPEECH.rate_hz, SPEECH.channels).resampled(25.0)
     (pair,) = compare(SPEECH, half)["others"]
     assert pair["rate_hz"] == 25.0
@@ -62,7 +59,7 @@ def test_rates_and_lengths_are_brought_together_and_said() -> None:
     assert pair["notes"][1].endswith("s are compared")
 
 
-def test_frames_without_a_face_are_left_out() -> None:
+def test_frames_without_a_face_are_left_out():
     values = np.array(SPEECH.values)
     values[10:15] = 100
     seen = np.ones(len(values), bool)
@@ -73,7 +70,7 @@ def test_frames_without_a_face_are_left_out() -> None:
     assert pair["notes"] == [f"5 of {len(values)} frames are left out: the face was not measured"]
 
 
-def test_blendshapes_are_found_however_they_are_spelt() -> None:
+def test_blendshapes_are_found_however_they_are_spelt():
     reference = weights("jawOpen", "browInnerUp", "mouthClose")
     other = weights("Face.JawOpen", "brow_inner_up")
     (pair,) = compare(reference, other)["others"]
@@ -88,7 +85,7 @@ def test_blendshapes_are_found_however_they_are_spelt() -> None:
     assert wanted > 0.05
 
 
-def test_what_does_not_move_is_named() -> None:
+def test_what_does_not_move_is_named():
     flat = moved(weights("jawOpen", "mouthClose"), "mouthClose", np.zeros(60))
     (pair,) = compare(flat, flat)["others"]
     assert pair["notes"] == ["left out, for they do not move in the reference: mouthClose"]
@@ -109,12 +106,12 @@ def test_what_does_not_move_is_named() -> None:
         ("a.bvh", "cannot read motion from '.bvh'"),
     ],
 )
-def test_what_cannot_be_compared(other: str | Motion, words: str) -> None:
+def test_what_cannot_be_compared(other, words):
     with pytest.raises(InputError, match=words):
         compare(weights("jawOpen"), other)
 
 
-def test_there_must_be_another() -> None:
+def test_there_must_be_another():
     with pytest.raises(InputError, match="give another motion file or video"):
         lipmotion.compare(SPEECH)
 
@@ -122,7 +119,7 @@ def test_there_must_be_another() -> None:
 @pytest.mark.long
 @pytest.mark.video
 @pytest.mark.recordings
-def test_videos_are_tracked(recordings: Path) -> None:
+def test_videos_are_tracked(recordings):
     pytest.importorskip("mediapipe")
     clip = min((recordings / "grid-others").glob("*.mpg"))
     (pair,) = compare(clip, clip)["others"]

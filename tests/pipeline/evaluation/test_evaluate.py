@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -17,18 +15,16 @@ from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generation import generate_for
-from lipmotion.speech.recognition.recogniser import NO_WEIGHT_SCORE, OWN_VOICE_SCORE, cached_recogniser
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.speaker_similarity import voice_knowledge
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.testing.toy import toy_motion, toy_sentences
-from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
+from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
 from lipmotion_lab.evaluation.evaluate import _was_trained_on, figures_of
-from lipmotion_lab.evaluation.held_out import (
-    AUDIO_ONLY,
-    ComparedClip,
-    load_held_out,
-    make_speech,
-)
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, load_held_out, make_speech
+from pipeline import made
 
 evaluate = partial(evaluated, recogniser="own")
 """The toy's voice is that of its model."""
@@ -82,14 +78,18 @@ def known() -> dict[float, Motion]:
     return {sentence.audio.duration_s: toy_motion(sentence.units, 100.0) for sentence in toy_sentences(12)}
 
 
-def test_a_voice_is_as_well_known_as_in_animation(toy_model: Model, toy_corpus: Corpus) -> None:
+def test_a_voice_is_as_well_known_as_in_animation(toy_model, toy_corpus):
     """Whatever engine recognises nothing itself generates the motion of strangers as such."""
-    phones = cached_recogniser(toy_model.phones, "own")
-    recordings = load_held_out(toy_corpus, phones, selection=Selection(split="val"), lexicon=Lexicon())
-    for score, voice in ((NO_WEIGHT_SCORE, 0.0), ((NO_WEIGHT_SCORE + OWN_VOICE_SCORE) / 2, 0.5), (0.0, 1.0)):
-        found = [replace(each, similarity=score) for each in recordings.recognitions]
-        speeches = make_speech(replace(recordings, recognitions=found), AUDIO_ONLY, Medium(None), {})
-        assert [speech.voice for speech in speeches] == pytest.approx([voice] * len(found))
+    heard = []
+    for less_similar in (0.0, 3.0, 20.0):
+        own = replace(toy_model.phones, typical_fit=toy_model.phones.typical_fit + less_similar, speaker=None)
+        recogniser = cached_recogniser(own, "own")
+        recordings = load_held_out(toy_corpus, recogniser, selection=Selection(split="val"), lexicon=Lexicon())
+        speeches = make_speech(recordings, AUDIO_ONLY, Medium(None), {})
+        heard.append([speech.voice for speech in speeches])
+        known = [voice_knowledge(own, analysed(each.audio)) for each in recordings.utterances]
+        assert heard[-1] == pytest.approx(known)
+    assert [1.0] * len(heard[0]) == heard[0] >= heard[1] > heard[2] == [0.0] * len(heard[0])
 
 
 @pytest.fixture(scope="module")
@@ -103,17 +103,14 @@ def perfect(toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) ->
 
 
 def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
-    corpus = Corpus.create(folder / "corpus")
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
+    return made.corpus_of(folder / "corpus", utterances)
 
 
 def held_out(corpus: Corpus) -> list[Utterance]:
     return [corpus.utterance(name) for name in corpus.names("test")]
 
 
-def test_all_figures_are_there(figures: dict[str, Any]) -> None:
+def test_all_figures_are_there(figures):
     assert (figures["split"], figures["clips"]) == ("test", 2)
     assert list(figures["conditions"]) == CONDITIONS
     for condition in figures["conditions"].values():
@@ -128,7 +125,7 @@ def test_all_figures_are_there(figures: dict[str, Any]) -> None:
         assert name in figures_table(figures)
 
 
-def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures: dict[str, Any]) -> None:
+def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures):
     for condition in figures["conditions"].values():
         assert condition["acc"] > 0.9
         for row in condition["channels"].values():
@@ -142,7 +139,7 @@ def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures: dict[str, A
         assert condition["silence"]["generated"]["mean"] < 0.01
 
 
-def test_a_perfect_model_has_perfect_figures(perfect: dict[str, Any]) -> None:
+def test_a_perfect_model_has_perfect_figures(perfect):
     for condition in perfect["conditions"].values():
         assert list(condition) == FIGURES  # an engine that pins nothing has no other figures
         for row in condition["channels"].values():
@@ -161,9 +158,7 @@ def test_a_perfect_model_has_perfect_figures(perfect: dict[str, Any]) -> None:
         assert condition["silence"]["generated"] == pytest.approx(condition["silence"]["original"], abs=1e-6)
 
 
-def test_figures_without_pins_are_those_of_the_engine_without_them(
-    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], perfect: dict[str, Any]
-) -> None:
+def test_figures_without_pins_are_those_of_the_engine_without_them(toy_model, toy_corpus, known, perfect):
     figures = evaluate(replace(toy_model, engine=Shut(None), learned=known), toy_corpus)
     for name, condition in figures["conditions"].items():
         assert condition["unpinned"] == perfect["conditions"][name]
@@ -173,7 +168,7 @@ def test_figures_without_pins_are_those_of_the_engine_without_them(
     assert "pin" not in figures_table(perfect)
 
 
-def test_a_late_model_is_late(toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) -> None:
+def test_a_late_model_is_late(toy_model, toy_corpus, known):
     for late in (-8, 4):
         shifted = {length: replace(m, values=np.roll(m.values, late, axis=0)) for length, m in known.items()}
         figures = evaluate(replace(toy_model, engine=Medium(None), learned=shifted), toy_corpus)
@@ -181,9 +176,7 @@ def test_a_late_model_is_late(toy_model: Model, toy_corpus: Corpus, known: dict[
         assert figures["conditions"]["audio only"]["closures"]["timing_ms"] == pytest.approx(10 * late, abs=20)
 
 
-def test_frames_without_a_face_are_left_out(
-    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
-) -> None:
+def test_frames_without_a_face_are_left_out(toy_model, toy_corpus, known, tmp_path):
     """What the tracker filled in where it saw nothing has no say."""
     damaged = []
     for utterance in held_out(toy_corpus):
@@ -197,7 +190,7 @@ def test_frames_without_a_face_are_left_out(
     assert figures["conditions"]["audio only"]["amse"] == pytest.approx(0, abs=1e-6)
 
 
-def test_closed_is_closed_by_the_training_list(toy_model: Model, toy_corpus: Corpus, figures: dict[str, Any]) -> None:
+def test_closed_is_closed_by_the_training_list(toy_model, toy_corpus, figures):
     openings = [toy_corpus.utterance(name).track.motion["opening"] for name in toy_corpus.names("train")]
     expected = pytest.approx(0.1 * np.percentile(np.concatenate(openings), 95), rel=1e-5)
     assert figures["closed_under"] == expected
@@ -206,7 +199,7 @@ def test_closed_is_closed_by_the_training_list(toy_model: Model, toy_corpus: Cor
 
 
 @pytest.mark.long
-def test_the_seed_decides(toy_model: Model, toy_corpus: Corpus) -> None:
+def test_the_seed_decides(toy_model, toy_corpus):
     one, two, other = (
         evaluate(toy_model, toy_corpus, selection=Selection(None), seed=seed)["conditions"]["audio only"]
         for seed in (1, 1, 2)
@@ -216,7 +209,7 @@ def test_the_seed_decides(toy_model: Model, toy_corpus: Corpus) -> None:
     assert one["channels"] == other["channels"]
 
 
-def test_without_transcripts_there_is_audio_only(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_without_transcripts_there_is_audio_only(toy_model, toy_corpus, tmp_path):
     first, second = held_out(toy_corpus)
     untold = corpus_of([replace(first, words=None), second], tmp_path)
     figures = evaluate(toy_model, untold)
@@ -224,9 +217,7 @@ def test_without_transcripts_there_is_audio_only(toy_model: Model, toy_corpus: C
     assert figures["without_words"] == 1
 
 
-def test_a_model_on_its_own_training_list_is_named(
-    toy_model: Model, toy_corpus: Corpus, figures: dict[str, Any]
-) -> None:
+def test_a_model_on_its_own_training_list_is_named(toy_model, toy_corpus, figures):
     training = [toy_corpus.utterance(toy_corpus.names("train")[0])]
     about = toy_model.about
     assert "seen_in_training" not in figures
@@ -238,7 +229,7 @@ def test_a_model_on_its_own_training_list_is_named(
     assert evaluate(toy_model, toy_corpus, selection=first)["seen_in_training"] is True
 
 
-def test_a_transcript_that_does_not_fit_is_named(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_a_transcript_that_does_not_fit_is_named(toy_model, toy_corpus, tmp_path):
     first, second = held_out(toy_corpus)
     wrong = corpus_of([first, replace(second, words=("five",) * 100)], tmp_path)
     with pytest.raises(AlignmentError, match=rf"{second.name}: .*too short.*correct its transcript, or leave it out"):
@@ -256,15 +247,7 @@ def renamed_utterance(utterance: Utterance) -> Utterance:
     return replace(utterance, track=replace(utterance.track, motion=renamed(utterance.track.motion)))
 
 
-def labelled(utterance: Utterance, names: dict[str, str]) -> Timeline[Unit]:
-    """The true phones of a toy utterance, some of them under other names."""
-    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
-    return Timeline(tuple(replace(s, label=Unit(names.get(s.label.phone, s.label.phone))) for s in units))
-
-
-def test_other_channels_than_lip_distances(
-    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
-) -> None:
+def test_other_channels_than_lip_distances(toy_model, toy_corpus, known, tmp_path):
     """Every channel that moves is compared, and what only an opening can tell is left out."""
     faces = corpus_of([renamed_utterance(u) for u in held_out(toy_corpus)], tmp_path)
     other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
@@ -281,9 +264,7 @@ def test_other_channels_than_lip_distances(
     assert "left out, for they do not move: brow, noise" in figures_table(figures)
 
 
-def test_a_model_of_other_motion_is_refused(
-    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
-) -> None:
+def test_a_model_of_other_motion_is_refused(toy_model, toy_corpus, known, tmp_path):
     first, second = held_out(toy_corpus)
     faces = corpus_of([renamed_utterance(first)], tmp_path)
     with pytest.raises(CorpusError, match="the model has no channels jaw, pout, which the corpus has"):
@@ -296,7 +277,7 @@ def test_a_model_of_other_motion_is_refused(
         evaluate(toy_model, faces)
 
 
-def test_motion_that_never_moves_is_refused(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_motion_that_never_moves_is_refused(toy_model, toy_corpus, tmp_path):
     frozen = [renamed_utterance(u) for u in held_out(toy_corpus)]
     motions = [replace(u.track.motion, values=np.ones_like(u.track.motion.values)) for u in frozen]
     frozen = [replace(u, track=replace(u.track, motion=m)) for u, m in zip(frozen, motions, strict=True)]
@@ -304,7 +285,7 @@ def test_motion_that_never_moves_is_refused(toy_model: Model, toy_corpus: Corpus
         evaluate(toy_model, corpus_of(frozen, tmp_path))
 
 
-def test_one_speaker(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_one_speaker(toy_model, toy_corpus, tmp_path):
     first, second = held_out(toy_corpus)
     both = corpus_of([replace(first, speaker="anna"), replace(second, speaker="ben")], tmp_path)
     alone = corpus_of([first], tmp_path / "alone")
@@ -313,9 +294,10 @@ def test_one_speaker(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> No
     assert one == evaluate(toy_model, alone)
 
 
-def test_labelled_phones_are_the_reference(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_labelled_phones_are_the_reference(toy_model, toy_corpus, tmp_path):
     """Labels that call the p, b and m something else: then there is nothing to close in."""
-    untold = [replace(u, words=None, phones=labelled(u, {"p": "t", "b": "d", "m": "n"})) for u in held_out(toy_corpus)]
+    names = {"p": "t", "b": "d", "m": "n"}
+    untold = [replace(u, words=None, phones=made.true_phones(u, names)) for u in held_out(toy_corpus)]
     figures = evaluate(toy_model, corpus_of(untold, tmp_path))
     assert list(figures["conditions"]) == CONDITIONS
     for condition in figures["conditions"].values():
@@ -325,7 +307,7 @@ def test_labelled_phones_are_the_reference(toy_model: Model, toy_corpus: Corpus,
     assert "recall – of 0" in figures_table(figures)
 
 
-def test_closings_elsewhere_are_counted_per_minute_of_other_speech() -> None:
+def test_closings_elsewhere_are_counted_per_minute_of_other_speech():
     """Twenty seconds of speech, half of them m; the lips close once outside of it, originally never."""
     time_s = np.arange(500) / 25
     original, generated = np.ones((500, 1)), np.ones((500, 1))
@@ -337,9 +319,7 @@ def test_closings_elsewhere_are_counted_per_minute_of_other_speech() -> None:
     assert (lips["false_per_minute"], lips["original_per_minute"]) == pytest.approx((6, 0))
 
 
-def test_guessed_words_are_reported_and_a_lexicon_gives_pronunciations(
-    toy_model: Model, toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_guessed_words_are_reported_and_a_lexicon_gives_pronunciations(toy_model, toy_corpus, tmp_path, caplog):
     names = {"papa": "pahpa", "mama": "日本"}
     changed = [replace(u, words=tuple(names.get(word, word) for word in u.words or ())) for u in held_out(toy_corpus)]
     lexicon = Lexicon({"日本": (("m", "aa", "m", "ax"),)})

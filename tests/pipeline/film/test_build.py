@@ -1,7 +1,3 @@
-"""A face built from videos of the drawn person, tracked without errors."""
-
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,7 +23,6 @@ Event = Progress | Item
 
 @pytest.fixture(scope="module")
 def videos(tmp_path_factory: pytest.TempPathFactory) -> Videos:
-    """About eight seconds."""
     folder = tmp_path_factory.mktemp("filmed") / "anna"
     folder.mkdir()
     found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]
@@ -60,16 +55,13 @@ def built(videos: Videos) -> tuple[FilmedFace, list[Event]]:
     return face, events
 
 
-def test_what_was_built(built: tuple[FilmedFace, list[Event]], videos: Videos, tmp_path: Path) -> None:
+def test_what_was_built(built, videos, tmp_path):
     face, _ = built
     frames = sum(len(video.motion.values) for video in videos.values())
     assert face.about == {
-        "name": "Anna",
-        "corpus": ["/".join(folder_of(videos).parts[-2:])],
-        "speaker": "",
-        "footage_s": round(frames / 25, 1),
-        "recordings": SENTENCES,
-    }
+        "name": "Anna", "corpus": ["/".join(folder_of(videos).parts[-2:])], "speaker": "",
+        "footage_s": round(frames / 25, 1), "recordings": SENTENCES,
+    }  # fmt: skip
     assert face.appearance.scale == 1
     assert set(face.appearance.from_motion.names) == {"opening", "width", "outer", "y_152"}  # no depth
     assert face.background.video.size == (288, 224)
@@ -78,7 +70,7 @@ def test_what_was_built(built: tuple[FilmedFace, list[Event]], videos: Videos, t
     assert load_face(tmp_path / "a.face").summary == face.summary
 
 
-def test_motion_becomes_the_person(built: tuple[FilmedFace, list[Event]]) -> None:
+def test_motion_becomes_the_person(built):
     face, _ = built
     take = face.takes[2]
     codes = face.appearance.predict_codes(take.motion)
@@ -89,7 +81,7 @@ def test_motion_becomes_the_person(built: tuple[FilmedFace, list[Event]]) -> Non
     assert codes.chin_px == pytest.approx(toy_chin_px(lips), abs=3)
 
 
-def test_progress_rises_to_the_end(built: tuple[FilmedFace, list[Event]]) -> None:
+def test_progress_rises_to_the_end(built):
     _, events = built
     progress = [event for event in events if isinstance(event, Progress)]
     assert len(progress) == len(events) == SENTENCES + 3
@@ -101,7 +93,7 @@ def test_progress_rises_to_the_end(built: tuple[FilmedFace, list[Event]]) -> Non
     assert [event.step for event in progress[:SENTENCES]] == list(range(1, SENTENCES + 1))
 
 
-def test_the_speech_is_kept_with_its_motion(built: tuple[FilmedFace, list[Event]]) -> None:
+def test_the_speech_is_kept_with_its_motion(built):
     face, _ = built
     for take, sentence in zip(face.takes, toy_sentences(SENTENCES), strict=True):
         assert take.sound.duration_s == pytest.approx(sentence.audio.duration_s, abs=0.1)
@@ -111,7 +103,7 @@ def test_the_speech_is_kept_with_its_motion(built: tuple[FilmedFace, list[Event]
 
 
 @pytest.mark.usefixtures("tracker")
-def test_short_footage_is_refused(videos: Videos) -> None:
+def test_short_footage_is_refused(videos):
     video = next(iter(videos))
     with pytest.raises(InputError) as caught:
         build_face(video, workers=1)
@@ -123,9 +115,7 @@ def test_short_footage_is_refused(videos: Videos) -> None:
 
 
 @pytest.mark.long
-def test_what_is_not_enough_is_said(
-    videos: Videos, tracker: Callable[..., None], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_not_enough_is_said(videos, tracker, caplog, monkeypatch):
     """Frames in which the face is not seen do not count."""
     half = {path: np.arange(200) % 2 == 0 for path in list(videos)[:1]}
     tracker(half)
@@ -144,7 +134,7 @@ def test_what_is_not_enough_is_said(
 
 @pytest.mark.long
 @pytest.mark.usefixtures("tracker")
-def test_recordings_that_cannot_be_used_are_left_out(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recordings_that_cannot_be_used_are_left_out(videos, monkeypatch):
     def film(path: Path, *more: object) -> object:
         if path.name == "toy00.mp4":
             raise InputError(f"{path}: no face in 60 of 60 frames")
@@ -164,7 +154,7 @@ def test_recordings_that_cannot_be_used_are_left_out(videos: Videos, monkeypatch
 
 
 @pytest.mark.long
-def test_footage_without_sound(tracker: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_footage_without_sound(tracker, tmp_path, monkeypatch):
     """The face is built; its jaw cannot follow the energy, and other people's motion cannot be mapped onto it."""
     monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 2.0)
     monkeypatch.setattr(build, "read_sound", lambda _: None)
@@ -179,9 +169,7 @@ def test_footage_without_sound(tracker: Callable[..., None], tmp_path: Path, mon
 
 
 @pytest.mark.long
-def test_fast_video_is_learned_from_in_part(
-    tracker: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fast_video_is_learned_from_in_part(tracker, tmp_path, monkeypatch):
     """Of 60 frames a second every second is enough; seconds are counted, not frames."""
     monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 2.0)
     video = write_video(tmp_path / "fast.mp4", toy_sentences(3)[0], 60.0)
@@ -194,7 +182,7 @@ def test_fast_video_is_learned_from_in_part(
     assert len(face.background.video) == len(video.motion.values)
 
 
-def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path: Path) -> None:
+def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path):
     """599 of 600 frames of 29.97 a second are 19.99 s: no take of 0 frames follows, which no file could hold."""
     rate_hz, count = 30_000 / 1001, 600
     channels = (Channel("opening"),)
@@ -214,7 +202,7 @@ def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path: Path) ->
     assert len(kept.motion.values) == 599
 
 
-def test_silence_is_no_sound(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_silence_is_no_sound(monkeypatch, tmp_path):
     take = Take("a", tmp_path / "a.mp4", VideoSpan(1.0, 3.0), "", "", ())
     for count, level, expected_s in ((64_000, 1.0, 2.0), (24_000, 1.0, 0.5), (8000, 1.0, 0.0), (64_000, 0.0, 0.0)):
         audio = Audio(np.full(count, level, np.float32), 16_000)

@@ -1,16 +1,13 @@
-"""Films: any motion of the person, at any rate, of any length, in any background."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import av
 import numpy as np
 import pytest
 
-from lipmotion import Model, animate, write
+from lipmotion import animate, write
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.pipeline.request import Outputs, Request
@@ -19,7 +16,7 @@ from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeli
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.film import filmed_video as module
 from lipmotion_faces.film.background import open_stored_background
-from lipmotion_faces.film.filmed_video import face_codes, make_film, write_film
+from lipmotion_faces.film.filmed_video import face_codes, is_person_of, make_film, person_shown, write_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptions
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -48,14 +45,13 @@ def dark(frames: list[np.ndarray]) -> np.ndarray:
 
 
 def pictures(path: Path) -> tuple[list[np.ndarray], Any, dict[str, str]]:
-    """Return the frames of a video, its frame rate, and its tags."""
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
         return frames, stream.average_rate, dict(container.metadata)
 
 
-def test_any_rate(filmed_face: FilmedFace, motion: Motion) -> None:
+def test_any_rate(filmed_face, motion):
     for fps in (None, 12.5, 30.0):
         film = make_film(filmed_face, motion, fps=fps)
         frames = list(film.frames)
@@ -69,7 +65,7 @@ def test_any_rate(filmed_face: FilmedFace, motion: Motion) -> None:
             make_film(filmed_face, motion, fps=fps)
 
 
-def test_speech_longer_and_shorter_than_the_background(filmed_face: FilmedFace, motion: Motion) -> None:
+def test_speech_longer_and_shorter_than_the_background(filmed_face, motion):
     frames = list(make_film(filmed_face, motion).frames)
     assert len(frames) == pytest.approx(len(motion.values) / 4, abs=1)
     assert len(frames) > len(filmed_face.background.video)
@@ -78,7 +74,7 @@ def test_speech_longer_and_shorter_than_the_background(filmed_face: FilmedFace, 
         assert len(list(make_film(filmed_face, short).frames)) == count
 
 
-def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion, toy_sentence: ToySentence) -> None:
+def test_the_jaw_follows_what_it_is_told(filmed_face, brief, toy_sentence):
     closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(brief.values), 1)), 100.0, brief.channels)
     sound = Audio(toy_sentence.audio.samples[16_000 * 4 // 10 :], 16_000)
     films = {
@@ -94,7 +90,7 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion,
         make_film(filmed_face, brief, options=Outputs(jaw="energy"))
 
 
-def test_lips_close_in_p_b_and_m(filmed_face: FilmedFace) -> None:
+def test_lips_close_in_p_b_and_m(filmed_face):
     """Also where the motion leaves them apart."""
     parted = toy_motion(Timeline((Span(0.0, 0.8, Unit("ax")),)), 100.0)
     said = Timeline((Span(0.0, 0.3, Unit("ax")), Span(0.3, 0.42, Unit("b")), Span(0.42, 0.8, Unit("ax"))))
@@ -103,7 +99,7 @@ def test_lips_close_in_p_b_and_m(filmed_face: FilmedFace) -> None:
     assert min(apart[8:10].min(), closed[4]) > 20
 
 
-def test_the_refinement_as_printed(filmed_face: FilmedFace, brief: Motion) -> None:
+def test_the_refinement_as_printed(filmed_face, brief):
     """Eqs. 14-16 of Xie & Liu 2007, colour by colour, of the mean of three pictures."""
     codes = face_codes(filmed_face, brief, Timeline(()), 5, 25.0)
     options = replace(AS_PRINTED, noise=False)
@@ -119,18 +115,23 @@ def test_the_refinement_as_printed(filmed_face: FilmedFace, brief: Motion) -> No
 
 
 @pytest.mark.long
-def test_sound_and_pictures_are_as_long(
-    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
-    write_film(tmp_path / "a.mp4", make_film(filmed_face, motion), toy_sentence.audio)
+def test_sound_and_pictures_are_as_long(filmed_face, motion, toy_sentence, tmp_path):
+    events: list[Progress | Item] = []
+    film = make_film(filmed_face, motion)
+    write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
     frames, rate, _ = pictures(tmp_path / "a.mp4")
     assert rate == 25
     assert len(frames) / 25 == pytest.approx(toy_sentence.audio.duration_s, abs=0.08)
     drawn = list(make_film(filmed_face, motion).frames)
     assert np.abs(np.stack(frames).astype(int) - np.stack(drawn)).mean() < 2
+    shares = [event.share for event in events if isinstance(event, Progress)]
+    assert len(shares) == len(events) > 2
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert {event.steps for event in events} == {film.count} == {len(frames)}
 
 
-def test_the_mark(filmed_face: FilmedFace, brief: Motion, tmp_path: Path) -> None:
+def test_the_mark(filmed_face, brief, tmp_path):
     path, sound = tmp_path / "a.mp4", Audio(np.zeros(16_000 * 8 // 10, np.float32), 16_000)
     plain = np.stack(list(make_film(filmed_face, brief).frames))[::10].astype(int)
     for mark in ("metadata", "visible", "none"):
@@ -143,9 +144,7 @@ def test_the_mark(filmed_face: FilmedFace, brief: Motion, tmp_path: Path) -> Non
         assert (corners.max() > 60) == (mark == "visible")
 
 
-def test_motion_that_the_face_cannot_show(
-    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
+def test_motion_that_the_face_cannot_show(filmed_face, motion, toy_sentence, tmp_path):
     blendshapes = Motion(motion.values, 100.0, tuple(Channel(name, "weight") for name in ("jawOpen", "a", "b")))
     with pytest.raises(InputError, match=r"no channel 'opening' \(3 of the 3 that this face needs are missing\)"):
         make_film(filmed_face, blendshapes)
@@ -158,35 +157,7 @@ def test_motion_that_the_face_cannot_show(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_speech: Path, tmp_path: Path) -> None:
-    words = "an overlay shows the video of the speech: give a video as speech, and no background"
-    for overlay in ("inset", "mouth"):
-        with pytest.raises(InputError, match=words):
-            make_film(filmed_face, motion, options=Outputs(overlay=overlay))
-        (tmp_path / "b.mp4").write_text("video")
-        both = Outputs(overlay=overlay, background=tmp_path / "b.mp4")
-        with pytest.raises(InputError, match=words):
-            make_film(filmed_face, motion, speech=toy_speech, options=both)
-        with pytest.raises(InputError, match="has no pictures, and an overlay shows them; give a video as speech"):
-            make_film(filmed_face, motion, speech=toy_speech, options=Outputs(overlay=overlay))
-
-
-@pytest.mark.long
-def test_progress_is_that_of_the_frames(
-    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
-    events: list[Progress | Item] = []
-    film = make_film(filmed_face, motion)
-    write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
-    shares = [event.share for event in events if isinstance(event, Progress)]
-    assert len(shares) == len(events) > 2
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1.0)
-    assert {event.steps for event in events if isinstance(event, Progress)} == {film.count}
-    assert len(pictures(tmp_path / "a.mp4")[0]) == film.count
-
-
-def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None:
+def test_options_of_filmed_faces_alone(tmp_path, toy_speech):
     drawn = shown_face("portrait")
     video = tmp_path / "a.mp4"
     video.touch()
@@ -203,7 +174,7 @@ def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None
         drawn.check(OutputSettings(drawn, toy_speech, outputs=Outputs(mark=unmarked)))  # a drawn face needs no mark
 
 
-def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Motion, tmp_path: Path) -> None:
+def test_an_inset_on_the_video_of_the_speech(filmed_face, motion, tmp_path):
     """The video is shorter than the speech: as many frames as there are of both."""
     video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
     film = make_film(filmed_face, motion, speech=video, options=Outputs(overlay="inset"))
@@ -218,14 +189,11 @@ def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Mo
 
 
 @pytest.mark.long
-def test_eigenlips_become_the_person(
-    filmed_face: FilmedFace, pictured_model: Model, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
+def test_eigenlips_become_the_person(filmed_face, pictured_model, toy_sentence, tmp_path):
     """A model of mouth pictures drives the mouth by its pictures, and the jaw by points where it has them."""
     request = Request(toy_sentence.audio, units=toy_sentence.units)
     result = animate(request, model=pictured_model)
     eigenlips = pictured_model.eigenlips
-    assert eigenlips is not None
     names = {channel.name for channel in eigenlips.channels}
     assert names < set(result.motion.names)
     frames = list(make_film(filmed_face, result.motion, model=pictured_model).frames)
@@ -242,9 +210,7 @@ def test_eigenlips_become_the_person(
 
 
 @pytest.mark.long
-def test_another_persons_motion_is_mapped_onto_the_face(
-    toy_model: Model, filmed_face: FilmedFace, toy_sentence: ToySentence
-) -> None:
+def test_another_persons_motion_is_mapped_onto_the_face(toy_model, filmed_face, toy_sentence):
     """The person of the face opens the mouth half as far, and says the same."""
     takes = tuple(
         replace(take, motion=Motion(take.motion.values * [0.5, 1, 0.5], 25.0, take.motion.channels))
@@ -263,9 +229,7 @@ def test_another_persons_motion_is_mapped_onto_the_face(
         animate(Request(toy_sentence.audio, onto=mute), model=toy_model)
 
 
-def test_writing_is_whole_or_not_at_all(
-    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
+def test_writing_is_whole_or_not_at_all(filmed_face, motion, toy_sentence, tmp_path):
     (tmp_path / "a.mp4").write_text("older")
     with pytest.raises(ExportError):
         write_film(tmp_path / "a.mp4", make_film(filmed_face, motion), Audio(np.zeros(0, np.float32), 16_000))
@@ -289,9 +253,7 @@ def _spoiled(data: np.ndarray) -> np.ndarray:
     return changed
 
 
-def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(
-    filmed_face: FilmedFace, brief: Motion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(filmed_face, brief, tmp_path, monkeypatch):
     video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
     stitched, sequence = [], open_stored_background(filmed_face.background)
 
@@ -307,3 +269,43 @@ def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(
     assert stitched == [True, False]
     assert film.rate_hz == pytest.approx(25.0)
     assert film.covered == pytest.approx(sequence.enlarge(1.3).face_box)
+
+
+def model_of(*speakers: str, corpus: str = "filmed/many") -> Any:
+    return SimpleNamespace(about={"corpus": [corpus], "speakers": list(speakers)}, visual="points")
+
+
+def face_of(face: FilmedFace, speaker: str) -> FilmedFace:
+    return replace(face, about={"corpus": ["filmed/many"], "speaker": speaker})
+
+
+def test_the_person_of_one_corpus(filmed_face):
+    for people, speaker, filmed, same in (
+        ((), "", "anna", True),  # a corpus without names has one person
+        (("anna",), "", "anna", True),
+        (("anna",), "", "", True),
+        (("ben",), "", "anna", False),
+        (("anna", "ben"), "anna", "anna", True),
+        (("anna", "ben"), "ben", "anna", False),
+        (("anna", "ben"), "", "anna", False),  # the mean person
+    ):
+        face = face_of(filmed_face, filmed)
+        assert is_person_of(model_of(*people), face, speaker) == same
+        assert not is_person_of(model_of(*people, corpus="filmed/other"), face, speaker)
+
+
+def test_without_speech_nothing_is_mapped(filmed_face, caplog):
+    face = face_of(filmed_face, "anna")
+    assert person_shown(model_of("ben"), face) is face
+    assert person_shown(model_of("ben"), replace(face, takes=())) is None
+    assert "built from footage without sound" in caplog.text
+    assert person_shown(model_of("anna"), face) is None
+    assert shown_face(face).other_person(model_of("ben")) is face
+    assert shown_face("portrait").other_person(model_of("ben")) is None
+
+
+def test_mouth_pictures_cannot_be_mapped_onto_another_person(filmed_face):
+    pictured = SimpleNamespace(about={"corpus": ["filmed/many"], "speakers": ["ben"]}, visual="eigenlips")
+    assert is_person_of(pictured, face_of(filmed_face, "ben"))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"mouth pictures of the person of filmed/many, the face is that of another"):
+        is_person_of(pictured, face_of(filmed_face, "anna"))  # type: ignore[arg-type]

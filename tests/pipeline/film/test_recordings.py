@@ -1,13 +1,9 @@
-"""A face from real recordings: what it says is what was said, to a tracker too."""
-
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, here, run
+from cli.conftest import here, run
 from lipmotion import animate
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
@@ -32,7 +28,6 @@ def clips(recordings: Path) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def some_clips(clips: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Eighteen seconds of one person."""
     folder = tmp_path_factory.mktemp("filmed") / "someone"
     folder.mkdir()
     for clip in clips[:CLIPS]:
@@ -64,7 +59,7 @@ def likeness(first: np.ndarray, second: np.ndarray) -> float:
     return float(np.corrcoef(first[:count], second[:count])[0, 1])
 
 
-def test_what_was_built(built: Path) -> None:
+def test_what_was_built(built):
     face = load_face(built)
     assert face.about["recordings"] == CLIPS
     assert face.about["footage_s"] == pytest.approx(3.0 * CLIPS, abs=1)
@@ -74,22 +69,15 @@ def test_what_was_built(built: Path) -> None:
     assert sum(take.sound.duration_s for take in face.takes) > 10
 
 
-def test_tracked_motion_of_unseen_speech_is_tracked_again(built: Path, clips: list[Path], tmp_path: Path) -> None:
+def test_tracked_motion_of_unseen_speech_is_tracked_again(built, clips, tmp_path):
     clip = clips[CLIPS]
     original = track(clip, crops=False).motion
     write_film(tmp_path / "a.mp4", make_film(load_face(built), original), read_audio(clip))
     assert likeness(opening_in(tmp_path / "a.mp4"), np.asarray(original["opening"])) > 0.85
 
 
-def test_from_sound_to_video(built: Path, clips: list[Path], here: Path, run: RunCommand) -> None:
+def test_from_sound_to_video(built, clips, here, run):
     done = run("animate", clips[CLIPS], "--face", built, "-o", "a.mp4", "--mark", "visible")
     assert (done.code, done.out) == (0, ["a.mp4"]), done
     generated = animate(Request(clips[CLIPS], onto=load_face(built))).motion
     assert likeness(opening_in(here / "a.mp4"), np.asarray(generated.resampled(25.0)["opening"])) > 0.8
-
-
-@pytest.mark.parametrize("overlay", ["mouth"])
-def test_an_aid_to_lip_reading(built: Path, clips: list[Path], here: Path, run: RunCommand, overlay: str) -> None:
-    done = run("animate", clips[CLIPS], "--face", built, "--overlay", overlay, "-o", "a.mp4")
-    assert (done.code, done.out) == (0, ["a.mp4"]), done
-    assert opening_in(here / "a.mp4").shape[0] == pytest.approx(75, abs=1)

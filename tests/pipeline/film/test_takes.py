@@ -1,7 +1,3 @@
-"""Which recordings a face is learned from."""
-
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -42,14 +38,14 @@ def names(found: list[takes.Take]) -> list[str]:
     return [take.name for take in found]
 
 
-def test_one_video(videos: MakeVideos) -> None:
+def test_one_video(videos):
     video = videos("a") / "a.mkv"
     (take,) = choose_takes(video)
     assert (take.name, take.file, take.collection, take.speaker) == ("a", video, "filmed/anna", "")
     assert (take.span.start_s, take.span.end_s) == (0.0, MOST_FOOTAGE_S)
 
 
-def test_a_folder(videos: MakeVideos) -> None:
+def test_a_folder(videos):
     folder = videos("a", "b", "c")
     found = choose_takes(folder)
     assert names(found) == ["a", "b", "c"]
@@ -58,7 +54,7 @@ def test_a_folder(videos: MakeVideos) -> None:
     assert found[0].span.end_s == float("inf")
 
 
-def test_of_a_folder_with_lists_the_training_list(videos: MakeVideos) -> None:
+def test_of_a_folder_with_lists_the_training_list(videos):
     folder = videos("a", "b", "c", "d")
     (folder / "train.txt").write_text("b\nd\n")
     (folder / "test.txt").write_text("a\n")
@@ -66,7 +62,7 @@ def test_of_a_folder_with_lists_the_training_list(videos: MakeVideos) -> None:
     assert names(choose_takes(folder)) == ["b", "d"]
 
 
-def test_long_footage_is_used_in_part_evenly(videos: MakeVideos, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_footage_is_used_in_part_evenly(videos, monkeypatch):
     monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 3.0)
     found = choose_takes(videos(*(f"clip{number}" for number in range(9))))
     assert 3 <= len(found) <= 4
@@ -76,7 +72,7 @@ def test_long_footage_is_used_in_part_evenly(videos: MakeVideos, monkeypatch: py
     assert numbers == sorted(set(numbers))
 
 
-def test_one_of_several_people(videos: MakeVideos, tmp_path: Path) -> None:
+def test_one_of_several_people(videos, tmp_path):
     videos("a", "b", folder="filmed/anna")
     videos("c", folder="filmed/ben")
     folder = tmp_path / "filmed"
@@ -89,7 +85,7 @@ def test_one_of_several_people(videos: MakeVideos, tmp_path: Path) -> None:
         choose_takes(folder, speaker="cleo")
 
 
-def test_no_videos(tmp_path: Path) -> None:
+def test_no_videos(tmp_path):
     with pytest.raises(InputError, match="no such"):
         choose_takes(tmp_path / "missing.mp4")
     (tmp_path / "empty").mkdir()
@@ -109,7 +105,7 @@ def prepared(folder: Path, files: list[str], speakers: tuple[str, ...] = ("",)) 
     return corpus
 
 
-def test_a_corpus_with_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
+def test_a_corpus_with_its_videos(tmp_path, videos):
     folder = videos("a", "b", "c")
     corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "gone.mkv"])
     found = choose_takes(corpus.path, folder)
@@ -119,7 +115,7 @@ def test_a_corpus_with_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
     assert dict(found[0].rights) == {"licence": "CC BY 4.0", "attribution": "anna"}
 
 
-def test_a_corpus_of_several_people(tmp_path: Path, videos: MakeVideos) -> None:
+def test_a_corpus_of_several_people(tmp_path, videos):
     folder = videos("a", "b", "c", "d")
     corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "c.mkv", "d.mkv"], ("anna", "ben"))
     assert [take.file.name for take in choose_takes(corpus.path, folder, "ben")] == ["b.mkv", "d.mkv"]
@@ -127,7 +123,7 @@ def test_a_corpus_of_several_people(tmp_path: Path, videos: MakeVideos) -> None:
         choose_takes(corpus.path, folder)
 
 
-def test_a_corpus_without_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
+def test_a_corpus_without_its_videos(tmp_path, videos):
     corpus = prepared(tmp_path / "corpus", ["a.mkv"])
     with pytest.raises(InputError, match=r"holds the pictures of mouths, but not of faces; .* --recordings FOLDER"):
         choose_takes(corpus.path)
@@ -137,9 +133,7 @@ def test_a_corpus_without_its_videos(tmp_path: Path, videos: MakeVideos) -> None
         choose_takes(corpus.path, videos("other"))
 
 
-def test_long_videos_are_shortened_before_short_ones_are_left_out(
-    videos: MakeVideos, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_long_videos_are_shortened_before_short_ones_are_left_out(videos, monkeypatch):
     """The seconds of a folder are bounded, and not by the first of its videos."""
     durations = {"a": 300.0, "b": 3.0, "c": 3.0, "d": 7200.0}
     monkeypatch.setattr(takes, "_duration_s", lambda take: durations[take.name])
@@ -150,14 +144,14 @@ def test_long_videos_are_shortened_before_short_ones_are_left_out(
     assert used == pytest.approx([117.0, 3.0, 3.0, 117.0])
 
 
-def test_many_long_videos_are_used_in_part(videos: MakeVideos, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_long_videos_are_used_in_part(videos, monkeypatch):
     monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 30.0)
     monkeypatch.setattr(takes, "_duration_s", lambda _: 600.0)
     found = choose_takes(videos("a", "b", "c", "d", "e", "f"))
     assert [take.span.end_s for take in found] == [takes.LONG_S] * 3
 
 
-def test_videos_of_the_same_name_are_told_apart(tmp_path: Path, videos: MakeVideos) -> None:
+def test_videos_of_the_same_name_are_told_apart(tmp_path, videos):
     """Every person of GRID says the same sentences, in files of the same names."""
     videos("x", folder="filmed/anna")
     ben = write_sound(videos("y", folder="filmed/ben") / "x.mkv", tone(16_000, 0.9), 16_000, "flac", video=True)

@@ -1,7 +1,5 @@
 """Footage of the drawn person: videos, and what a tracker that makes no errors would say of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +27,6 @@ class ToyVideo:
 
 
 def write_video(path: Path, sentence: ToySentence, rate_hz: float = 25.0, *, silent: bool = False) -> ToyVideo:
-    """Write a video of a sentence."""
     motion = toy_motion(sentence.units, rate_hz)
     frames = toy_frames(motion, toy_places(len(motion.values), rate_hz))
     sound = sentence.audio

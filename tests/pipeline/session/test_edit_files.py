@@ -1,10 +1,5 @@
-"""Edits as sentences, and in files: what is written is read again; what is wrong is named."""
-
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +10,6 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
 from lipmotion.storage.files import sha256_of
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion.units import group_words
 
@@ -42,7 +36,7 @@ SENTENCES = (
 )
 
 
-def test_every_kind_of_edit_is_a_sentence() -> None:
+def test_every_kind_of_edit_is_a_sentence():
     steps = [parse_step(sentence) for sentence in SENTENCES]
     assert {step.form for step in steps} == set(STEPS)
     assert tuple(map(str, steps)) == SENTENCES
@@ -74,19 +68,19 @@ def test_every_kind_of_edit_is_a_sentence() -> None:
         ("set stepped maybe", "required one of: true, false"),
     ],
 )
-def test_sentences_that_state_no_edit(sentence: str, message: str) -> None:
+def test_sentences_that_state_no_edit(sentence, message):
     with pytest.raises(InputError, match=message):
         parse_step(sentence)
 
 
-def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for() -> None:
+def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for():
     edits = Edits().then("set intensity 1.2", "set stepped true", "set size 360", "set intensity 1.3")
     assert edits.delivery() == Delivery(intensity=1.3, stepped=True)
     assert edits.delivery(Delivery(intensity=2.0)).intensity == 2.0
     assert edits.staging() == Staging(size=360)
 
 
-def test_moods_are_added_to_those_that_are_asked_for() -> None:
+def test_moods_are_added_to_those_that_are_asked_for():
     edits = Edits().then("mood sad at 2.0", "mood happy:0.7 at 1.0", "mood angry at 2.0")
     assert edits.delivery().mood == "happy:0.7 at 1, angry at 2"
     assert edits.delivery(Delivery(mood="tired")).mood == "tired at 0, happy:0.7 at 1, angry at 2"
@@ -94,7 +88,7 @@ def test_moods_are_added_to_those_that_are_asked_for() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".json", ".toml"])
-def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
+def test_what_is_written_is_read_again(tmp_path, suffix):
     path = tmp_path / f"a.edits{suffix}"
     spans = (Span(0.0, 0.3, Unit("sil")), Span(0.3, 1 / 3 + 0.1, Unit("p", "sil-p+l", 'pl"ease', confidence=0.25)))
     outlook = Outlook("words", 0.5, None, 30.5, ("a \\ transcript",))
@@ -127,14 +121,14 @@ def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
         ('{"format": "lipmotion.edits", "version": 1, "units": [{"phone": "p"}]}', "start_s"),
     ],
 )
-def test_files_that_are_refused(tmp_path: Path, text: str, message: str) -> None:
+def test_files_that_are_refused(tmp_path, text, message):
     path = tmp_path / "a.json"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
         read_edits(path)
 
 
-def test_a_file_holds_the_moods_of_tags(toy_sentence: ToySentence, toy_model_file: Path, tmp_path: Path) -> None:
+def test_a_file_holds_the_moods_of_tags(toy_sentence, toy_model_file, tmp_path):
     words, recording = toy_sentence.words, tmp_path / "a.wav"
     write_sound(recording, toy_sentence.audio)
     tagged = f"[happy:0.5] {words[0]} [angry] {' '.join(words[1:])}"
@@ -145,7 +139,7 @@ def test_a_file_holds_the_moods_of_tags(toy_sentence: ToySentence, toy_model_fil
     assert second.time_s == pytest.approx(spoken[1].start_s)
 
 
-def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_a_file_replays_what_was_recognised(toy_speech, toy_model_file, tmp_path):
     """The phones in the file are the base: the motion is that of the session in which they were edited."""
     asked = Request(toy_speech, recogniser="own", model=toy_model_file)
     path, edits = tmp_path / "a.json", Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
@@ -157,7 +151,7 @@ def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Pa
     assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)
 
 
-def test_edits_of_another_sound_are_refused(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
+def test_edits_of_another_sound_are_refused(toy_speech, toy_model_file, tmp_path):
     """Of the same length, and wherever it lies; without a digest, as in earlier files, they are taken."""
     sound, path = tmp_path / "a.wav", tmp_path / "a.edits.json"
     sound.write_bytes(toy_speech.read_bytes())

@@ -1,7 +1,3 @@
-"""Edits of long recordings: the motion around an edit at once, and the whole when it is asked for."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -52,9 +48,7 @@ def parse_number(units: Timeline[Unit], phone: str, after_s: float) -> int:
 
 
 @pytest.mark.long
-def test_around_an_edit_the_motion_is_that_of_the_whole(
-    long_request: Request, toy_model: Model, made_s: list[float]
-) -> None:
+def test_around_an_edit_the_motion_is_that_of_the_whole(long_request, toy_model, made_s):
     """At the first phone, in the middle, at the last one, of a pause, with pins; one edit after another."""
     session, other = Session(long_request, model=toy_model), Session(long_request, model=toy_model)
     units, lasts_s = session.units(), long_request.recording.duration_s  # type: ignore[union-attr]
@@ -86,11 +80,10 @@ def test_around_an_edit_the_motion_is_that_of_the_whole(
         session.generate(edits.then("pin opening 0.1 at 9999"))
 
 
-def test_what_lies_far_apart_is_made_whole() -> None:
+def test_what_lies_far_apart_is_made_whole():
     units, frames = Timeline(tuple(Span(n / 10, (n + 1) / 10, Unit("aa")) for n in range(600))), 6001
     assert find_excerpt(units, units, (), frames) is None
     near = find_excerpt(units, units, [Pin(30.0, "opening", 0.1), Pin(31.0, "opening", 0.1)], frames)
-    assert near is not None
     assert near.frames.start % 100 == 0
     assert near.frames.start / 100 <= 30 - MARGIN_S
     assert near.frames.stop / 100 >= 31 + MARGIN_S

@@ -1,10 +1,5 @@
-"""Sessions: the same motion as in one pass, only what changed computed again, edits that hold, threads."""
-
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from threading import Barrier
 
 import numpy as np
@@ -46,7 +41,7 @@ def edited(*sentences: str) -> Edits:
     return Edits().then(*sentences)
 
 
-def test_a_session_gives_what_one_pass_gives(session: Session, request_: Request, toy_model: Model) -> None:
+def test_a_session_gives_what_one_pass_gives(session, request_, toy_model):
     """Whatever was asked for before; with phones edited in a session, or given."""
     place = phones(session.units()).index("iy") + 1
     edits = edited(f"phone {place} is aa", "pin opening 0.05 at 1.0")
@@ -62,7 +57,7 @@ def test_a_session_gives_what_one_pass_gives(session: Session, request_: Request
     assert np.array_equal(session.generate().motion.values, animate(request_, model=toy_model).motion.values)
 
 
-def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_what_changed_is_computed_again(session, monkeypatch):
     calls: list[str] = []
     for name in ("analyse_speech", "generate_motion"):
         plain = getattr(session_module, name)
@@ -80,7 +75,7 @@ def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pyte
     assert calls == ["analyse_speech", "generate_motion", "generate_motion"]
 
 
-def test_edits_of_phones(session: Session) -> None:
+def test_edits_of_phones(session):
     plain = session.units()
     third = plain[2]
     moved = session.units(edited(f"phone 3 ends {third.end_s - 0.02:.3f}"))
@@ -98,7 +93,7 @@ def test_edits_of_phones(session: Session) -> None:
     assert all(a.end_s == pytest.approx(b.start_s) for a, b in zip(more.spans, more.spans[1:], strict=False))
 
 
-def test_another_word_is_aligned_where_it_was(session: Session) -> None:
+def test_another_word_is_aligned_where_it_was(session):
     word = next(span.label.word for span in session.units() if span.label.word)
     plain = [span for span in session.units() if span.label.word == word]
     found = [span for span in session.units(edited("word 1 is mama")) if span.label.word == "mama"]
@@ -111,7 +106,7 @@ def test_another_word_is_aligned_where_it_was(session: Session) -> None:
         session.units(edited("word 99 is mama"))
 
 
-def test_a_phone_is_split_and_words_are_said_otherwise(session: Session) -> None:
+def test_a_phone_is_split_and_words_are_said_otherwise(session):
     plain = session.units()
     third = plain[2]
     middle_s = round((third.start_s + third.end_s) / 2, 3)
@@ -130,7 +125,7 @@ def test_a_phone_is_split_and_words_are_said_otherwise(session: Session) -> None
     assert other[-1].end_s == pytest.approx(last_s, abs=1e-3)
 
 
-def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session: Session) -> None:
+def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session):
     plain = session.generate()
     found = session.generate(edited("draw opening 0.1 0.2 0.1 from 0.8 to 1.0", "draw jawOpen 0 1 from 1.5 to 1.6"))
     assert found.motion["opening"][[80, 90, 100]] == pytest.approx([0.1, 0.2, 0.1])
@@ -148,12 +143,12 @@ def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session: Sessi
         session.generate(edited("draw jaw 0 1 from 1.5 to 1.6"))
 
 
-def test_a_thousand_edits_of_phones_are_no_deeper_than_one(session: Session) -> None:
+def test_a_thousand_edits_of_phones_are_no_deeper_than_one(session):
     edits = Edits().then(*(f"phone {2 + n % 3} is {'pbm'[n % 3]}" for n in range(1200)))
     assert phones(session.units(edits))[1:4] == ["p", "b", "m"]
 
 
-def test_pins_hold_for_channels_and_curves(session: Session, tmp_path: Path) -> None:
+def test_pins_hold_for_channels_and_curves(session, tmp_path):
     edits = edited(
         "pin opening 0.1 at 0.8", "pin jawOpen 0.7 at 1.2", "gain 1.5 from 0.5 to 1.0", "pin viseme_PP 0.4 at 1.5"
     )
@@ -172,13 +167,13 @@ def test_pins_hold_for_channels_and_curves(session: Session, tmp_path: Path) -> 
     )
 
 
-def test_pins_that_are_close_together_all_hold(session: Session) -> None:
+def test_pins_that_are_close_together_all_hold(session):
     found = session.generate(edited("pin jawOpen 0.7 at 1.2", "pin jawOpen 0.2 at 1.25", "pin jawOpen 0.3 at 1.25"))
     curve = make_curves(found.motion, found.units, "arkit", edits=found.curve_edits)["jawOpen"]
     assert curve[[120, 125]] == pytest.approx([0.7, 0.3])  # of two at one time the last
 
 
-def test_gains_make_movements_larger_for_a_time(session: Session) -> None:
+def test_gains_make_movements_larger_for_a_time(session):
     plain, larger = session.generate(), session.generate(edited("gain 2 from 0.6 to 1.4"))
     span = slice(60, 141)
     assert np.ptp(larger.motion["opening"][span]) > 1.3 * np.ptp(plain.motion["opening"][span])
@@ -193,7 +188,7 @@ def test_gains_make_movements_larger_for_a_time(session: Session) -> None:
     assert np.array_equal(still.motion["opening"], plain.motion["opening"])
 
 
-def test_a_locked_span_stays_as_it_was(session: Session) -> None:
+def test_a_locked_span_stays_as_it_was(session):
     first = edited("pin opening 0.1 at 0.8", "lock from 0.6 to 1.0")
     later = first.then("gain 2 from 0.2 to 2.0", f"phone {len(session.units()) - 2} is aa")
     before, after = session.generate(edited("pin opening 0.1 at 0.8")), session.generate(later)
@@ -210,14 +205,14 @@ def test_a_locked_span_stays_as_it_was(session: Session) -> None:
     assert freed.motion["opening"][70] == pytest.approx(0.2)
 
 
-def test_a_locked_span_keeps_channels_that_are_added_later(session: Session) -> None:
+def test_a_locked_span_keeps_channels_that_are_added_later(session):
     spoken = session.generate(edited("pin tongue 0.5 at 1.5"))
     locked = session.generate(edited("lock from 0.6 to 1.0", "pin tongue 0.5 at 1.5"))
     assert np.allclose(locked.motion["tongue"], spoken.motion["tongue"])
     assert locked.motion["tongue"][150] == pytest.approx(0.5)
 
 
-def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_locks_take_the_motion_once_each(session, monkeypatch):
     made: list[int] = []
     monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
     steps = [
@@ -229,7 +224,7 @@ def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pyt
     assert len(made) <= 15
 
 
-def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_long_motion_less_is_kept(session, monkeypatch):
     made: list[int] = []
     monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
     monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generate().motion.values))
@@ -240,7 +235,7 @@ def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.Monke
     assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
 
 
-def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: Request) -> None:
+def test_edits_of_another_recording_are_refused(session, toy_model, request_):
     file = EditFile(edited("phone 3 is p"), units=session.units())
     half = Audio(request_.recording.samples[:16_000], 16_000)  # type: ignore[union-attr]
     with pytest.raises(InputError, match=r"the recording lasts 1\.00 s, the edited one .* of another recording"):
@@ -264,12 +259,12 @@ def test_edits_of_another_recording_are_refused(session: Session, toy_model: Mod
         ("gain lips 2 from 0 to 1", "cannot change 'lips'"),
     ],
 )
-def test_edits_that_are_not_possible(session: Session, sentence: str, message: str) -> None:
+def test_edits_that_are_not_possible(session, sentence, message):
     with pytest.raises(InputError, match=message):
         session.generate(edited(sentence))
 
 
-def test_single_pictures_are_those_of_the_video(session: Session, request_: Request) -> None:
+def test_single_pictures_are_those_of_the_video(session, request_):
     """Any frame, before and after an edit; what is not at that time is refused."""
     pictures = SessionPictures(session)
     for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
@@ -289,7 +284,7 @@ def test_single_pictures_are_those_of_the_video(session: Session, request_: Requ
         pictures.picture(9)
 
 
-def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy_sentence: ToySentence) -> None:
+def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model, toy_sentence):
     """Each alone and both at once give the same bits; the matrix products of one do not change those of the other."""
     requests = [Request(toy_sentence.audio, " ".join(toy_sentence.words)), Request(toy_sentence.audio)]
     edits = [edited("phone 3 is p"), edited("pin opening 0.05 at 1.0")]
@@ -309,9 +304,7 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy
 
 
 @pytest.mark.long
-def test_what_comes_next_is_prepared_while_processes_work(
-    request_: Request, toy_model: Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_comes_next_is_prepared_while_processes_work(request_, toy_model, monkeypatch):
     prepared: list[object] = []
     monkeypatch.setattr(session_module, "prepare_search", prepared.append)
     session = Session(request_, model=toy_model, workers=2, background=lambda: prepared.append("face"))

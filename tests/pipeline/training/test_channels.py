@@ -1,7 +1,3 @@
-"""Eigenlips from mouth pictures to figures: learned, trained on, kept in the model, generated, compared."""
-
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, Model, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
+from lipmotion import Corpus, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
+from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network
@@ -52,7 +48,7 @@ def crops(given: Sequence[Utterance]) -> list[np.ndarray]:
     return [np.asarray(utterance.track.crops) for utterance in given]
 
 
-def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances: list[Utterance]) -> None:
+def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances):
     """Those that are not seen are white here: not one of them is taken."""
     given, kept = [], []
     for number, utterance in enumerate(utterances):
@@ -65,7 +61,7 @@ def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances: lis
     assert np.array_equal(train_eigenlips(given, 4, 50).basis, fit_eigenlips(everything[frames], 4).basis)
 
 
-def test_an_utterance_that_was_never_seen_gives_no_picture(utterances: list[Utterance]) -> None:
+def test_an_utterance_that_was_never_seen_gives_no_picture(utterances):
     hidden = replace(
         utterances[1], track=replace(utterances[1].track, seen=np.zeros(len(utterances[1].track.seen), bool))
     )
@@ -75,7 +71,7 @@ def test_an_utterance_that_was_never_seen_gives_no_picture(utterances: list[Utte
         train_eigenlips([hidden])
 
 
-def test_motion_has_the_channels_that_are_learned(utterances: list[Utterance], space: Eigenlips) -> None:
+def test_motion_has_the_channels_that_are_learned(utterances, space):
     one = utterances[0]
     assert with_visual_channels(one, GEOMETRY, None) is one
     pictured, both = (with_visual_channels(one, visual, space).track.motion for visual in (EIGENLIPS, BOTH))
@@ -86,7 +82,7 @@ def test_motion_has_the_channels_that_are_learned(utterances: list[Utterance], s
     assert pictured.rate_hz == both.rate_hz == one.track.motion.rate_hz
 
 
-def test_what_is_missing_is_reported(utterances: list[Utterance], space: Eigenlips, tmp_path: Path) -> None:
+def test_what_is_missing_is_reported(utterances, space, tmp_path):
     blind = replace(utterances[0], track=replace(utterances[0].track, crops=None))
     words = f"{blind.name}: no mouth pictures, which eigenlips need; prepare its video again without --no-crops"
     with pytest.raises(CorpusError, match=words):
@@ -105,20 +101,12 @@ def test_what_is_missing_is_reported(utterances: list[Utterance], space: Eigenli
         train(corpus, visual="lips")
 
 
-def test_pictures_of_two_sizes_are_refused(utterances: list[Utterance]) -> None:
-    track = utterances[1].track
-    small = replace(utterances[1], track=replace(track, crops=np.asarray(track.crops)[:, ::2]))
-    with pytest.raises(CorpusError, match="mouth pictures of 2 sizes"):
-        train_eigenlips([utterances[0], small])
-
-
 @pytest.mark.long
-def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models: dict[str, Path], toy_corpus: Corpus) -> None:
+def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models, toy_corpus):
     """Saved, loaded, and asked for the mouth of a sentence of the test list."""
     model = load_model(models[EIGENLIPS])
     held_out = toy_corpus.utterance(toy_corpus.names("test")[0])
     motion = animate(held_out.audio, transcript=" ".join(held_out.words or ()), model=model).motion
-    assert model.eigenlips is not None
     assert motion.channels == model.eigenlips.channels
     times_s = np.arange(len(held_out.track.seen)) / held_out.track.motion.rate_hz
     drawn = model.eigenlips.restore(motion.at(times_s)).astype(float)
@@ -127,7 +115,7 @@ def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models: dict[str, Path
     assert np.abs(drawn - real).mean() < 0.5 * still
 
 
-def test_figures_of_pictures(models: dict[str, Path], toy_corpus: Corpus) -> None:
+def test_figures_of_pictures(models, toy_corpus):
     figures = evaluate(load_model(models[EIGENLIPS]), toy_corpus, recogniser="own")
     assert figures["closed_under"] is None
     for condition in figures["conditions"].values():
@@ -143,7 +131,7 @@ def test_figures_of_pictures(models: dict[str, Path], toy_corpus: Corpus) -> Non
     assert "lips_r_01 " not in figures_table(figures).replace("lag of lips_r_01 ", "")
 
 
-def test_figures_of_both(models: dict[str, Path], toy_model: Model, toy_corpus: Corpus) -> None:
+def test_figures_of_both(models, toy_model, toy_corpus):
     """The eigenlips stand apart: figures of the lip distances are of these alone."""
     figures, plain = (evaluate(model, toy_corpus, recogniser="own") for model in (load_model(models[BOTH]), toy_model))
     assert figures["closed_under"] == plain["closed_under"]
@@ -158,9 +146,8 @@ def test_figures_of_both(models: dict[str, Path], toy_model: Model, toy_corpus: 
     assert "AMSE of the eigenlips" in figures_table(figures)
 
 
-def test_originals_are_the_projected_pictures(models: dict[str, Path], toy_corpus: Corpus) -> None:
+def test_originals_are_the_projected_pictures(models, toy_corpus):
     model = load_model(models[BOTH])
-    assert model.eigenlips is not None
     found = load_held_out(toy_corpus, Recogniser(model.phones, "own"), visual=model.visual, eigenlips=model.eigenlips)
     assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
     made = generate_clips(found, "with transcript", model.engine, model.learned)
@@ -170,7 +157,7 @@ def test_originals_are_the_projected_pictures(models: dict[str, Path], toy_corpu
 
 
 @pytest.mark.long
-def test_the_joint_engine_learns_pictures_too(toy_corpus: Corpus) -> None:
+def test_the_joint_engine_learns_pictures_too(toy_corpus):
     engine = engine_named("joint", {})
     model, _ = train(
         toy_corpus,
@@ -184,17 +171,7 @@ def test_the_joint_engine_learns_pictures_too(toy_corpus: Corpus) -> None:
     )
 
 
-def test_a_model_without_the_eigenlips_it_names_is_damaged(models: dict[str, Path], tmp_path: Path) -> None:
-    model = load_model(models[BOTH])
-    assert model.visual == BOTH
-    save_model(replace(model, eigenlips=None), tmp_path / "without")
-    with pytest.raises(ModelFormatError, match="the model says visual 'both', which its eigenlips do not fit"):
-        load_model(tmp_path / "without")
-
-
-def test_motion_files_hold_the_coefficients_and_videos_need_an_opening(
-    models: dict[str, Path], toy_speech: Path, tmp_path: Path
-) -> None:
+def test_motion_files_hold_the_coefficients_and_videos_need_an_opening(models, toy_speech, tmp_path):
     result = animate(toy_speech, model=models[EIGENLIPS])
     write(result, [tmp_path / "a.npz", tmp_path / "a.json"])
     for name in ("a.npz", "a.json"):

@@ -1,9 +1,4 @@
-"""Many speakers: what they say, what recordings say, and who is kept aside."""
-
-from __future__ import annotations
-
 import shutil
-import wave
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +8,7 @@ import pytest
 
 from lipmotion import Model
 from lipmotion.errors import CorpusError, MissingDependencyError
+from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.training import other_speakers as module
 from lipmotion.pipeline.training.other_speakers import (
     align_recordings,
@@ -27,7 +23,7 @@ from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.testing.toy import ToySentence, toy_sentences
+from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Item, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
 
@@ -50,20 +46,17 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_every_text_in_every_voice() -> None:
+def test_every_text_in_every_voice():
     sentences = list(synthesise_sentences(TEXTS))
     assert [sentence.name for sentence in sentences] == [
-        "flite-low-001",
-        "flite-low-002",
-        "flite-high-001",
-        "flite-high-002",
-    ]
+        "flite-low-001", "flite-low-002", "flite-high-001", "flite-high-002",
+    ]  # fmt: skip
     assert [sentence.speaker for sentence in sentences] == ["anna", "anna", "bert", "bert"]
     assert [s.name for s in synthesise_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
 
 
 @pytest.mark.usefixtures("spoken")
-def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
+def test_sentences_stand_between_pauses_over_a_faint_noise():
     for sentence in synthesise_sentences(TEXTS):
         first, last = sentence.phones[0], sentence.phones[-1]
         assert first.label == last.label == Unit("sil")
@@ -77,7 +70,7 @@ def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pauses_of_the_synthesiser_become_longer(monkeypatch):
     phones = [("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)]
     monkeypatch.setattr(module, "speak_sentences", lambda *_: iter([synthesise(phones)]))
     (sentence,) = synthesise_sentences(["Bee"], VOICES[:1])
@@ -87,7 +80,7 @@ def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.usefixtures("spoken")
-def test_the_same_again_shared_or_not() -> None:
+def test_the_same_again_shared_or_not():
     shared = synthesise_sentences(TEXTS, each=lambda function, items: iter([function(item) for item in list(items)]))
     for one, other in zip(synthesise_sentences(TEXTS), shared, strict=True):
         assert np.array_equal(one.audio.samples, other.audio.samples)
@@ -96,7 +89,7 @@ def test_the_same_again_shared_or_not() -> None:
 
 @pytest.mark.long
 @pytest.mark.usefixtures("spoken")
-def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
+def test_texts_by_default_say_every_phone_of_the_dictionary():
     sentences = list(synthesise_sentences(voices=VOICES[:1]))
     said = {span.label.phone for sentence in sentences for span in sentence.phones}
     assert len(sentences) == 60
@@ -105,7 +98,7 @@ def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_sentences_become_training_data() -> None:
+def test_sentences_become_training_data():
     sentences = list(synthesise_sentences(TEXTS))
     for sentence, (features, units, speaker) in zip(sentences, make_voice_examples(sentences), strict=True):
         assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)
@@ -114,18 +107,18 @@ def test_sentences_become_training_data() -> None:
         assert speaker == sentence.speaker
 
 
-def test_without_voices_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_voices_it_says_what_to_install(monkeypatch):
     monkeypatch.setattr(module, "installed_voices", lambda: ())
     with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
         next(synthesise_sentences(TEXTS))
 
 
-def test_sides_never_change() -> None:
+def test_sides_never_change():
     named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
     assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
 
 
-def test_a_quarter_is_kept_aside() -> None:
+def test_a_quarter_is_kept_aside():
     assert np.mean([is_held_out_speaker(f"speaker {number}") for number in range(2000)]) == pytest.approx(
         0.25, abs=0.03
     )
@@ -133,9 +126,7 @@ def test_a_quarter_is_kept_aside() -> None:
 
 def write(path: Path, audio: Audio, text: str | None = None) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, audio.rate_hz, 0, "NONE", ""))
-        file.writeframes(np.round(audio.samples * 32767).astype("<i2").tobytes())
+    write_sound(path, audio)
     if text is not None:
         path.with_suffix(".txt").write_text(text, encoding="utf-8")
 
@@ -159,7 +150,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recordings_are_aligned(folder, own, monkeypatch):
     monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
     items: list[Item] = []
     given = {"anna-*": "Anna B."}
@@ -176,9 +167,7 @@ def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pyte
     ]
 
 
-def test_a_transcript_of_other_words_is_detected(
-    folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_transcript_of_other_words_is_detected(folder, own, monkeypatch):
     monkeypatch.setattr(module, "agreement_score", lambda *_: -4.3)
     items: list[Item] = []
     assert list(align_recordings(folder, own, monitor=items.append)) == []  # type: ignore[arg-type]
@@ -186,14 +175,14 @@ def test_a_transcript_of_other_words_is_detected(
 
 
 @pytest.mark.parametrize("name", ["nothing", ""])
-def test_a_folder_without_transcripts(tmp_path: Path, own: Recogniser, toy_sentence: ToySentence, name: str) -> None:
+def test_a_folder_without_transcripts(tmp_path, own, toy_sentence, name):
     write(tmp_path / "unsaid.wav", toy_sentence.audio)
     with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
         next(align_recordings(tmp_path / name, own))
 
 
 @pytest.mark.recordings
-def test_real_recordings(recordings: Path, toy_model: Model) -> None:
+def test_real_recordings(recordings, toy_model):
     folder = recordings / "speech-open"
     if not folder.is_dir():
         pytest.skip("speech-open is not here")
@@ -206,7 +195,7 @@ def test_real_recordings(recordings: Path, toy_model: Model) -> None:
 
 
 @pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
-def test_real_voices() -> None:
+def test_real_voices():
     voices = installed_voices()[-1:]
     if not voices:
         pytest.skip("the synthesisers have no voices")

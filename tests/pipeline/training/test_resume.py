@@ -1,7 +1,3 @@
-"""A training that is stopped, wherever it is, goes on from there to the same bytes."""
-
-from __future__ import annotations
-
 import multiprocessing
 import shutil
 from collections.abc import Callable, Iterator
@@ -90,9 +86,7 @@ def whole(corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.long
-def test_stopped_after_any_event(
-    corpus: Corpus, whole: bytes, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stopped_after_any_event(corpus, whole, work, tmp_path, monkeypatch):
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
     count = len(create_events(corpus))
     assert count > 15
@@ -105,7 +99,7 @@ def test_stopped_after_any_event(
 
 
 @pytest.mark.long
-def test_stopped_again_and_again(corpus: Corpus, whole: bytes, work: Path, tmp_path: Path) -> None:
+def test_stopped_again_and_again(corpus, whole, work, tmp_path):
     """Every run gets some steps further than the one before."""
     stops = 0
     while True:
@@ -121,7 +115,7 @@ def test_stopped_again_and_again(corpus: Corpus, whole: bytes, work: Path, tmp_p
 
 @pytest.mark.long
 @pytest.mark.parametrize("what", ["corpus", "lexicon"])
-def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, what: str) -> None:
+def test_another_job_starts_over(corpus, work, tmp_path, what):
     run(corpus, work)
     options: dict[str, object] = {"recogniser": CONFIG}
     if what == "corpus":
@@ -138,7 +132,7 @@ def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, wha
 
 
 @pytest.mark.long
-def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, whole: bytes, work: Path, tmp_path: Path) -> None:
+def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
     assert content(run(corpus, work), tmp_path) == whole
     for name in ("phones", "labels-0"):
         path = work / f"{name}.checkpoint"
@@ -147,9 +141,7 @@ def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, whole: bytes, work: Pa
 
 
 @pytest.mark.long
-def test_threads_of_matrix_products_change_nothing(
-    corpus: Corpus, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monkeypatch):
     """Neither this process's own nor those that the processes it starts would use."""
     monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
@@ -159,9 +151,7 @@ def test_threads_of_matrix_products_change_nothing(
 
 
 @pytest.mark.long
-def test_stopped_in_two_processes(
-    corpus: Corpus, whole: bytes, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stopped_in_two_processes(corpus, whole, work, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
     before = set(multiprocessing.active_children())
@@ -171,7 +161,7 @@ def test_stopped_in_two_processes(
     assert content(train(corpus, recogniser=CONFIG, run=Run(work=work, workers=2))[0], tmp_path) == whole
 
 
-def test_what_is_done_is_not_done_again(corpus: Corpus, work: Path) -> None:
+def test_what_is_done_is_not_done_again(corpus, work):
     """What could not be used is reported again."""
     first, again = create_events(corpus, work), create_events(corpus, work)
     shares = [event.share for event in again if isinstance(event, Progress)]
@@ -184,9 +174,7 @@ def test_what_is_done_is_not_done_again(corpus: Corpus, work: Path) -> None:
     assert [event for event in again if isinstance(event, Item)] == items
 
 
-def test_the_fingerprint_is_of_all_that_a_training_uses(
-    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path, monkeypatch):
     corpus = Corpus.create(tmp_path / "corpus")
     utterance = toy_corpus.utterance("toy00")
     engine, job = engine_named("trajectory", {}), (CONFIG, Lexicon())

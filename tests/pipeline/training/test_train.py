@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -7,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, Model, Run, Selection, save_model, train
+from lipmotion import Corpus, Run, Selection, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
@@ -18,8 +16,9 @@ from lipmotion.pipeline.training.train import describe_training, label_phones
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
-from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
+from lipmotion.types import Channel, Motion, Track, Utterance
 from lipmotion.units import Lexicon
+from pipeline import made
 
 SMALL, JOINT = HmmConfig(mixtures=1, iterations=2), engine_named("joint", {})
 TRAINED = tuple(f"toy0{number}" for number in range(8))
@@ -30,14 +29,11 @@ def some(corpus: Corpus, count: int = 5) -> list[Utterance]:
 
 
 def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
-    corpus = Corpus.create(folder / "corpus")
-    for utterance in utterances:
-        corpus.add(utterance)
-    return corpus
+    return made.corpus_of(folder / "corpus", utterances)
 
 
 @pytest.mark.long
-def test_other_lists_all_and_given_names(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_other_lists_all_and_given_names(toy_corpus, tmp_path):
     assert train(toy_corpus, selection=Selection("val"), recogniser=SMALL, engine=JOINT)[1].used == ("toy08", "toy09")
     few = corpus_of([toy_corpus.utterance(name) for name in ("toy10", "toy02", "toy03")], tmp_path)
     for selection, used, split in (
@@ -53,9 +49,7 @@ def test_other_lists_all_and_given_names(toy_corpus: Corpus, tmp_path: Path) -> 
 
 
 @pytest.mark.long
-def test_untranscribed_utterances_are_recognised_and_used(
-    toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_untranscribed_utterances_are_recognised_and_used(toy_corpus, tmp_path, caplog):
     utterances = some(toy_corpus, 8)
     utterances[5] = replace(utterances[5], words=None)
     mixed = corpus_of(utterances, tmp_path)
@@ -71,16 +65,11 @@ def test_untranscribed_utterances_are_recognised_and_used(
 
 
 def labelled(utterance: Utterance) -> Utterance:
-    """The true phones instead of the words."""
-    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
-    phones = Timeline(tuple(replace(s, label=Unit(s.label.phone)) for s in units))
-    return replace(utterance, words=None, phones=phones)
+    return replace(utterance, words=None, phones=made.true_phones(utterance))
 
 
 @pytest.mark.long
-def test_labelled_phones_are_used_as_they_are(
-    toy_corpus: Corpus, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path, monkeypatch):
     """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
     monkeypatch.setattr(module, "align_or_recognise", None)
     given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
@@ -93,7 +82,7 @@ def test_labelled_phones_are_used_as_they_are(
 
 
 @pytest.mark.long
-def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_labelled_and_transcribed_utterances_together(toy_corpus, tmp_path):
     both = [u if number % 2 else labelled(u) for number, u in enumerate(some(toy_corpus, 8))]
     model, report = train(corpus_of(both, tmp_path), recogniser=SMALL, engine=JOINT)
     assert (report.used, report.skipped) == (TRAINED, {})
@@ -106,18 +95,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
 
 
 @pytest.mark.long
-def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:
-    names = ("anna", "ben", "ben", "anna", "anna")
-    corpus = corpus_of([replace(u, speaker=n) for u, n in zip(some(toy_corpus), names, strict=True)], tmp_path)
-    model, report = train(corpus, selection=Selection(speakers=["anna"]), recogniser=SMALL, engine=JOINT)
-    assert report.used == ("toy00", "toy03", "toy04")
-    assert model.about["speakers"] == ["anna"]
-    with pytest.raises(CorpusError, match="no speaker 'carl'"):
-        train(corpus, selection=Selection(speakers=["carl"]))
-
-
-@pytest.mark.long
-def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_path):
     utterances = some(toy_corpus)
     utterances[1] = replace(utterances[1], words=("five",) * 100)
     utterances[2] = replace(utterances[2], words=("mama", "日本"))
@@ -130,13 +108,7 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corp
 
 
 @pytest.mark.long
-def test_without_any_transcript_the_shipped_phones_are_used(
-    toy_corpus: Corpus,
-    toy_model: Model,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, toy_model, tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(module, "load_model", lambda: toy_model)
     silent = corpus_of([replace(utterance, words=None) for utterance in some(toy_corpus)], tmp_path)
     model, report = train(silent, recogniser=SMALL, engine=JOINT)
@@ -146,7 +118,7 @@ def test_without_any_transcript_the_shipped_phones_are_used(
 
 
 @pytest.mark.long
-def test_guessed_words_are_reported(toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_guessed_words_are_reported(toy_corpus, tmp_path, caplog):
     names = {"papa": "pahpa", "mama": "mahma"}
     utterances = [replace(u, words=tuple(names.get(w, w) for w in u.words or ())) for u in some(toy_corpus, 4)]
     train(
@@ -158,7 +130,7 @@ def test_guessed_words_are_reported(toy_corpus: Corpus, tmp_path: Path, caplog: 
     assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
 
 
-def test_licence_and_attribution_go_with_the_model(toy_corpus: Corpus) -> None:
+def test_licence_and_attribution_go_with_the_model(toy_corpus):
     rights = [{"licence": "CC0"}, {"licence": "CC BY 4.0", "attribution": "Anna"}, {"attribution": "Anna"}, {}]
     given = [replace(u, source=source) for u, source in zip(some(toy_corpus, 4), rights, strict=True)]
     about = describe_training(toy_corpus, given, "train", 4)
@@ -169,13 +141,13 @@ def test_licence_and_attribution_go_with_the_model(toy_corpus: Corpus) -> None:
     assert about["minutes"] == pytest.approx(0.2, abs=0.05)
 
 
-def test_nothing_usable(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_nothing_usable(toy_corpus, tmp_path):
     wrong = corpus_of([replace(u, words=("five",) * 100) for u in some(toy_corpus, 2)], tmp_path)
     with pytest.raises(CorpusError, match="none of 2 utterances has a transcript that fits"):
         train(wrong, recogniser=SMALL)
 
 
-def test_frames_without_a_face_are_not_learned_from(toy_corpus: Corpus) -> None:
+def test_frames_without_a_face_are_not_learned_from(toy_corpus):
     track = toy_corpus.utterance("toy00").track
     seen = np.arange(len(track.seen)) % 10 > 1
     _, valid = resample_track(replace(track, seen=seen), 250)
@@ -183,7 +155,7 @@ def test_frames_without_a_face_are_not_learned_from(toy_corpus: Corpus) -> None:
     assert np.array_equal(valid, seen[nearest])
 
 
-def test_camera_frames_become_model_frames() -> None:
+def test_camera_frames_become_model_frames():
     curve = np.sin(np.arange(26) / 25 * 2 * np.pi)[:, None]
     motion, valid = resample_track(Track(Motion(curve, 25.0, (Channel("opening"),)), np.ones(26, bool)), 111)
     assert motion.values[:101, 0] == pytest.approx(np.sin(np.arange(101) / 100 * 2 * np.pi), abs=0.01)
@@ -197,7 +169,7 @@ def others() -> Iterator[VoiceExample]:
         yield VoiceExample(analysed(sentence.audio).mfcc(), sentence.units, ("bert", "anna")[number % 2])
 
 
-def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Corpus) -> None:
+def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):
     stages: list[str] = []
     plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "acoustic_regression": False, "variance_scaling": False}
     engine = engine_named("coupled", plain | {"speech_only_mixtures": 1})
@@ -216,14 +188,12 @@ def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Cor
     assert lips[0].tobytes() == lips[1].tobytes()
 
 
-def test_other_engines_have_no_use_for_voices(toy_corpus: Corpus) -> None:
+def test_other_engines_have_no_use_for_voices(toy_corpus):
     with pytest.raises(InputError, match="the engine 'joint' does not learn from other voices"):
         train(toy_corpus, engine=engine_named("joint", {}), voices=others())
 
 
-def test_the_training_list_is_used_and_gives_the_same_model(
-    toy_corpus: Corpus, joint_model: Model, tmp_path: Path
-) -> None:
+def test_the_training_list_is_used_and_gives_the_same_model(toy_corpus, joint_model, tmp_path):
     model, report = train(toy_corpus, recogniser=SMALL, engine=JOINT)
     for name, each in (("first", joint_model), ("again", model)):
         save_model(each, tmp_path / f"{name}.lipmotion")
@@ -234,7 +204,7 @@ def test_the_training_list_is_used_and_gives_the_same_model(
 
 
 @pytest.mark.long
-def test_configurations_are_used_and_every_stage_is_reported(toy_corpus: Corpus) -> None:
+def test_configurations_are_used_and_every_stage_is_reported(toy_corpus):
     steps: list[str] = []
     engine = engine_named("trajectory", {"states": 3})
     run = Run(monitor=lambda event: steps.append(event.stage))

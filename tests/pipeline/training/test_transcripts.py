@@ -1,8 +1,5 @@
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -37,9 +34,7 @@ def messages(caplog: pytest.LogCaptureFixture) -> list[str]:
 
 
 @pytest.mark.long
-def test_training_names_the_transcripts_of_something_else_and_what_has_none(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_training_names_the_transcripts_of_something_else_and_what_has_none(tmp_path, caplog):
     corpus = Corpus.create(tmp_path / "corpus")
     changed = {2: ("squash", "six", "fish", "chefs"), 4: None, 5: ()}
     for number, utterance in enumerate(toy_utterances(12)):
@@ -50,13 +45,13 @@ def test_training_names_the_transcripts_of_something_else_and_what_has_none(
     assert wrong.startswith("1 of 6 transcripts seem not to be what is said (toy02): the model learns wrong lips")
 
 
-def test_right_transcripts_are_not_named(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+def test_right_transcripts_are_not_named(labelled, caplog):
     warn_of_doubtful_transcripts(labelled)
     warn_of_missing_transcripts([utterance for utterance, _ in labelled])
     assert not caplog.records
 
 
-def test_words_that_are_left_out(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+def test_words_that_are_left_out(labelled, caplog):
     """Half of the sentence stands as silence."""
     utterance, units = labelled[0]
     spans = list(units)
@@ -68,15 +63,13 @@ def test_words_that_are_left_out(labelled: Labelled, caplog: pytest.LogCaptureFi
     ]
 
 
-def test_labelled_phones_are_believed(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+def test_labelled_phones_are_believed(labelled, caplog):
     (utterance, units), (_, others) = labelled[:2]
     warn_of_doubtful_transcripts([(replace(utterance, phones=units), others)])
     assert not caplog.records
 
 
-def test_without_general_models_nothing_is_measured(
-    labelled: Labelled, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_general_models_nothing_is_measured(labelled, caplog, monkeypatch):
     def missing(*_: object) -> None:
         raise MissingDependencyError("no pocketsphinx")
 
@@ -85,7 +78,7 @@ def test_without_general_models_nothing_is_measured(
     assert not caplog.records
 
 
-def test_only_some_are_named(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+def test_only_some_are_named(labelled, caplog):
     named = labelled[0][0]
     many = [
         replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MAX_NAMED_RECORDINGS + 4)
@@ -98,9 +91,7 @@ def test_only_some_are_named(labelled: Labelled, caplog: pytest.LogCaptureFixtur
     assert len(caplog.records) == 1
 
 
-def test_of_two_alignments_the_better_one_counts(
-    labelled: Labelled, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_two_alignments_the_better_one_counts(labelled, caplog, monkeypatch):
     """It may cover more of the speech and fit it worse."""
     first, second = TranscriptFit(DOUBTFUL_SCORE, ((0.0, 3.0),), 4.0), TranscriptFit(DOUBTFUL_SCORE - 0.1, (), 4.0)
     fits = iter([first, second, second, first])

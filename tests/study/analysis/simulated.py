@@ -1,7 +1,5 @@
 """Studies with known effects of raters and sentences, and what their answers would be in the end."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,10 +1,5 @@
-"""The whole analysis: with and without screening, its tables, and what it refuses."""
-
-from __future__ import annotations
-
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +22,7 @@ def study() -> list[Answer]:
     return [replace(each, value="first") if each.rater == "r3" and each.other else each for each in answers]
 
 
-def test_figures_come_with_and_without_screening(tmp_path: Path) -> None:
+def test_figures_come_with_and_without_screening(tmp_path):
     write_answers(tmp_path / "answers.csv", study())
     figures = analyse_study(tmp_path / "answers.csv", baseline="ph-HMM")
     assert [row["rater"] for row in figures["screening"]["left_out"]] == ["r3"]
@@ -37,7 +32,7 @@ def test_figures_come_with_and_without_screening(tmp_path: Path) -> None:
     as_json(nan_as_null(figures))
 
 
-def test_the_table_has_all_figures() -> None:
+def test_the_table_has_all_figures():
     figures = analyse_study(study(), baseline="ph-HMM")
     text = analysis_table(figures)
     assert "left out: r3 (sides: 0 of 18 pairs answered alike in both orders)" in text
@@ -54,7 +49,7 @@ def test_the_table_has_all_figures() -> None:
     assert "all raters" not in analysis_table(analyse_study([each for each in study() if each.rater != "r3"]))
 
 
-def test_more_sentences_need_fewer_raters() -> None:
+def test_more_sentences_need_fewer_raters():
     few, many = (
         {row["difference"]: row["raters"] for row in analyse_study(study(), sentences=count)["all"][0]["raters_needed"]}
         for count in (6, 40)
@@ -72,17 +67,17 @@ def test_more_sentences_need_fewer_raters() -> None:
         ({"sentences": 1}, "1 sentences of planned studies, required at least 2"),
     ],
 )
-def test_options_that_are_refused(options: dict[str, object], error: str) -> None:
+def test_options_that_are_refused(options, error):
     with pytest.raises(InputError, match=error):
         analyse_study(study(), **options)  # type: ignore[arg-type]
 
 
-def test_a_study_without_answers_is_refused() -> None:
+def test_a_study_without_answers_is_refused():
     with pytest.raises(InputError, match="1 answers, none of which counts"):
         analyse_study([replace(rating(("r", "s"), "a", 3), practice=True)])
 
 
-def test_no_rater_left() -> None:
+def test_no_rater_left():
     answers = [replace(rating(("r", "s"), "a", 3), expected="4"), rating(("r", "s"), "a", 3)]
     figures = analyse_study(answers)
     assert figures["screened"] is None
@@ -103,7 +98,7 @@ DEGENERATE = {
 
 
 @pytest.mark.parametrize("name", DEGENERATE)
-def test_degenerate_studies_have_figures_without_numbers_that_are_none(name: str) -> None:
+def test_degenerate_studies_have_figures_without_numbers_that_are_none(name):
     """No division warns, and what is unknown is a dash and null."""
     figures = analyse_study(DEGENERATE[name])
     text = analysis_table(figures)
@@ -111,7 +106,7 @@ def test_degenerate_studies_have_figures_without_numbers_that_are_none(name: str
     as_json(nan_as_null(figures))
 
 
-def test_degenerate_studies_say_what_their_intervals_are_over() -> None:
+def test_degenerate_studies_say_what_their_intervals_are_over():
     assert "intervals over sentences only" in analysis_table(analyse_study(DEGENERATE["one rater"]))
     assert "intervals over raters only" in analysis_table(analyse_study(DEGENERATE["one sentence"]))
     assert "raters, all agree only" in analysis_table(analyse_study(DEGENERATE["one always wins"]))

@@ -1,11 +1,9 @@
-"""Opinion scores and rankings: means, differences, improvement as the paper prints it."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats
 
+from lipmotion_studio.study.analysis.analyse import power_of, raters_needed, rating_power, share_power
+from lipmotion_studio.study.analysis.crossed import Components, crossed_mean
 from lipmotion_studio.study.analysis.ratings import (
     RANKS,
     SCALES,
@@ -31,14 +29,14 @@ def simulated(size: tuple[int, int], seed: int = 1, means: np.ndarray = MEANS) -
     return ratings(np.random.default_rng(seed), means, size, Effects())
 
 
-def test_improvement_is_that_of_the_paper() -> None:
+def test_improvement_is_that_of_the_paper():
     values = np.tile(np.array(list(XIE_LIU.values()))[:, None, None], (1, 4, 3))
     table = RatingTable(tuple(XIE_LIU), values, np.ones(values.shape, np.intp), SCALES[MOS])
     for name, percent in IMPROVEMENT.items():
         assert round(relative_improvement(table, name, "ph-HMM")["percent"], 2) == percent
 
 
-def test_improvement_has_an_interval_around_it() -> None:
+def test_improvement_has_an_interval_around_it():
     table = simulated((30, 12))
     row = relative_improvement(table, "c2", "c0")
     c0, c2 = (table.of(name).mean() for name in ("c0", "c2"))
@@ -48,7 +46,7 @@ def test_improvement_has_an_interval_around_it() -> None:
     assert row["low"] < 100 * (expected[2] / expected[0] - 1) < row["high"]
 
 
-def test_answers_survive_the_table() -> None:
+def test_answers_survive_the_table():
     table = simulated((3, 4))
     again = rating_table(rated_answers(table))
     assert again.conditions == table.conditions
@@ -58,7 +56,7 @@ def test_answers_survive_the_table() -> None:
     )
 
 
-def test_known_means_are_found() -> None:
+def test_known_means_are_found():
     figures = rating_figures(simulated((60, 40)), None)
     assert figures["baseline"] == "c0"
     assert [row["condition"] for row in figures["conditions"]] == ["c2", "c1", "c0"]
@@ -67,7 +65,7 @@ def test_known_means_are_found() -> None:
         assert (row["answers"], row["raters"], row["sentences"]) == (2400, 60, 40)
 
 
-def test_a_difference_of_few_raters_on_one_sentence_is_the_paired_t_test() -> None:
+def test_a_difference_of_few_raters_on_one_sentence_is_the_paired_t_test():
     table = simulated((12, 1))
     usual = stats.ttest_rel(table.of("c1")[:, 0], table.of("c0")[:, 0])
     row = next(row for row in rating_figures(table, None)["pairs"] if row["other"] == "c1")
@@ -76,7 +74,7 @@ def test_a_difference_of_few_raters_on_one_sentence_is_the_paired_t_test() -> No
     assert row["over"] == "raters"
 
 
-def test_what_raters_add_to_all_conditions_leaves_differences() -> None:
+def test_what_raters_add_to_all_conditions_leaves_differences():
     """Nothing is normalised: a rater who is strict throughout changes no difference."""
     table = simulated((10, 6), means=np.array([2.5, 3.0]))
     strict = table.values + np.linspace(-1, 1, 10)[:, None]
@@ -84,7 +82,7 @@ def test_what_raters_add_to_all_conditions_leaves_differences() -> None:
     assert moved.difference("c1", "c0").interval == pytest.approx(table.difference("c1", "c0").interval)
 
 
-def test_the_anchor_is_shown_but_not_tested() -> None:
+def test_the_anchor_is_shown_but_not_tested():
     table = simulated((8, 6))
     figures = rating_figures(RatingTable(("a", "anchor", "recording"), table.values, table.count, table.scale), None)
     assert len(figures["conditions"]) == 3
@@ -93,7 +91,7 @@ def test_the_anchor_is_shown_but_not_tested() -> None:
     assert [row["condition"] for row in figures["relative_improvement"]] == ["recording"]
 
 
-def test_conditions_never_compared_by_one_rater_have_no_difference() -> None:
+def test_conditions_never_compared_by_one_rater_have_no_difference():
     answers = [rating((f"r{r}", f"s{s}"), "ab"[r % 2], 1 + (r + s) % 5) for r in range(6) for s in range(4)]
     figures = rating_figures(rating_table(answers), "a")
     (pair,) = figures["pairs"]
@@ -103,7 +101,7 @@ def test_conditions_never_compared_by_one_rater_have_no_difference() -> None:
     assert not np.isnan(figures["conditions"][0]["low"])
 
 
-def test_equal_scores_have_means_and_no_intervals() -> None:
+def test_equal_scores_have_means_and_no_intervals():
     answers = [rating((f"r{r}", f"s{s}"), name, 4) for r in range(5) for s in range(3) for name in "ab"]
     table = rating_table(answers)
     figures = rating_figures(table, None)
@@ -115,7 +113,7 @@ def test_equal_scores_have_means_and_no_intervals() -> None:
     assert difference_components(table) is not None
 
 
-def test_a_baseline_of_nothing_has_no_improvement_over_it() -> None:
+def test_a_baseline_of_nothing_has_no_improvement_over_it():
     ranks = [
         rating((f"r{r}", f"s{s}"), name, 50 * (name == "b"), kind="ranking")
         for r in "xy"
@@ -127,10 +125,67 @@ def test_a_baseline_of_nothing_has_no_improvement_over_it() -> None:
 
 
 @pytest.mark.long
-def test_intervals_cover_known_means_near_the_end_of_the_scale() -> None:
+def test_intervals_cover_known_means_near_the_end_of_the_scale():
     draw, truth = np.random.default_rng(3), [expected_rating(mean, Effects()) for mean in MEANS]
     hits = []
     for _ in range(400):
         rows = rating_figures(ratings(draw, MEANS, (20, 6), Effects()), None)["conditions"]
         hits += [row["low"] <= truth[int(row["condition"][1])] <= row["high"] for row in rows]
     assert 0.93 < np.mean(hits) < 0.97
+
+
+USUAL = Components(0.16, 0.04, 1.0)
+
+
+def told(components: Components, difference: float, raters: int, sentences: int, studies: int) -> float:
+    draw, found = np.random.default_rng(7), 0
+    rater, sentence, rest = np.sqrt(components)
+    for _ in range(studies):
+        values = difference + rest * draw.normal(size=(raters, sentences))
+        values += rater * draw.normal(size=(raters, 1)) + sentence * draw.normal(size=(1, sentences))
+        found += crossed_mean(values, 4.0).p_value < 0.05
+    return found / studies
+
+
+@pytest.mark.parametrize("components", [USUAL, Components(0, 0, 1.0), Components(0.0, 0.3, 0.5)])
+def test_power_is_that_of_simulated_studies(components):
+    assert power_of(components, 0.5, 12, 6) == pytest.approx(told(components, 0.5, 12, 6, 800), abs=0.04)
+
+
+def test_where_raters_alone_differ_power_is_that_of_the_t_test():
+    critical, shift = stats.t.ppf(0.975, 15), 0.5 / np.sqrt(0.5 / 16)
+    usual = 1 - stats.nct.cdf(critical, 15, shift) + stats.nct.cdf(-critical, 15, shift)
+    assert power_of(Components(0.5, 0, 1e-9), 0.5, 16, 6) == pytest.approx(usual, abs=0.01)
+
+
+def test_the_number_of_raters_is_the_smallest():
+    for difference in (0.3, 0.5, 1.0):
+        raters = raters_needed(USUAL, difference, 12)
+        assert raters is not None
+        assert power_of(USUAL, difference, raters, 12) >= 0.8
+        assert raters == 2 or power_of(USUAL, difference, raters - 1, 12) < 0.8
+    assert raters_needed(USUAL, 0.5, 12, 0.95) > raters_needed(USUAL, 0.5, 12)  # type: ignore[operator]
+
+
+def test_sentences_that_differ_bound_what_raters_can_tell():
+    components = Components(0.1, 0.3, 0.5)
+    assert raters_needed(components, 0.3, 6) is None
+    assert raters_needed(components, 0.3, 60) is not None
+
+
+def test_judgements_that_never_vary():
+    nothing = Components(0, 0, 0)
+    assert power_of(nothing, 0.1, 2, 2) == 1
+    assert power_of(nothing, 0.0, 2, 2) == pytest.approx(0.05)
+    assert raters_needed(nothing, 0.1, 2) == 2
+
+
+def test_tables_of_raters():
+    rows = rating_power(USUAL, "mos", 12, 0.8)
+    assert [row["difference"] for row in rows] == [0.1, 0.2, 0.3, 0.5, 1.0]
+    assert [row["difference"] for row in rating_power(USUAL, "ranking", 12, 0.8)] == [2, 5, 10, 20]
+    shares = share_power(Components(0.05, 0.02, 0.6), 12, 0.8)
+    assert [row["share"] for row in shares] == [0.55, 0.6, 0.65, 0.7, 0.75]
+    needed = [row["raters"] for row in shares if row["raters"]]
+    assert needed == sorted(needed, reverse=True)
+    assert rating_power(None, "mos", 12, 0.8) == share_power(None, 12, 0.8) == rating_power(USUAL, "mos", 1, 0.8) == []

@@ -1,7 +1,3 @@
-"""Who is left out: each rule catches whom it is for, and spares who merely finds conditions alike."""
-
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -50,7 +46,7 @@ CASES: list[tuple[str, Change, str]] = [
 ]
 
 
-def test_an_attentive_panel_stays() -> None:
+def test_an_attentive_panel_stays():
     """Also where all conditions look alike, so that answers to both orders agree by chance alone."""
     screening = screen(panel())
     assert len(screening.raters) == 10
@@ -59,7 +55,7 @@ def test_an_attentive_panel_stays() -> None:
 
 
 @pytest.mark.parametrize(("rule", "change", "text"), CASES, ids=[case[0] for case in CASES])
-def test_a_rule_finds_its_rater(rule: str, change: Change, text: str) -> None:
+def test_a_rule_finds_its_rater(rule, change, text):
     answers = changed(change)
     screening = screen(answers)
     assert set(screening.found) == {"r3"}
@@ -70,12 +66,12 @@ def test_a_rule_finds_its_rater(rule: str, change: Change, text: str) -> None:
     assert {each.rater for each in screening.kept(answers)} == set(screening.raters) - {"r3"}
 
 
-def test_too_few_answers() -> None:
+def test_too_few_answers():
     answers = [each for each in panel() if each.rater != "r3" or each.sentence == "s1"]
     assert screen(answers).found["r3"]["answers"] == "9 of usually 54"
 
 
-def test_an_anchor_that_is_preferred() -> None:
+def test_an_anchor_that_is_preferred():
     answers = paired_answers(
         comparisons(np.random.default_rng(1), np.array([5.0, -5, -5]), (6, 6), Effects(0, 0, 0, 0, 0))
     )
@@ -86,18 +82,18 @@ def test_an_anchor_that_is_preferred() -> None:
     assert set(screen(answers).found) == {f"r{rater}" for rater in range(6)}
 
 
-def test_equal_times_exclude_nobody_and_broken_ones_are_passed_over() -> None:
+def test_equal_times_exclude_nobody_and_broken_ones_are_passed_over():
     answers = [replace(each, seconds=4.0) for each in panel()]
     assert not screen(answers).found
     answers = [replace(each, seconds=float("nan") if each.rater == "r1" else 0.0) for each in answers]
     assert not screen(answers).found
 
 
-def test_four_raters_are_no_panel_for_times() -> None:
+def test_four_raters_are_no_panel_for_times():
     few = [each for each in changed(lambda each: replace(each, seconds=each.seconds / 9)) if each.rater < "r4"]
     assert not screen(few).found
 
 
-def test_practice_and_checks_do_not_count() -> None:
+def test_practice_and_checks_do_not_count():
     assert len(counts(panel())) == len(panel()) - 30
     assert screen([]).raters == ()

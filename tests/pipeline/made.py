@@ -1,0 +1,49 @@
+"""What tests of several rooms make: corpora of utterances, and sounds of noise."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from scipy.io import wavfile
+
+from lipmotion import Corpus
+from lipmotion.testing.toy import toy_sentences, toy_utterances
+from lipmotion.types import Timeline, Unit, Utterance
+
+
+def corpus_of(folder: Path, utterances: Iterable[Utterance]) -> Corpus:
+    corpus = Corpus.create(folder)
+    for utterance in utterances:
+        corpus.add(utterance)
+    return corpus
+
+
+GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
+"""How ben's opening, width and outer differ from those of the toy: he never closes his mouth wholly."""
+
+
+def of_ben(utterance: Utterance) -> Utterance:
+    motion = utterance.track.motion
+    changed = replace(motion, values=OFFSET + GAIN * motion.values)
+    return replace(utterance, track=replace(utterance.track, motion=changed), speaker="ben")
+
+
+def people(count: int = 12, seed: int = 0) -> list[Utterance]:
+    """Return sentences of the toy; every other one is ben's, the others are anna's."""
+    said = enumerate(toy_utterances(count, seed=seed))
+    return [of_ben(each) if number % 2 else replace(each, speaker="anna") for number, each in said]
+
+
+def true_phones(utterance: Utterance, names: Mapping[str, str] = MappingProxyType({})) -> Timeline[Unit]:
+    """Return the phones of a toy utterance, some of them under other names."""
+    (units,) = (each.units for each in toy_sentences(12) if each.name == utterance.name)
+    return Timeline(tuple(replace(s, label=Unit(names.get(s.label.phone, s.label.phone))) for s in units))
+
+
+def write_noise(path: Path, seconds: float = 1.0, seed: int = 0, rate_hz: int = 16_000) -> None:
+    """Write noise as a WAV file, whatever its suffix is."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    samples = np.random.default_rng(seed).integers(-9000, 9000, int(seconds * rate_hz))
+    wavfile.write(path, rate_hz, samples.astype("<i2"))
