@@ -264,10 +264,7 @@ def test_names_that_come_again_and_again_are_not_said(read: Read) -> None:
 
 
 DAMAGED = {
-    "times without seconds": (
-        "1\n00:00:01,000 --> 07\nhi\n\n2\n00:04 --> 00:05\nyou",
-        r"a\.txt: line 2 is '00:00:01",
-    ),
+    "times without seconds": ("1\n00:00:01,000 --> 07\nhi\n\n2\n00:04 --> 00:05\nyou", r"a\.txt: line 2 is '00:00:01"),
     "a time with letters": (SRT.replace("00:00:02,750 -->", "00:00:0x,7 -->"), r"a\.txt: line 6 is '00:00:0x,7 -->"),
     "an end before its start": (
         SRT.replace("02,750", "09,750"),

@@ -3,13 +3,7 @@ import pytest
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, random_hmm, recordings, speaker
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.align import (
-    align_units,
-    choose_pronunciations,
-    expand_states,
-    place_words,
-    spread_windows,
-)
+from lipmotion.hmm.align import align_units, choose_pronunciations, expand_states, place_words, spread_windows
 from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.kernels.paths import Windows
 from oracles import sequences
@@ -53,13 +47,7 @@ def test_too_short_a_recording_says_so():
         align_units(hmm, compute_log_likelihoods(hmm, np.zeros((11, 2), np.float32)), ("sil", "a", "b", "sil"))
     assert align_units(
         hmm, compute_log_likelihoods(hmm, np.zeros((12, 2), np.float32)), ("sil", "a", "b", "sil")
-    ).tolist() == [
-        0,
-        3,
-        6,
-        9,
-        12,
-    ]
+    ).tolist() == [0, 3, 6, 9, 12]
 
 
 WORDS = ((("a",), ("b", "c")), (("d",),), (("c", "e"), ("b",), ("e", "e")))

@@ -12,16 +12,7 @@ from lipmotion.motion.acoustic_network import POSTERIOR_SHARES, AcousticNetwork
 from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.posterior_network import RECURRENT, PosteriorNetwork
 from lipmotion.motion.predictors import PredictorTraining, predictor_from_arrays, predictor_to_arrays
-from lipmotion.types import (
-    Channel,
-    ConditionSpectrum,
-    Example,
-    Features,
-    Motion,
-    Speech,
-    Timeline,
-    TokenPosteriors,
-)
+from lipmotion.types import Channel, ConditionSpectrum, Example, Features, Motion, Speech, Timeline, TokenPosteriors
 
 TRAINED_RECURRENT = posterior_network._train_recurrent
 """The tests of all else train none (``conftest``)."""

@@ -192,10 +192,7 @@ def test_nothing_but_the_file_itself_is_opened(tmp_path: Path) -> None:
     Image.new("RGB", (64, 48)).save(tmp_path / "page001.png")
     for name, text in FOREIGN.items():
         (tmp_path / name).write_text(text)
-        with (
-            opened_in(tmp_path) as opened,
-            pytest.raises(InputError, match=r"required a recording|not a readable"),
-        ):
+        with opened_in(tmp_path) as opened, pytest.raises(InputError, match=r"required a recording|not a readable"):
             read_audio(tmp_path / name)
         assert opened <= {name}
 

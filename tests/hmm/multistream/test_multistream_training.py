@@ -46,8 +46,7 @@ def stages(events):
 
 
 @pytest.mark.parametrize(
-    "weights",
-    [StreamWeights(), MOTION_ONLY, pytest.param(StreamWeights(0.3, 0.5, 0, 0.1, 2), marks=pytest.mark.long)],
+    "weights", [StreamWeights(), MOTION_ONLY, pytest.param(StreamWeights(0.3, 0.5, 0, 0.1, 2), marks=pytest.mark.long)]
 )
 def test_the_likelihood_never_falls_within_a_stage(weights):
     data = TRAIN[:10] if weights is MOTION_ONLY else [replace(utterance, bounds=None) for utterance in TRAIN[:10]]

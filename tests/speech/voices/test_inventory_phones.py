@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.speech.voices import inventory_phones as module
 from lipmotion.speech.voices.inventory_phones import inventory_timeline, matches, with_words
-from lipmotion.speech.voices.phone_maps import ARPABET_PHONES, ESPEAK_PHONES
+from lipmotion.speech.voices.phone_maps import ARPABET_PHONES, ESPEAK_PHONES, complete_map
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from oracles.edits import least_cost
@@ -107,3 +107,15 @@ def test_tables_lead_to_the_inventory() -> None:
         assert {phone for phones in table.values() for phone in phones} <= set(PHONES)
     spoken = {phone for phones in ESPEAK_PHONES.values() for phone in phones}
     assert set(PHONES) - spoken == {"sp"}
+
+
+def test_unknown_letters_are_reported_once() -> None:
+    found, unknown = complete_map(["ꙮ", "aꙮ", "_", ";", "_", "ꙮ"], {"_": ("sil",), ";": ()}, ipa=True)
+    assert found == {"ꙮ": ("ax",), "aꙮ": ("aa", "ax"), "_": ("sil",), ";": ()}
+    assert unknown == ("ꙮ",)
+
+
+def test_unknown_mnemonics_are_read_as_ipa_and_reported() -> None:
+    found, unknown = complete_map(["t", "e", "_!"], {"t": ("t",)}, ipa=False)
+    assert found == {"t": ("t",), "e": ("eh",), "_!": ("sil",)}
+    assert unknown == ("e",)

@@ -26,12 +26,7 @@ from oracles.networks import posteriors
 
 SMALL = {"articulation": False, "states": 1, "asynchrony": 0, "mixtures": 1, "speech_only_mixtures": 2, "components": 1}
 PLAIN = {"acoustic_regression": False, "variance_scaling": False}
-STRUCTURES = {
-    "hmm": "phone",
-    "multistream": "phone",
-    "factorial": "phone viseme",
-    "coupled": "phone viseme",
-}
+STRUCTURES = {"hmm": "phone", "multistream": "phone", "factorial": "phone viseme", "coupled": "phone viseme"}
 
 
 def aligned(sentences: Sequence[Example]) -> list[AlignedUtterance]:
