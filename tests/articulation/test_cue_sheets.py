@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formats.cue_examples import result, spoken, timeline
+from formats.examples import result, spoken, timeline
 from lipmotion import CueSheet
 from lipmotion.articulation.cue_sheets import (
     ANY_OPEN,

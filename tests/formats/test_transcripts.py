@@ -194,18 +194,16 @@ def test_words_in_time(read: Read, kind: str) -> None:
         assert word[1:] == pytest.approx(wanted[1:])
 
 
-def test_some_words_have_no_time(read: Read) -> None:
+def test_some_words_have_no_time_some_share_one_and_an_end_just_before_its_start_is_its_start(read: Read) -> None:
     items = [{"word": "In", "start": 0.5, "end": 0.6}, {"word": "1999"}, {"word": "we", "start": 2.0, "end": None}]
     found = words(read(json.dumps({"segments": [{"start": 0.5, "end": 2.5, "text": "", "words": items}]})))
     assert [word for word, *_ in found] == ["in", "1999", "we"]
     assert [time is None for _, time, _ in found] == [False, True, False]
     assert found[-1] == ("we", 2.0, None)
-
-
-def test_several_words_share_the_time_of_one(read: Read) -> None:
     found = words(read('{"words": [{"word": "20-foot", "start": 1.0, "end": 2.0}]}'))
     assert [word for word, *_ in found] == ["20", "foot"]
     assert [time for row in found for time in row[1:]] == pytest.approx([1.0, 1.6, 1.6, 2.0])
+    assert words(read('{"words": [{"word": "a", "start": 7.0, "end": 6.98}]}')) == [("a", 7.0, 7.0)]
 
 
 SCROLLING = """WEBVTT
@@ -237,11 +235,8 @@ def test_captions_that_scroll_say_each_line_once(read: Read) -> None:
     assert [start_s for _, start_s, _ in found] == pytest.approx([0.24, 0.64, 0.8, 1.92, 2.32])
     without_times = SCROLLING.replace("<c>", "").replace("</c>", "").replace("<00:00:", "<").replace("<0", "<i 0")
     assert read(without_times).words == ("let", "us", "look", "look", "again")
-
-
-def test_what_is_said_twice_stays(read: Read) -> None:
-    text = "00:00:01,000 --> 00:00:02,000\nno\n\n00:00:02,000 --> 00:00:03,000\nno\nno\n\n"
-    assert read(text).words == ("no", "no", "no")
+    twice = "00:00:01,000 --> 00:00:02,000\nno\n\n00:00:02,000 --> 00:00:03,000\nno\nno\n\n"
+    assert read(twice).words == ("no", "no", "no")
 
 
 def test_what_is_spoken(read: Read) -> None:
@@ -266,14 +261,10 @@ def test_names_that_come_again_and_again_are_not_said(read: Read) -> None:
 DAMAGED = {
     "times without seconds": ("1\n00:00:01,000 --> 07\nhi\n\n2\n00:04 --> 00:05\nyou", r"a\.txt: line 2 is '00:00:01"),
     "a time with letters": (SRT.replace("00:00:02,750 -->", "00:00:0x,7 -->"), r"a\.txt: line 6 is '00:00:0x,7 -->"),
-    "an end before its start": (
-        SRT.replace("02,750", "09,750"),
-        r"a\.txt: line 6 ends at 4 s, before its start at 9.75 s",
-    ),
-    "a table with a broken row": (
-        "start\tend\ttext\n0\t1\ta\n2 3 b\n",
-        r"a\.txt: line 3 is '2 3 b'; required: start, end",
-    ),
+    "an end before its start": (SRT.replace("02,750", "09,750"),
+        r"a\.txt: line 6 ends at 4 s, before its start at 9.75 s"),
+    "a table with a broken row": ("start\tend\ttext\n0\t1\ta\n2 3 b\n",
+        r"a\.txt: line 3 is '2 3 b'; required: start, end"),
     "no word": (SRT.replace("Hello there!", "♪").replace("How are\nyou?", "[music]"), "holds no word"),
     "JSON cut off": ('{"segments": [\n{"start": 0,', r"a\.txt: line 2: damaged JSON"),
     "JSON with more after it": ('{"segments": []}\n]', r"a\.txt: line 2: damaged JSON"),
@@ -285,21 +276,17 @@ DAMAGED = {
     "a segment that is a number": ('{"segments": [{"text": "a"}, 7]}', "'segments', item 2 is 7, required an object"),
     "a word without text": ('{"words": [{"start": 7}]}', "words 1: no text"),
     "a text that is a list": ('{"segments": [{"text": [1], "start": 7}]}', r"its text is \[1\], required a text"),
-    "a word that ends long before it starts": (
-        '{"words": [{"word": "a", "start": 7, "end": 2}]}',
-        "ends at 2 s, before",
-    ),
+    "a word that ends long before it starts": ('{"words": [{"word": "a", "start": 7, "end": 2}]}',
+        "ends at 2 s, before"),
     "CTM of two recordings": ("a 1 0.0 0.5 hi\nb 1 0.5 0.5 you\n", r"line 2: words of two recordings, 'a' and 'b'"),
     "CTM with a broken line": ("a 1 0.0 0.5 hi\na 1 0.5 you\n", r"line 2 is 'a 1 0\.5 you'; required, as in line 1"),
     "CTM with a time that is none": ("a 1 0.0 0.5 hi\na 1 nan 0.5 you\n", "line 2 has the time 'nan"),
     "CTM with a negative duration": ("a 1 0.0 0.5 hi\na 1 1.0 -0.5 you\n", r"line 2: a duration of -0\.5 s"),
-    "LRS with a broken line": (
-        "Text:  HI\n\nWORD START END\nHI 0.1 0.2 9\nYOU 0.2\n",
-        r"line 5 is 'YOU.*0\.2'; required",
-    ),
+    "LRS with a broken line": ("Text:  HI\n\nWORD START END\nHI 0.1 0.2 9\nYOU 0.2\n",
+        r"line 5 is 'YOU.*0\.2'; required"),
     "LRS with a time that is none": ("Text:  HI\n\nWORD START END\nHI 0.1 nan\n", "line 4 has the time 'nan"),
     "phones alone": ("0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "phones in time, but no words"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", DAMAGED)
@@ -307,10 +294,6 @@ def test_what_is_damaged_is_refused_with_its_place(read: Read, kind: str) -> Non
     text, message = DAMAGED[kind]
     with pytest.raises(InputError, match=message):
         read(text)
-
-
-def test_an_end_a_little_before_its_start_is_its_start(read: Read) -> None:
-    assert words(read('{"words": [{"word": "a", "start": 7.0, "end": 6.98}]}')) == [("a", 7.0, 7.0)]
 
 
 HOSTILE: list[tuple[Callable[[], bytes], str]] = [
@@ -340,8 +323,9 @@ def test_other_encodings(read: Read, caplog: pytest.LogCaptureFixture) -> None:
 
 
 def test_plain_text_stays_as_it_is(tmp_path: Path) -> None:
-    (tmp_path / "a.txt").write_text("Hello, [you] (all)\n")
-    assert read_transcript(tmp_path / "a.txt") == "Hello, [you] (all)\n"
+    for text in ("Hello, [you] (all)\n", "The 5:30 - 6:00 train", "5:30 - 6:00", "a -> b", "3 - 4 -> 5"):
+        (tmp_path / "a.txt").write_text(text)
+        assert read_transcript(tmp_path / "a.txt") == text
     with pytest.raises(InputError, match=r"b\.txt: no such transcript file"):
         read_transcript(tmp_path / "b.txt")
 
@@ -415,12 +399,6 @@ def test_times_are_never_spoken(tmp_path: Path) -> None:
         with pytest.raises(InputError) as refused:
             read_transcript(path)
         assert message in str(refused.value)
-
-
-def test_texts_with_times_of_day_or_arrows_are_texts(tmp_path: Path) -> None:
-    for text in ("The 5:30 - 6:00 train", "5:30 - 6:00", "a -> b", "3 - 4 -> 5"):
-        (tmp_path / "a.txt").write_text(text)
-        assert read_transcript(tmp_path / "a.txt") == text
 
 
 def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
