@@ -31,8 +31,7 @@ from lipmotion_faces.head.shape_fit import lip_gap
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.portrait_rasteriser import face_poses
-from meshes.heads import head, lip_points, write_glb
-from meshes.obj_writing import write_obj
+from meshes.heads import head, lip_points, write_glb, write_obj
 from meshes.speech import motion, units
 
 Mask = NDArray[np.bool_]

@@ -22,7 +22,8 @@ from lipmotion.speech.recognition.agreement import (
     agreement_score,
     transcript_fit,
 )
-from lipmotion.speech.recognition.general.acoustic import PHONES as GENERAL_PHONES, general_model
+from lipmotion.speech.recognition.general.acoustic import PHONES as GENERAL_PHONES
+from lipmotion.speech.recognition.general.acoustic import general_model
 from lipmotion.speech.recognition.general.front_end import general_features
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import (
