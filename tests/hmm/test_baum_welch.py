@@ -15,7 +15,7 @@ from lipmotion.hmm.baum_welch import accumulate_statistics, adapt_contexts, baum
 from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.unit_training import add_contexts
-from oracles import chains
+from oracles import paths
 
 
 def step(hmm, data, said):
@@ -75,7 +75,7 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
         chain = expand_states(hmm, units)
         stay = hmm.log_stay[chain.plain].astype(float)
         emission = hmm.mixtures.log_likelihood(x)[:, chain.densities].astype(float)
-        posterior, stay, log_likelihood = chains.chain_posteriors(emission, stay, np.log(-np.expm1(stay)))
+        posterior, stay, log_likelihood = paths.chain_posteriors(emission, stay, np.log(-np.expm1(stay)))
         np.add.at(occupied, chain.densities, posterior.sum(axis=0))
         np.add.at(visits, chain.plain, posterior.sum(axis=0))
         np.add.at(stays, chain.plain, stay)

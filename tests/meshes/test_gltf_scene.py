@@ -191,6 +191,13 @@ TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")
 """The table at the end of each stream of triangles."""
 
 
+@pytest.mark.parametrize(
+    ("start", "triangles"),
+    [
+        ("e0 f0 10 fe ff f0 0c ff 02 02 02 00", [[0, 1, 2], [2, 1, 3], [4, 6, 5], [7, 8, 9]]),
+        ("e1 f0 10 fe 1f 3d 00 0a 00", [[0, 1, 2], [2, 1, 3], [0, 1, 2], [2, 1, 5], [2, 1, 4]]),
+    ],
+)
 def test_triangles_of_both_versions_indices_and_exponents(start, triangles):
     """Streams of the reference implementation (meshoptimizer): fresh, shared, repeated and arbitrary vertices."""
     stream = bytes.fromhex(start) + TAIL

@@ -20,8 +20,8 @@ from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, me
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, Stream, StreamObservations, StreamWeights
 from lipmotion.types import Progress
-from oracles import chains
 from oracles import joint as slow
+from oracles import paths
 
 TRAIN, HELD_OUT = utterances(30), utterances(8, seed=1)
 
@@ -70,7 +70,7 @@ def test_posteriors_are_those_of_all_paths():
             [slow.log_density(hmm, observed, state, t, hmm.config.training) for state in triphones] for t in range(7)
         ]
         rows = prepared.items[0].monophones
-        expected, stay, log_likelihood = chains.chain_posteriors(
+        expected, stay, log_likelihood = paths.chain_posteriors(
             np.array(density), hmm.log_stay[rows], hmm.log_move[rows]
         )
         assert found.states == pytest.approx(expected, abs=1e-4)

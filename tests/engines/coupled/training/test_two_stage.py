@@ -22,7 +22,7 @@ from lipmotion.stats.mixture import Mixtures
 from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles.joint import mixture
-from oracles.networks import posteriors
+from oracles.paths import posteriors
 
 SMALL = {"articulation": False, "states": 1, "asynchrony": 0, "mixtures": 1, "speech_only_mixtures": 2, "components": 1}
 PLAIN = {"acoustic_regression": False, "variance_scaling": False}
