@@ -145,6 +145,7 @@ def test_a_moving_face_is_one_scene(show: Show) -> None:
     assert followed == [150.0 + n for n in range(30)]
     assert follower.person().all()
     assert follower.cuts() == []
+    assert len(show([([ANNA], 0)] * 110)[0].thumbnails()) == MOST_THUMBNAILS  # later looks are kept when they are new
 
 
 def test_the_one_shown_longest_is_the_person(show: Show) -> None:
@@ -185,6 +186,8 @@ def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
     assert followed == [220.0] * 8 + [None] * 3 + [230.0] * 8
     assert np.flatnonzero(~follower.person()).tolist() == [8, 9, 10]
     assert SmallMesh.open == 0
+    assert show([([hidden], 0)] * 6)[1] == [None] * 6  # of which the mesh is unsure is nobody's
+    assert SmallMesh.open == 0
 
 
 def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
@@ -192,12 +195,6 @@ def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
     follower, followed = show([([SMALL_ANNA], 0)] * 12 + gone + [([moved(SMALL_ANNA, -120)], 0)] * 6)
     assert followed == [220.0] * 12 + [None] * len(gone) + [100.0] * 6
     assert np.flatnonzero(follower.person()).tolist() == [*range(12), *range(len(followed) - 6, len(followed))]
-
-
-def test_a_face_of_which_the_mesh_is_unsure_is_nobodys(show: Show) -> None:
-    _, followed = show([([("A", *SMALL_ANNA[1:])], 0)] * 6)
-    assert followed == [None] * 6
-    assert SmallMesh.open == 0
 
 
 def test_of_several_small_ones_the_largest_then_the_known_one(show: Show) -> None:
@@ -213,12 +210,6 @@ def test_only_the_person_who_is_wanted_counts(show: Show) -> None:
     assert follower.person().tolist() == [False] * 20 + [True] * 5
     assert follower.share_of_person() == pytest.approx(0.2)
     assert not show([([BELLA], 1)] * 20, wanted)[0].person().any()
-
-
-def test_later_looks_are_kept_when_they_are_new(show: Show) -> None:
-    """Frames 0 to 95 give the first twenty thumbnails; nothing changes until somebody else's look comes slowly."""
-    same, _ = show([([ANNA], 0)] * 110)
-    assert len(same.thumbnails()) == MOST_THUMBNAILS
 
 
 def test_of_several_the_largest_then_the_middle_one(show: Show) -> None:
