@@ -64,12 +64,11 @@ def test_everything_comes_later(said: Generation) -> None:
 
 @pytest.mark.parametrize("offset_ms", [1000.0, -250.0])
 def test_phones_that_end_after_the_last_frame_are_not_cut(said: Generation, offset_ms: float) -> None:
-    last = len(said.units) - 1
-    spans = [*list(said.units)[:-1], replace(said.units[last], end_s=2.005)]
-    longer = replace(said, units=Timeline(tuple(spans)))
+    *spans, last = said.units
+    longer = Timeline((*spans, replace(last, end_s=2.005)))
     delivery, end_s = Delivery(offset_ms=offset_ms), pytest.approx(2.005 + offset_ms / 1000)
-    assert shift_in_time(longer, delivery).units[last].end_s == end_s
-    assert delay_units(longer.units, delivery, 2.0)[last].end_s == end_s
+    assert shift_in_time(replace(said, units=longer), delivery).units[len(spans)].end_s == end_s
+    assert delay_units(longer, delivery, 2.0)[len(spans)].end_s == end_s
 
 
 def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:
@@ -82,7 +81,7 @@ def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:
 
 def test_closures_survive_a_shift_between_two_frames(said: Generation) -> None:
     spiky = said.motion.values.copy()
-    (column,) = [said.motion.column("opening")]
+    column = said.motion.column("opening")
     spiky[90:101, column] = 0.1
     spiky[95, column] = 0.0
     early = shift_in_time(replace(said, motion=replace(said.motion, values=spiky)), Delivery(anticipation_ms=33))
@@ -141,9 +140,8 @@ def error(rows: NDArray[np.float64], borders: list[int], fixed: list[int]) -> fl
     """Return the sum of squared differences between curves and held poses."""
     total = 0.0
     for first, stop in pairwise(borders):
-        inside = [frame for frame in fixed if first <= frame < stop]
-        pose = rows[inside].mean(axis=0) if inside else rows[first:stop].mean(axis=0)
-        total += float(((rows[first:stop] - pose) ** 2).sum())
+        inside = [frame for frame in fixed if first <= frame < stop] or slice(first, stop)
+        total += float(((rows[first:stop] - rows[inside].mean(axis=0)) ** 2).sum())
     return total
 
 
@@ -174,13 +172,10 @@ def test_no_division_is_nearer() -> None:
         assert error(rows, borders, fixed) == pytest.approx(least_error(rows, hold, fixed), abs=1e-9)
 
 
-def test_a_curve_of_steps_is_found_again() -> None:
+def test_a_curve_of_steps_is_found_again_and_few_frames_are_one_pose() -> None:
     rows = np.repeat([0.0, 3.0, 1.0, 2.0], [5, 4, 6, 7])[:, None]
     borders = choose_holds(rows, 4)
     assert {5, 9, 15} <= set(borders)
     assert error(rows, borders, []) == pytest.approx(0, abs=1e-12)
-
-
-def test_few_frames_are_one_pose() -> None:
     for frames, borders in ((0, [0]), (1, [0, 1]), (7, [0, 7])):
         assert choose_holds(np.arange(frames, dtype=float)[:, None], 4) == borders

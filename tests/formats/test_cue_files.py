@@ -96,10 +96,10 @@ def test_what_is_written_is_read(sheet: CueSheet, tmp_path: Path) -> None:
         assert float(root.findtext("metadata/duration") or "") == sheet.duration_s
         said = root.findtext("metadata/soundFile") or ""
         assert said == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
-    for name, form in CUE_FORMATS.items():
+    for name, kind in CUE_FORMATS.items():
         path = tmp_path / f"Größe.{name.upper()}"
         write_cue_file(path, sheet, "a.wav", format_of(path))
-        assert path.read_bytes().decode() == form.text(sheet, "a.wav")
+        assert path.read_bytes().decode() == kind.text(sheet, "a.wav")
     for name in ("a.txt", "a"):
         with pytest.raises(ExportError, match=r"unknown cue format .*; required one of: \.tsv \.xml \.json \.dat"):
             format_of(Path(name))
@@ -186,11 +186,11 @@ def test_every_frame_shows_the_cue_and_words_follow_each_other(toy_sentence: Toy
     words = [word for *_, words in phrases for word, *_ in words]
     assert {part for word in words for part in word.split("-")} <= {f"word{n}" for n in range(99)} | {UNKNOWN}
     assert len(words) > 1
-    for text, first, last, words in phrases:
-        assert text == " ".join(word for word, *_ in words)
-        assert (words[0][1], words[-1][2]) == (first, last)
-        assert all(after[1] == before[2] + 1 for before, after in pairwise(words))
-        assert all(start <= end and shapes[0][0] == start for _, start, end, shapes in words)
+    for text, first, last, said_in in phrases:
+        assert text == " ".join(word for word, *_ in said_in)
+        assert (said_in[0][1], said_in[-1][2]) == (first, last)
+        assert all(after[1] == before[2] + 1 for before, after in pairwise(said_in))
+        assert all(start <= end and shapes[0][0] == start for _, start, end, shapes in said_in)
 
 
 def test_words_of_less_than_a_frame_are_joined() -> None:

@@ -220,16 +220,10 @@ TIMED = {
 }
 """What is read as a transcript, but is no plain text."""
 WORDS = [
-    "hello you",
-    "3 5 7\n1 2 9\n",
-    "20 30 people\n40 50 more\n",
-    "Chapter 1\n\n1.5 million people came.\nThey stayed.\n",
-    "It took 1234567 steps,\n3.5 days.\n",
-    "a --> b",
-    "# a heading\n\nhello\n",
-    "<3 you",
-    "[laughs] hello",
-]
+    "hello you", "3 5 7\n1 2 9\n", "20 30 people\n40 50 more\n",
+    "Chapter 1\n\n1.5 million people came.\nThey stayed.\n", "It took 1234567 steps,\n3.5 days.\n", "a --> b",
+    "# a heading\n\nhello\n", "<3 you", "[laughs] hello",
+]  # fmt: skip
 
 
 def test_what_would_be_read_as_words_is_refused(tmp_path: Path) -> None:

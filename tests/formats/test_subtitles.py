@@ -36,7 +36,7 @@ def test_words_and_phones_are_written_and_words_come_back(tmp_path: Path, suffix
         )
     assert text(UNITS, f"a{suffix}") == words
     assert text(UNITS, f"a.phones{suffix.upper()}") == phones
-    plain = Timeline((*UNITS[:3], Span(0.52, 3599.9996, Unit("dh", "", "there"))))
+    plain = Timeline((*UNITS.spans[:3], Span(0.52, 3599.9996, Unit("dh", "", "there"))))
     text(plain, f"a{suffix}")
     transcript = read_labels(tmp_path / f"a{suffix}").transcript
     assert transcript is not None

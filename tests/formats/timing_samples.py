@@ -106,17 +106,8 @@ MFA_CSV = "Begin,End,Label,Type,Speaker\n0.1,0.5,my,words,ann\n0.1,0.2,M,phones,
 SERVERS = {"timestamps": [{"word": "Hi,", "start_time": 0.1, "end_time": 0.4}]}
 
 SAMPLES = {
-    "polly": POLLY,
-    "words": AZURE_WORDS,
-    "visemes": AZURE_VISEMES,
-    "characters": ELEVENLABS,
-    "messages": CARTESIA,
-    "marks": GOOGLE,
-    "piper": PIPER,
-    "kokoro": KOKORO,
-    "gentle": GENTLE,
-    "mfa": MFA,
-    "table": MFA_CSV,
+    "polly": POLLY, "words": AZURE_WORDS, "visemes": AZURE_VISEMES, "characters": ELEVENLABS, "messages": CARTESIA,
+    "marks": GOOGLE, "piper": PIPER, "kokoro": KOKORO, "gentle": GENTLE, "mfa": MFA, "table": MFA_CSV,
     "servers": SERVERS,
-}
+}  # fmt: skip
 """A text, or a value for JSON, of every kind."""

@@ -25,15 +25,10 @@ def document() -> tuple[dict, bytes]:
     accessors.append({"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"})
     primitive = {"attributes": {"POSITION": 0}, "indices": 3, "targets": [{"POSITION": 1}, {"POSITION": 2}]}
     content = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": "head", "mesh": 0}],
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "head", "mesh": 0}],
         "meshes": [{"primitives": [primitive], "extras": {"targetNames": ["jawOpen", "mouthWide"]}}],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": offset}],
-    }
+        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": offset}],
+    }  # fmt: skip
     return content, b"".join(array.tobytes() for array in arrays)
 
 

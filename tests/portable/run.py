@@ -25,15 +25,7 @@ NUMERIC = (
     ),
     *(
         f"motion/test_{name}.py"
-        for name in (
-            "acoustic_network",
-            "closure",
-            "generation",
-            "prior_regression",
-            "space",
-            "speaker_maps",
-            "transfer_map",
-        )
+        for name in ("acoustic_network", "generation", "limits", "prior_regression", "space", "speaker_maps")
     ),
     *(f"speech/test_{name}.py" for name in ("adaptation", "f0", "mfcc", "recogniser", "analysed_audio")),
     *("speech/general", "pipeline/training/test_resume.py"),

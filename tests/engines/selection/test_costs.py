@@ -69,14 +69,9 @@ def test_motion_unlike_the_guide_costs_unless_the_sounds_are_alike() -> None:
 def test_abutting_costs_more_beside_a_protected_phone_and_inside_a_cluster_of_one_word() -> None:
     units = inventory("uw", "uw", "s l p aa")
     for text, wanted in (
-        ("s l", 0.15 + 0.1),
-        ("s | l", 0.15),
-        ("s aa", 0.15),
-        ("aa s", 0.15),
-        ("s p", 0.15 + 0.1 + 1),
-        ("p aa", 0.15 + 1),
-        ("aa p", 0.15 + 1),
-    ):
+        ("s l", 0.15 + 0.1), ("s | l", 0.15), ("s aa", 0.15), ("aa s", 0.15), ("s p", 0.15 + 0.1 + 1),
+        ("p aa", 0.15 + 1), ("aa p", 0.15 + 1),
+    ):  # fmt: skip
         costs = costs_of(units, hard=0.15, cluster=0.1, protected=1.0)
         assert costs.join_costs(target_of(costs, text), 1, array(0), array(1))[0, 0] == pytest.approx(wanted), text
     limited = costs_of(units, hard=9.0, most=2.0)

@@ -64,13 +64,9 @@ def test_a_voice_says_phones_in_time() -> None:
         assert audio.duration_s == pytest.approx(1.0)
         found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
         assert found == [
-            ("sil", "", 0.0),
-            ("hh", "hello", 0.2),
-            ("ax", "hello", 0.3),
-            ("l", "hello", 0.4),
-            ("ow", "hello", 0.5),
+            ("sil", "", 0.0), ("hh", "hello", 0.2), ("ax", "hello", 0.3), ("l", "hello", 0.4), ("ow", "hello", 0.5),
             ("sil", "", 0.9),
-        ]
+        ]  # fmt: skip
 
 
 @pytest.mark.parametrize("voice", EACH)
