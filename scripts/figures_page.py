@@ -3,9 +3,9 @@
 A sheet is one JSON file: ``page``, the page that it belongs to; ``tables`` by name, each with ``columns``, ``rows`` and
 its stamp; ``stated``, what the text of that page says in figures beside the tables. The stamp of that is the table
 ``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
-``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``, which a page shows as long
-as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file; an engine and the
-digest of its default options; ``none``, where no model takes part; or words.
+``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A page shows the model, and
+the command as long as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file;
+an engine and the digest of its default options; ``none``, where no model takes part; or words.
 
 In a page a table stands between ``<!-- figures: SHEET.TABLE -->`` and ``<!-- end -->``. Run
 ``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.
@@ -50,26 +50,30 @@ def current_models() -> frozenset[str]:
 
 def made_by(model: str, current: frozenset[str]) -> str:
     """Return what a page says of the models of a stamp; of one that is not the current one it says so."""
-    parts = model.split(", ")
-    earlier = [part for part in parts if part not in current]
+    earlier = [part for part in model.split(", ") if part not in current]
     if model == "none":
         return ""
-    return f" · from an earlier model: {', '.join(earlier)}" if earlier else f" · {model}"
+    return f"Earlier model ({', '.join(earlier)})" if earlier else model
 
 
 def stamp(table: Sheet, current: frozenset[str]) -> str:
-    """Return the line below a table: its commit, its model and the command that made it."""
-    command = table.get("command", "")
+    """Return the line below a table: its model and the command that made it; its commit and date are in the sheet.
+
+    Of the figures in a text it says only what does not go without saying: an earlier model, or a command.
+    """
+    command, made = table.get("command", ""), made_by(table["model"], current)
     gone = any(not (ROOT / "benchmarks" / name).exists() for name in re.findall(r"benchmarks/(\w+\.py)", command))
-    command = " · the driver is in the history" if gone else f" · `{command}`" if command else ""
     title = f"{table['title']}: " if table.get("title") and not table["columns"] else ""
-    return f"*{title}{table['commit']}, {table['date']}{made_by(table['model'], current)}{command}*"
+    if title:
+        made = made.replace("Earlier", "earlier") if "Earlier" in made else ""
+    line = " · ".join(filter(None, [made, f"`{command}`" if command and not gone else ""]))
+    return f"*{title}{line}*" if line else ""
 
 
 def rendered(table: Sheet, current: frozenset[str]) -> str:
     """Return a table in Markdown, with its stamp; of one without columns the stamp alone."""
     if not table["columns"]:
-        return stamp(table, current) + "\n"
+        return f"{line}\n" if (line := stamp(table, current)) else ""
     cells = [table["columns"], *table["rows"]]
     head, *rows = (re.sub(r"\| +(?=\|)", "| ", f"| {' | '.join(row)} |") for row in cells)
     return "\n".join([head, "|" + "---|" * len(table["columns"]), *rows, "", stamp(table, current), ""])
@@ -110,20 +114,18 @@ def not_held(page: Path, text: str, found: Mapping[str, Sheet]) -> list[str]:
 
 
 def overview(found: Mapping[str, Sheet], current: frozenset[str]) -> str:
-    """Return the page of all figures: those at a glance, then where each is, from which commit and model."""
+    """Return the page of all figures: those at a glance, then the pages with figures of earlier models."""
     glance = found["glance"]
     lines = ["# Figures at a glance", "", *glance["text"], ""]
     for table in glance["tables"].values():
         lines += [f"## {table['title']}", "", *table.get("text", []), "", rendered(table, current)]
     lines += ["## All figures", "", *glance["all"], ""]
-    pages: dict[bool, dict[str, str]] = {False: {}, True: {}}
+    earlier: dict[str, str] = {}
     for name, sheet in found.items():
-        if name != "glance":
-            earlier = any("earlier" in made_by(table["model"], current) for table in sheet["tables"].values())
+        if name != "glance" and any("Earlier" in made_by(each["model"], current) for each in sheet["tables"].values()):
             target = f"../{sheet['page']}".replace("../results/", "")
-            pages[earlier][target] = f"[{name}]({target})"
-    lines += [f"- Of today's models, or of none: {', '.join(pages[False].values())}"]
-    lines += [f"- With figures from an earlier model: {', '.join(pages[True].values())}"]
+            earlier.setdefault(target, f"[{Path(target).stem}]({target})")
+    lines += [f"Pages with figures of an earlier model: {', '.join(earlier.values())}."]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"
 
 

@@ -68,9 +68,9 @@ def test_a_figure_that_no_sheet_holds_is_found() -> None:
 def test_a_figure_of_another_model_says_so() -> None:
     page = "<!-- figures: mouth.gap -->\n<!-- end -->\n"
     now = FIGURES.written(page, {"mouth": SHEET}, frozenset({"shipped 00000000"}))
-    assert "| opening | 0.256 |\n\n*abc1234, 2026-11-23 · shipped 00000000 · `make bench`*\n" in now
+    assert "| opening | 0.256 |\n\n*shipped 00000000 · `make bench`*\n" in now
     later = FIGURES.written(now, {"mouth": SHEET}, frozenset({"shipped 11111111"}))
-    assert "from an earlier model: shipped 00000000" in later
+    assert "*Earlier model (shipped 00000000) · `make bench`*\n" in later
     with pytest.raises(KeyError):
         FIGURES.written(page, {}, frozenset())
 
