@@ -1,7 +1,5 @@
 """The chin of a drawn face, moved by a known distance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

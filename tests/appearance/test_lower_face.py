@@ -1,7 +1,5 @@
 """The lower face: where it is, what of it is replaced, and its light."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """From motion to pictures: known functions are found, and nothing is believed far from all footage."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The appearance of a drawn person: mouth, jaw and chin for motion, mouth pictures and sound."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contact: when lips touch, for how long, and in which pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

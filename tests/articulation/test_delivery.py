@@ -1,7 +1,5 @@
 """Intensity, anticipation, offset and held poses, on motion with known closures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

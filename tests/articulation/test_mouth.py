@@ -1,7 +1,5 @@
 """The spoken mouth: gap, width, jaw and articulatory channels of motion and phones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Pauses: the mouth rests in them, softly, and starts no earlier than a breath before the next phrase."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Sounds of recorders, and tables of offsets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What every engine promises, whatever it does inside."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

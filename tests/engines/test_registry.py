@@ -1,7 +1,5 @@
 """Engines as a command line asks for them."""
 
-from __future__ import annotations
-
 import pytest
 
 from lipmotion.engines import ENGINES, engine_from_settings, engine_named, preset_visual

@@ -1,7 +1,5 @@
 """Characters of pictures: which file is which shape, pictures over one another, sizes and backgrounds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A character's file as a face: pictures of the lips that the motion has."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

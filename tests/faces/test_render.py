@@ -1,7 +1,5 @@
 """Faces that are drawn, and their frames for the encoder, which look like those for people."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

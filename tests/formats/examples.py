@@ -1,7 +1,5 @@
 """Generations for writers of curves and of cues, and the shortest way to write them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import accumulate
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Names and texts that break formats which do not escape them, and what each writer makes of them."""
 
-from __future__ import annotations
-
 import ast
 import csv
 import html

@@ -1,7 +1,5 @@
 """Weights of blendshapes as Audio2Face exports them, by their content, with either set of names."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

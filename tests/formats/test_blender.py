@@ -1,7 +1,5 @@
 """The script for Blender stands alone, and holds the curves."""
 
-from __future__ import annotations
-
 import ast
 import zipfile
 from importlib import metadata

@@ -1,7 +1,5 @@
 """BVH: read line by line, and by Blender where it is installed as a module."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

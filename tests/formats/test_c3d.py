@@ -1,7 +1,5 @@
 """C3D: what is written is read by others and by us, what others write is read; movements of the head are taken out."""
 
-from __future__ import annotations
-
 import math
 import struct
 import warnings

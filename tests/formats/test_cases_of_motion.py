@@ -1,7 +1,5 @@
 """Motion files as people bring them: cases of public bug reports, and others of their kind."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

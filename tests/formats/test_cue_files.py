@@ -1,7 +1,5 @@
 """Each format of cues is read by a small parser that reads it as its consumers do, and by them where they are."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Cue files as motion: every format that is written is read, closures stay closed, and what is damaged is named."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """MPEG-4's parameters: a round trip, and files of others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

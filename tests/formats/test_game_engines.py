@@ -1,7 +1,5 @@
 """Animations of Godot: the text of a resource that Godot saved, and keys that are those of the motion."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Phones in time that users give: motion files, units alone, labels of other programs; gaps are silence."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Motions of Live2D: counts are exact, and the curves through the keys are those of the mouth."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

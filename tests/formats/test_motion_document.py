@@ -1,7 +1,5 @@
 """Motion documents: JSON as specified, and arrays that are not rounded."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

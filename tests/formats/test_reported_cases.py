@@ -1,7 +1,5 @@
 """Labels that users of other tools have reported, and their siblings: words and phones as they are said."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Sound files: what is written is what is read again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import av

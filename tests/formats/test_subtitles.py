@@ -1,7 +1,5 @@
 """SubRip and WebVTT: the form of their files, read back as a transcript, and by others."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Tables: motion as specified, takes of Live Link Face as the app writes and Unreal reads them, tables of others."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Timings of voices and aligners: files as the services document them, read by their content."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Transcripts with times, as people and recognisers write them."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

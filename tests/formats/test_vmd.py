@@ -1,7 +1,5 @@
 """Motions of MikuMikuDance: bytes by the published layout, and as mmd-parser of three.js reads them, where it is."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 from pathlib import Path

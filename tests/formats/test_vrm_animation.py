@@ -1,7 +1,5 @@
 """VRM animations: read back, and by three-vrm and Khronos' validator, where they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

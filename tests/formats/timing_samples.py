@@ -1,7 +1,5 @@
 """Files of voices and aligners as the services document them, written for these tests."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

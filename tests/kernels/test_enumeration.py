@@ -5,8 +5,6 @@ themselves, counts by one such tolerance for every frame; in single precision by
 probability of a best path may be lower than that of the best of all by the rounding of single precision.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

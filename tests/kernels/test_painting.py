@@ -1,7 +1,5 @@
 """Pictures that are painted, moved and blended, against their definitions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

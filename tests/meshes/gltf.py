@@ -1,7 +1,5 @@
 """glTF files for tests, written by hand: a square of two triangles with two morph targets."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

@@ -1,7 +1,5 @@
 """A small head for tests: a curved sheet with a mouth cut into it, ARKit's blendshapes, teeth behind, eyes beside."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Lip points are found or named; they move what is near them on the surface; bindings are stored and painted."""
 
-from __future__ import annotations
-
 import zipfile
 
 import numpy as np

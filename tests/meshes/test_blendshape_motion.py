@@ -1,7 +1,5 @@
 """Weights of blendshapes as motion of a mouth, of eyes and brows; visemes add up to 1."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Files of characters: OBJ and folders of it, and what is refused before it is made."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

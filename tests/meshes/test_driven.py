@@ -1,7 +1,5 @@
 """Characters from files to vertices."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

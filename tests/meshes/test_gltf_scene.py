@@ -1,7 +1,5 @@
 """glTF files are read wherever their numbers are kept; damaged ones are refused with a message."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 

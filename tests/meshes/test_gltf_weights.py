@@ -1,7 +1,5 @@
 """Animations of glTF as motion: even and uneven keys, steps, splines, several meshes, expressions of VRM."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

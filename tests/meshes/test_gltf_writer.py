@@ -1,7 +1,5 @@
 """What is written as glb is read again; a user's own .glb gets an animation, and all else in it stays."""
 
-from __future__ import annotations
-
 import json
 import struct
 from dataclasses import replace

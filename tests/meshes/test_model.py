@@ -1,7 +1,5 @@
 """Meshes check themselves; blendshapes add up."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A user's table of controls: rows add up, limits hold, damaged tables are refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Weights follow the points, stay in range, and close the lips where they should."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear

@@ -1,7 +1,5 @@
 """Pictures on meshes and colours of vertices, from files to what is seen."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Acoustic networks: interpolation, training on acoustic conditions, serialisation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

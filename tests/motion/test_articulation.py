@@ -1,7 +1,5 @@
 """The table of articulation: its curves, its place in a speaker's range, and how far contexts are known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Long recordings are generated block by block."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

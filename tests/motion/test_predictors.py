@@ -1,7 +1,5 @@
 """Predictors by name: that of docs/extend/predictor.md, in both engines that have predictors, and in their models."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterator

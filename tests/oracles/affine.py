@@ -1,7 +1,5 @@
 """Affine transforms of features, computed for one frame, Gaussian and row at a time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from lipmotion.stats.constrained_mllr import AffineStatistics

@@ -1,7 +1,5 @@
 """Paths through networks, chains and trellises by enumeration of all of them: the best, the cheapest, posteriors."""
 
-from __future__ import annotations
-
 from itertools import groupby, pairwise, product
 
 import numpy as np

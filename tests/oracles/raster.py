@@ -1,7 +1,5 @@
 """Triangles to pixels by definition: a triangle at a time, all of its samples at once; with textures, too."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Recordings in any container, made on the spot."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A synthesiser for machines without any: the project's own, saying words as the dictionary has them."""
 
-from __future__ import annotations
-
 import wave
 from collections.abc import Iterator, Sequence
 from pathlib import Path

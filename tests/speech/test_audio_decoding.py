@@ -1,7 +1,5 @@
 """Every container and codec that PyAV can write, at odd rates and channel counts, with holes and damage."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys

@@ -1,7 +1,5 @@
 """Recognisers that users install, with stand-ins that have their interfaces (faster-whisper 1.2, vosk 0.3.45)."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Sound that is changed: noise at the level that was asked for, acoustic conditions, pieces joined, fewer samples."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Phone recognisers, the search for words in their posteriors, and what is made of both."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Whether a transcript is what is said: by posteriors of a made-up network, and by the sound."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Voice events in sounds that are made (``speech.made_voices``)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import find_peaks

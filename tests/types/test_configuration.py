@@ -1,7 +1,5 @@
 """Configurations check themselves, and are parsed from texts and mappings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar

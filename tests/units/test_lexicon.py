@@ -1,7 +1,5 @@
 """Words that are in no dictionary are read by a network, where it is installed, else by rules."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Words in time, of phones in time."""
 
-from __future__ import annotations
-
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit

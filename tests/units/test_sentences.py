@@ -1,7 +1,5 @@
 """Text to sentences that a synthesiser can say."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

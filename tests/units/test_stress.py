@@ -1,7 +1,5 @@
 """Which syllables are stressed, as far as rules know."""
 
-from __future__ import annotations
-
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
 from lipmotion.units.stress import NUCLEI, find_stress, find_stressed_vowel

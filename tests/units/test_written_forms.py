@@ -1,7 +1,5 @@
 """Written forms: every one in the words that a voice says, and the sound that chooses among readings."""
 
-from __future__ import annotations
-
 import pytest
 
 from lipmotion import load_model

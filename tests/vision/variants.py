@@ -1,7 +1,5 @@
 """A real clip made into what people record: with other frame times, cuts, neighbours and damage."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path

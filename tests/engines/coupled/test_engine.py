@@ -1,7 +1,5 @@
 """Explanations of frames, against all paths of small chains and against the numbers of a fitted model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

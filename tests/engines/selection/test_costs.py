@@ -1,7 +1,5 @@
 """The costs and overlaps of Minnis & Breen 2000, each on units that differ in one thing only."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

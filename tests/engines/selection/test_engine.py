@@ -1,7 +1,5 @@
 """The engine: sources of units, edits, reports."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Windows of phones, and the index that finds them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The dynamic programming: exact, with and without pruning."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Filmed faces as files: there and back, and nothing but a whole face is read."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """Stitching: the footage comes back where nothing is to change, and what is to change is what was drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The figure of the 3D head: its form, its poses, and these as weights of blendshapes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

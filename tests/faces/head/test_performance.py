@@ -1,7 +1,5 @@
 """Motion becomes poses; each sound has a mouth that can be named from the picture alone."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The general models against what pocketsphinx itself says of its files and of sound."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pocketsphinx import Decoder

@@ -1,7 +1,5 @@
 """espeak-ng: which library speaks, what it says in other languages, and the words that it tells."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

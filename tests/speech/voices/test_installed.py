@@ -1,7 +1,5 @@
 """Which voices there are, and what they say: with fakes everywhere, with the synthesisers where they are."""
 
-from __future__ import annotations
-
 import os
 import time
 from contextlib import closing

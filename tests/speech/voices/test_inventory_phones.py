@@ -1,7 +1,5 @@
 """A synthesiser's phones as the project's aligner would name them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest
