@@ -1,5 +1,3 @@
-"""The chin of a drawn face, moved by a known distance."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""The lower face: where it is, what of it is replaced, and its light."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""From motion to pictures: known functions are found, and nothing is believed far from all footage."""
-
 import numpy as np
 import pytest
 

@@ -1,6 +1,5 @@
-"""The appearance of a drawn person: mouth, jaw and chin for motion, mouth pictures and sound."""
-
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -179,6 +178,6 @@ def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatc
     [("motion", "266 pictures, 265 .*266 of"), ("levels_db", "266 pictures, 266 .*265 of"), ("clips", "0 pictures")],
 )
 def test_footage_that_does_not_fit_together(footage: FootagePictures, wrong: str, counts: str) -> None:
-    part = () if wrong == "clips" else getattr(footage, wrong)[:-1]
+    part: Any = () if wrong == "clips" else getattr(footage, wrong)[:-1]
     with pytest.raises(InputError, match=counts):
         learn_appearance(replace(footage, **{wrong: part}))

@@ -1,5 +1,3 @@
-"""Weights of blendshapes as Audio2Face exports them, by their content, with either set of names."""
-
 import json
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""The script for Blender stands alone, and holds the curves."""
-
 import ast
 import zipfile
 from importlib import metadata

@@ -1,5 +1,3 @@
-"""BVH: read line by line, and by Blender where it is installed as a module."""
-
 import json
 import os
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""C3D: what is written is read by others and by us, what others write is read; movements of the head are taken out."""
-
 import math
 import struct
 import warnings
@@ -130,23 +128,16 @@ def test_movements_of_the_head_are_taken_out(tmp_path, unit, per_mm):
     np.testing.assert_allclose(motion["opening"], expected, atol=1e-5)
 
 
-def test_axes_with_z_up_are_turned(tmp_path):
+def test_axes_with_z_up_and_faces_that_look_the_other_way_are_turned(tmp_path):
     still = face()
     z_up = {name: np.stack([p[:, 0], -p[:, 2], p[:, 1]], axis=1) * 90 for name, p in still.items()}
     write_c3d(tmp_path / "a.c3d", capture(z_up))
     motion = read_motion(tmp_path / "a.c3d")[0]
-    for axis, column in zip("xyz", range(3), strict=True):
-        np.testing.assert_allclose(motion[f"{axis}_13"], still["LIP_13"][:, column], atol=1e-5)
-
-
-def test_a_face_that_looks_the_other_way_is_turned():
-    still = {name.split(":")[-1]: place for name, place in face().items()}
-    found = to_head_frame({name: place * [-90.0, 90, -90] for name, place in still.items()}, "mm")
-    np.testing.assert_allclose(found["LIP_13"], still["LIP_13"], atol=1e-9)
-
-
-def test_without_eyes_an_eye_distance_is_stated(tmp_path):
-    mouth = {name: place * 90 for name, place in face().items() if ":" not in name}
+    place = np.stack([motion[f"{axis}_13"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(place, still["LIP_13"], atol=1e-5)
+    behind = {name.split(":")[-1]: p * [-90.0, 90, -90] for name, p in still.items()}
+    np.testing.assert_allclose(to_head_frame(behind, "mm")["LIP_13"], still["LIP_13"], atol=1e-9)
+    mouth = {name: p * 90 for name, p in still.items() if ":" not in name}  # no eyes: an eye distance is stated
     write_c3d(tmp_path / "a.c3d", capture(mouth))
     np.testing.assert_allclose(read_motion(tmp_path / "a.c3d")[0]["y_chin"], mouth["chin"][:, 1] / 90, atol=1e-6)
 
@@ -199,16 +190,15 @@ def test_what_is_wrong_is_said(tmp_path, written):
 
 def test_markers_of_the_mouth_are_required(tmp_path):
     still = {name: place for name, place in face().items() if ":" in name}
-    write_c3d(tmp_path / "a.c3d", capture(still))
-    with pytest.raises(InputError, match="all markers are those of the head"):
-        read_motion(tmp_path / "a.c3d")
-    write_c3d(tmp_path / "b.c3d", capture({"*1": still["Anna:EYE_L"]}))
-    with pytest.raises(InputError, match=r"no marker with a name is seen in half of the frames; the labels: \*1"):
-        read_motion(tmp_path / "b.c3d")
-    same = {"EYE_L": still["Anna:EYE_L"], "EYE_R": still["Anna:EYE_L"], "LIP_13": still["Anna:EYE_L"]}
-    write_c3d(tmp_path / "c.c3d", capture(same))
-    with pytest.raises(InputError, match="the two eye corners are in one place"):
-        read_motion(tmp_path / "c.c3d")
+    eye = still["Anna:EYE_L"]
+    for markers, message in (
+        (still, "all markers are those of the head"),
+        ({"*1": eye}, r"no marker with a name is seen in half of the frames; the labels: \*1"),
+        ({"EYE_L": eye, "EYE_R": eye, "LIP_13": eye}, "the two eye corners are in one place"),
+    ):
+        write_c3d(tmp_path / "a.c3d", capture(markers))
+        with pytest.raises(InputError, match=message):
+            read_motion(tmp_path / "a.c3d")
     with pytest.raises(ExportError, match="does not fit into"):
         write(tmp_path / "d.c3d", of_motion(Motion(np.zeros((2, 1)), 100.0, (Channel("öffnen"),))))
 

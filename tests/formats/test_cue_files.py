@@ -1,5 +1,3 @@
-"""Each format of cues is read by a small parser that reads it as its consumers do, and by them where they are."""
-
 import json
 import math
 import re

@@ -1,5 +1,3 @@
-"""MPEG-4's parameters: a round trip, and files of others."""
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Animations of Godot: the text of a resource that Godot saved, and keys that are those of the motion."""
-
 import re
 from pathlib import Path
 

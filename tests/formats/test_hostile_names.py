@@ -1,5 +1,3 @@
-"""Each writer keeps names that could break its format, or refuses them; ``hostile_names`` says how they are read."""
-
 from pathlib import Path
 
 import pytest

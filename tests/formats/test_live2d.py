@@ -1,5 +1,3 @@
-"""Motions of Live2D: counts are exact, and the curves through the keys are those of the mouth."""
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""Motion documents: JSON as specified, and arrays that are not rounded."""
-
 import json
 from dataclasses import replace
 

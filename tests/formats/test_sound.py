@@ -1,5 +1,3 @@
-"""Sound files: what is written is what is read again."""
-
 from pathlib import Path
 
 import av

@@ -1,5 +1,4 @@
-"""SubRip and WebVTT: the form of their files, read back as a transcript, and by others."""
-
+import html
 from pathlib import Path
 
 import pytest
@@ -28,10 +27,7 @@ def test_words_and_phones_are_written_and_words_come_back(tmp_path: Path, suffix
 
     words, phones = WEBVTT, WEBVTT_PHONES
     if suffix == ".srt":
-        words, phones = (
-            as_subrip(WEBVTT.replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">")),
-            as_subrip(phones),
-        )
+        words, phones = as_subrip(html.unescape(words)), as_subrip(phones)
     assert text(UNITS, f"a{suffix}") == words
     assert text(UNITS, f"a.phones{suffix.upper()}") == phones
     plain = Timeline((*UNITS.spans[:3], Span(0.52, 3599.9996, Unit("dh", "", "there"))))

@@ -1,5 +1,3 @@
-"""Tables: motion as specified, takes of Live Link Face as the app writes and Unreal reads them, tables of others."""
-
 from pathlib import Path
 
 import numpy as np

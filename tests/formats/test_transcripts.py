@@ -1,5 +1,3 @@
-"""Transcripts with times, as people and recognisers write them."""
-
 import json
 import math
 from collections.abc import Callable
@@ -98,49 +96,21 @@ OF_LINES = {
     "lyrics": "[ar:Anna]\n[offset:+50]\n[00:02.80] How are\nyou\n[00:01.05] Hello there\n[00:02.55]\n[00:04.05]\n",
     "lines that begin with times": "[0:01] Hello there\n[00:00:02.50]\n[0:00:02.75]How are you\n[0:04]",
     "Whisper's table": "start\tend\ttext\n1000\t2500\tHello there!\n2750\t4000\tHow are you?\n",
-    "Whisper": json.dumps(
-        {
-            "text": " Hello there! How are you?",
-            "language": "en",
-            "segments": [
-                {"id": 0, "start": 1.0, "end": 2.5, "text": " Hello there!", "avg_logprob": math.nan},
-                {"id": 1, "start": 2.75, "end": 4, "text": " How are you?", "tokens": [1, 2]},
-            ],
-        }
-    ),
-    "faster-whisper's segments": json.dumps(
-        [
-            {"start": 1.0, "end": 2.5, "text": " Hello there!", "words": None},
-            {"start": 2.75, "end": 4.0, "text": "How are you?", "words": None},
-        ],
-        indent=1,
-    ),
-    "whisper.cpp": json.dumps(
-        {
-            "systeminfo": "AVX = 1",
-            "transcription": [
-                {
-                    "timestamps": {"from": "00:00:01,000", "to": "00:00:02,500"},
-                    "offsets": {"from": 1000, "to": 2500},
-                    "text": " Hello there!",
-                    "tokens": [{"text": " Hello"}],
-                },
-                {"offsets": {"from": 2750, "to": 4000}, "text": " How are you?"},
-            ],
-        }
-    ),
-    "transformers": json.dumps(
-        {
-            "text": "Hello there! How are you?",
-            "chunks": [
-                {"timestamp": [1.0, 2.5], "text": " Hello there!"},
-                {"timestamp": [2.75, 4.0], "text": " How are you?"},
-            ],
-        }
-    ),
+    "Whisper": json.dumps({"text": " Hello there! How are you?", "language": "en", "segments": [
+        {"id": 0, "start": 1.0, "end": 2.5, "text": " Hello there!", "avg_logprob": math.nan},
+        {"id": 1, "start": 2.75, "end": 4, "text": " How are you?", "tokens": [1, 2]}]}),
+    "faster-whisper's segments": json.dumps([
+        {"start": 1.0, "end": 2.5, "text": " Hello there!", "words": None},
+        {"start": 2.75, "end": 4.0, "text": "How are you?", "words": None}], indent=1),
+    "whisper.cpp": json.dumps({"systeminfo": "AVX = 1", "transcription": [
+        {"timestamps": {"from": "00:00:01,000", "to": "00:00:02,500"}, "offsets": {"from": 1000, "to": 2500},
+         "text": " Hello there!", "tokens": [{"text": " Hello"}]},
+        {"offsets": {"from": 2750, "to": 4000}, "text": " How are you?"}]}),
+    "transformers": json.dumps({"text": "Hello there! How are you?", "chunks": [
+        {"timestamp": [1.0, 2.5], "text": " Hello there!"}, {"timestamp": [2.75, 4.0], "text": " How are you?"}]}),
     "Audacity's labels": "1.000000\t2.500000\tHello there!\n2.750000\t4.000000\tHow are you?\n",
     "lines out of order": "00:00:02,750 --> 00:00:04,000\nHow are you\n\n00:00:01,000 --> 00:00:02,500\nHello there\n",
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", OF_LINES)
@@ -159,9 +129,7 @@ VOSK: list[dict[str, Any]] = [{"result": segment(0, 2, space="")["words"], "text
 VOSK += [{"result": segment(2, 5, space="")["words"], "text": "how are you"}]
 OF_WORDS = {
     "Whisper": json.dumps({"text": "", "segments": [segment(0, 2), segment(2, 5)]}),
-    "OpenAI's API": json.dumps(
-        {"duration": 4, "segments": [{"start": 1, "end": 4, "text": "-"}], "words": segment(0, 5)["words"]}
-    ),
+    "OpenAI's API": json.dumps({"segments": [{"start": 1, "end": 4, "text": "-"}], "words": segment(0, 5)["words"]}),
     "Vosk, a list": json.dumps(VOSK),
     "Vosk, one after another": "\n".join(json.dumps(result, indent=2) for result in VOSK),
     "Vosk, one of several": json.dumps({"alternatives": [VOSK[0] | {"confidence": 9}, VOSK[2]]})
@@ -178,9 +146,7 @@ OF_WORDS = {
     + "\n\nEND",
     "a TextGrid": '"ooTextFile" "TextGrid" 0 4 <exists> 1 "IntervalTier" "words" 0 4 5\n'
     + "\n".join(f'{start_s} {end_s} "{word}"' for word, start_s, end_s in HELLO_WORDS),
-    "HTK's labels": "\n".join(
-        f"{round(start_s * 1e7)} {round(end_s * 1e7)} {word}" for word, start_s, end_s in HELLO_WORDS
-    ),
+    "HTK's labels": "\n".join(f"{round(a * 1e7)} {round(b * 1e7)} {word}" for word, a, b in HELLO_WORDS),
 }
 
 
@@ -398,5 +364,4 @@ def test_times_are_never_spoken(tmp_path: Path) -> None:
 def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "take1.txt").write_text(" \n")
     assert find_labels(tmp_path / "take1.mp4").words is None
-    (text,) = caplog.messages
-    assert "take1.txt: is empty: it counts as no transcript" in text
+    assert "take1.txt: is empty: it counts as no transcript" in caplog.messages[0]

@@ -52,9 +52,8 @@ def test_the_bytes_are_those_of_the_format(path: Path, generation: Generation) -
     assert [frame for _, frame, _ in keys] == sorted(frame for _, frame, _ in keys)
     held = [frame for name, frame, _ in keys if name.startswith("い".encode("cp932")) and 5 <= frame < 25]
     assert held == [5, 24]
-    assert generation.motion["aa"][0] == pytest.approx(
-        next(w for n, _, w in keys if n.startswith("あ".encode("cp932")))
-    )
+    first = next(weight for name, _, weight in keys if name.startswith("あ".encode("cp932")))
+    assert generation.motion["aa"][0] == pytest.approx(first)
 
 
 def test_what_is_written_is_read(path: Path, generation: Generation) -> None:
@@ -64,9 +63,8 @@ def test_what_is_written_is_read(path: Path, generation: Generation) -> None:
         assert motion[name] == pytest.approx(generation.motion[name], abs=1e-6)
     assert with_mouth(motion)["lip_gap"].max() > 0.1
     lowered = replace(generation, motion=replace(generation.motion, channels=(*generation.motion.channels[:6], *BROWS)))
-    assert read_motion(written(path, lowered))[0]["browDownLeft"] == pytest.approx(
-        generation.motion["eyeBlinkLeft"], abs=1e-6
-    )
+    brow = read_motion(written(path, lowered))[0]["browDownLeft"]
+    assert brow == pytest.approx(generation.motion["eyeBlinkLeft"], abs=1e-6)
 
 
 def test_eyes_turn_in_one_bone(tmp_path: Path, generation: Generation) -> None:

@@ -13,7 +13,7 @@ from lipmotion.speech.features import analysed_audio as module
 from lipmotion.speech.features import mfcc as front_end
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc
-from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS, speaker_similarity
+from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS, SpeakerSimilarity, speaker_similarity
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.agreement import agreement_score
 from lipmotion.speech.recognition.general.front_end import general_features
@@ -106,8 +106,8 @@ def test_features_are_normalised_over_the_passage_alone() -> None:
     ],
 )
 def test_silence_and_gain_change_no_features(before_s: float, after_s: float, units: float, decibels: float) -> None:
-    line = whole_frames(0)
     """But that two frames at either end are left out, whose windows reach into it, and those of a noise as loud."""
+    line = whole_frames(0)
     alone = of_samples(line)
     padded = of_samples(silence(before_s, units), line * 10 ** (decibels / 20), silence(after_s, units))
     (passage,), (found,) = alone.passages, padded.passages
@@ -165,12 +165,17 @@ def test_where_nothing_is_said_all_features_are_0() -> None:
             assert not values.any()
 
 
-def test_a_passage_is_not_divided_further(sentence: ToySentence) -> None:
+def test_a_passage_is_not_divided_further_and_what_keeps_its_features_stays_itself(sentence: ToySentence) -> None:
     audio = analysed(sentence.audio)
     (passage,) = audio.passages
     assert not audio.is_passage
     assert passage.audio.is_passage
     assert passage.audio.frames == len(passage.audio.mfcc().values)
+    assert analysed(audio) is audio
+    assert audio.samples is sentence.audio.samples
+    assert audio.duration_s == sentence.audio.duration_s
+    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
+        analysed(Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
 
 
 def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
@@ -186,18 +191,6 @@ def test_features_that_are_known_are_not_computed(sentence: ToySentence, compute
     computed.clear()
     assert analysed(sentence.audio, features).mfcc() is features
     assert not computed
-
-
-def test_a_recording_that_keeps_its_features_stays_the_same_object(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
-    assert analysed(audio) is audio
-    assert audio.samples is sentence.audio.samples
-    assert audio.duration_s == sentence.audio.duration_s
-
-
-def test_what_has_no_features() -> None:
-    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
-        analysed(Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
 
 
 def long_audio() -> Audio:
@@ -275,15 +268,15 @@ def test_the_warp_chosen_is_the_most_similar(toy_model: Model) -> None:
 
 def test_a_recording_is_judged_by_its_longest_passage(toy_model: Model) -> None:
     """Silence, and a short line by another voice, change nothing."""
-    line, other = (
-        sentence.audio.samples[: len(sentence.audio.samples) // 160 * 160] for sentence in toy_sentences(3)[:2]
-    )
-    silence = np.zeros(5 * 16_000, np.float32)
-    alone = speaker_similarity(toy_model.phones, analysed(Audio(np.pad(line, 8000), 16_000)))
+
+    def judged(*parts: np.ndarray) -> SpeakerSimilarity:
+        return speaker_similarity(toy_model.phones, of_samples(*parts))
+
+    line, other, quiet = whole_frames(0), toy_sentences(3)[1].audio.samples, np.zeros(5 * 16_000)
+    alone = judged(np.pad(line, 8000))
     short = np.interp(np.arange(160 * 200) * 1.3, np.arange(len(other)), other)
-    for parts in ((silence, line, silence), (short, silence, line, silence), (silence, line, silence, short)):
-        audio = analysed(Audio(np.concatenate(parts).astype(np.float32), 16_000))
-        found = speaker_similarity(toy_model.phones, audio)
+    for parts in ((quiet, line, quiet), (short, quiet, line, quiet), (quiet, line, quiet, short)):
+        found = judged(*parts)
         assert found.warp == alone.warp
         assert found.score == pytest.approx(alone.score, abs=1e-3)
-    assert speaker_similarity(toy_model.phones, analysed(Audio(short.astype(np.float32), 16_000))).score != alone.score
+    assert judged(short).score != alone.score

@@ -1,5 +1,3 @@
-"""The speech encoder: windows, silence and gain do not change it; regressions on it."""
-
 from dataclasses import replace
 
 import numpy as np

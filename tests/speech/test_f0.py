@@ -1,11 +1,8 @@
-import tracemalloc
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from lipmotion.errors import InputError
 from lipmotion.speech.features import f0 as module
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0
@@ -153,34 +150,12 @@ def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
         assert found(samples) == pytest.approx(whole, rel=1e-4, nan_ok=True)
 
 
-@pytest.mark.long
-def test_memory_beside_the_result_is_bounded() -> None:
-    samples = noise(8 * 60 * RATE_HZ)
-    log_f0(Audio(samples[:RATE_HZ], RATE_HZ))
-    tracemalloc.start()
-    result = log_f0(Audio(samples, RATE_HZ))
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak - result.nbytes < 20e6 < samples.nbytes
-
-
 def test_very_short_recordings_work() -> None:
     for count in (400, 401, 639, 1600):
         result = found(voice(steady(200))[:count])
         assert len(result) == count // 160 + 1
         assert np.nanmax(np.abs(result / 200 - 1), initial=0) < 0.5
     assert found(voice(steady(200, 0.1)))[2:-2] == pytest.approx(200, rel=0.02)
-
-
-def test_it_says_what_is_wrong() -> None:
-    for audio, message in (
-        (Audio(noise(16_000), 44_100), "need 16000 Hz, found 44100 Hz; resample first"),
-        (Audio(noise(399), RATE_HZ), r"need 400 samples of one channel, found shape \(399,\)"),
-        (Audio(noise(16_000).reshape(2, 8000), RATE_HZ), r"found shape \(2, 8000\)"),
-        (Audio(np.where(np.arange(800) == 7, np.nan, 0.1), RATE_HZ), "found a peak of nan"),
-    ):
-        with pytest.raises(InputError, match=message):
-            log_f0(audio)
 
 
 def test_level_and_pitch_of_a_tone_that_rises_and_gets_louder():
@@ -195,13 +170,10 @@ def test_level_and_pitch_of_a_tone_that_rises_and_gets_louder():
     assert np.exp(np.nanmedian(voice.log_f0[120:180])) == pytest.approx(180, rel=0.03)
 
 
-def test_silence_is_quiet_and_without_pitch():
-    voice = prosody_of(Audio(np.zeros(16_000, np.float32), 16_000))
-    assert voice.level_db.max() < -80
-    assert not np.isfinite(voice.log_f0).any()
-
-
-def test_a_level_is_the_mean_power_of_10_ms_before_and_after() -> None:
+def test_silence_is_quiet_and_without_pitch_and_a_level_is_the_mean_power_of_10_ms_before_and_after():
+    silent = prosody_of(Audio(np.zeros(16_000, np.float32), 16_000))
+    assert silent.level_db.max() < -80
+    assert not np.isfinite(silent.log_f0).any()
     samples = np.random.default_rng(4).normal(0, 0.1, 1_650).astype(np.float32)
     levels = prosody_of(Audio(samples, 16_000)).level_db
     around = [samples[max(160 * n - 160, 0) : 160 * n + 160].astype(float) for n in range(11)]

@@ -31,11 +31,8 @@ class WhisperModel:
 
     loaded: ClassVar[list[tuple[str, dict[str, object]]]] = []
     language = "en"
-    segments: ClassVar[list[SimpleNamespace]] = [
-        SimpleNamespace(
-            start=0.1, end=1.6, text="-", words=[SimpleNamespace(word=w, start=a, end=b) for w, a, b in WORDS]
-        )
-    ]
+    words: ClassVar = [SimpleNamespace(word=word, start=start_s, end=end_s) for word, start_s, end_s in WORDS]
+    segments: ClassVar = [SimpleNamespace(start=0.1, end=1.6, text="-", words=words)]
 
     def __init__(self, model_size_or_path: str, **options: object):
         self.loaded.append((model_size_or_path, options))
@@ -66,10 +63,8 @@ def whisper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> type[WhisperMode
 def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
     """Install a stand-in for vosk, whose model is in ``tmp_path``; return the sound that it is given."""
     given: list[bytes] = []
-    results = [
-        {"text": ""},
-        {"result": [{"conf": 1, "word": w.strip(" ,"), "start": a, "end": b} for w, a, b in WORDS], "text": ""},
-    ]
+    words = [{"conf": 1, "word": w.strip(" ,"), "start": a, "end": b} for w, a, b in WORDS]
+    results: list[dict[str, object]] = [{"text": ""}, {"result": words, "text": ""}]
 
     class Recogniser:
         def __init__(self, model: object, rate_hz: float):

@@ -1,6 +1,8 @@
 import runpy
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.speech.features import mfcc as module
+from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.lip_speed import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
@@ -74,13 +77,15 @@ def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.long
-def test_memory_beside_the_result_is_bounded() -> None:
-    samples = noise(20 * 60 * RATE_HZ)
+@pytest.mark.parametrize(("measure", "minutes", "most"), [(lambda a: mfcc(a).values, 20, 70e6), (log_f0, 8, 20e6)])
+def test_memory_beside_the_result_is_bounded(measure: Callable[[Audio], Any], minutes: int, most: float) -> None:
+    samples = noise(minutes * 60 * RATE_HZ)
+    measure(Audio(samples[:RATE_HZ], RATE_HZ))
     tracemalloc.start()
-    result = features(samples)
+    result = measure(Audio(samples, RATE_HZ))
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak - result.nbytes < 70e6 < samples.nbytes
+    assert peak - result.nbytes < most < samples.nbytes
 
 
 def test_digital_silence_is_nothing_at_all_and_finite_inside_a_recording() -> None:
@@ -106,7 +111,8 @@ def test_the_delta_of_a_ramp_is_its_slope(frames: int, slope: float, start: floa
     assert regression_delta(ramp)[2:-2] == pytest.approx(slope, abs=1e-4)
 
 
-def test_it_says_what_is_wrong() -> None:
+@pytest.mark.parametrize("measure", [mfcc, log_f0])
+def test_it_says_what_is_wrong(measure: Callable[[Audio], object]) -> None:
     peak = "finite samples, full scale 1, found a peak of"
     for audio, message in (
         (Audio(noise(16_000), 44_100), "need 16000 Hz, found 44100 Hz; resample first"),
@@ -116,7 +122,7 @@ def test_it_says_what_is_wrong() -> None:
         (Audio(1e30 * noise(800), RATE_HZ), r"found a peak of \d.*e\+29"),
     ):
         with pytest.raises(InputError, match=message):
-            mfcc(audio)
+            measure(audio)
 
 
 def drawn_features(seed: int, frames: int = 200) -> Features:

@@ -1,5 +1,3 @@
-"""Whether a transcript is what is said: by posteriors of a made-up network, and by the sound."""
-
 from dataclasses import replace
 from pathlib import Path
 

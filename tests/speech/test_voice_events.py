@@ -1,5 +1,3 @@
-"""Voice events in sounds that are made (``speech.made_voices``)."""
-
 import numpy as np
 import pytest
 from scipy.signal import find_peaks

@@ -1,4 +1,5 @@
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,3 +28,12 @@ def write_video(tmp_path: Path) -> WriteVideo:
         return write_frames(tmp_path / name, pictures, ticks=ticks, options={"qp": "0"}, **how)
 
     return write
+
+
+@pytest.fixture
+def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Lets the faces of the next video be those that are given."""
+    pytest.importorskip("cv2")
+    from vision.scripted import script
+
+    return partial(script, monkeypatch)

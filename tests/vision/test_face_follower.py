@@ -1,7 +1,3 @@
-"""The follower on scripted faces: the picture tells them apart, no tracker is needed."""
-
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -11,6 +7,7 @@ from numpy.typing import NDArray
 from lipmotion_faces.tracking import face_follower as follow
 from lipmotion_faces.tracking.face_follower import JUMP, LOST_FRAMES, MOST_THUMBNAILS, FaceFollower
 from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, FaceBox, LandmarkTracker
+from vision.scripted import Opened
 
 pytestmark = pytest.mark.video
 
@@ -43,7 +40,7 @@ SMALL_FACE_PX = 40
 """A face with a smaller distance between the eyes is found by the detector alone."""
 
 
-class Mesh:
+class Mesh(Opened):
     """Finds the faces of the frame that is being shown, at most so many, in their order; not those in capitals."""
 
     shown: Sequence[Face] = ()
@@ -51,24 +48,12 @@ class Mesh:
     def __init__(self, most: int = 1) -> None:
         self.most = most
 
-    def __enter__(self) -> Mesh:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
     def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
         return [points(face) for face in Mesh.shown if face[0].islower() and face[3] >= SMALL_FACE_PX][: self.most]
 
 
-class Finder:
+class Finder(Opened):
     """Stands for the detector: finds all faces of the frame that is being shown, those in capitals too."""
-
-    def __enter__(self) -> Finder:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
 
     def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
         return [FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
@@ -95,7 +80,7 @@ class SmallMesh:
     def __init__(self, box: FaceBox, _: LandmarkTracker) -> None:
         self.x = box.x
 
-    def __enter__(self) -> SmallMesh:
+    def __enter__(self) -> "SmallMesh":
         SmallMesh.open += 1
         return self
 

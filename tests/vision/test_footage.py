@@ -1,8 +1,6 @@
-from __future__ import annotations
-
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from lipmotion_faces.tracking.footage import footage_frames, footage_groups, rea
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.video_scan import scan_video
-from vision.scripted import face, script
+from vision.scripted import Opened, face
 from vision.variants import write_frames
 
 OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)
@@ -21,12 +19,6 @@ MOVES = np.stack([0.5 * np.arange(20), np.sin(np.arange(20) / 4), np.zeros(20)],
 FACES = [face(opening) + move for opening, move in zip(OPENINGS, MOVES, strict=True)]
 JUMP_PX = 90
 """More than a face of 60 px between the eyes moves from frame to frame."""
-
-
-@pytest.fixture
-def scripted(monkeypatch):
-    pytest.importorskip("cv2")
-    return partial(script, monkeypatch)
 
 
 def levels(frames) -> list[int]:
@@ -146,22 +138,15 @@ def test_untracked_frames_hold_the_last_picture(write_video):
         assert levels(frames) == wanted
 
 
-class Follower:
+class Follower(Opened):
     """Stands for the follower of faces: counts what it is shown."""
 
     share = 1.0
-    last: Follower
+    shown: ClassVar[list[int]] = []
 
     def __init__(self, tracker: str) -> None:
         assert tracker == "mediapipe"
-        self.shown: list[int] = []
-
-    def __enter__(self) -> Follower:
-        Follower.last = self
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
+        self.shown.clear()
 
     def points(self, image: np.ndarray) -> None:
         self.shown.append(int(image.mean()))
@@ -205,7 +190,7 @@ def test_times_and_cuts(tmp_path):
 @pytest.mark.usefixtures("followed")
 def test_faces_are_looked_for_every_two_seconds(tmp_path):
     scan_video(write_frames(tmp_path / "a.mp4", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]))
-    assert Follower.last.shown == pytest.approx([0, 50, 100], abs=2)
+    assert Follower.shown == pytest.approx([0, 50, 100], abs=2)
 
 
 @pytest.mark.usefixtures("followed")

@@ -1,5 +1,3 @@
-"""What happens to a track when the video is not as one would wish: against the track of the untouched clip."""
-
 from pathlib import Path
 
 import numpy as np

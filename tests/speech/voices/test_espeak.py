@@ -1,7 +1,6 @@
-"""espeak-ng: which library speaks, what it says in other languages, and the words that it tells."""
-
 import json
 import re
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -45,11 +44,7 @@ def test_the_package_comes_before_the_system(wheel: Path) -> None:
     assert espeak._library() == {"library": str(wheel / "libespeak-ng.so"), "data": str(wheel)}
     assert [voice.name for voice in ESPEAK_NG.voices()] == ["en-us+f2"]
     assert [voice.name for voice in ESPEAK_NG.others()] == ["de", "en", "en-gb", "en-us"]
-
-
-def test_a_package_without_its_data_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    spec = SimpleNamespace(submodule_search_locations=[str(tmp_path)])
-    monkeypatch.setattr(espeak, "find_spec", lambda _: spec)
+    shutil.rmtree(wheel / "espeak-ng-data")
     assert espeak.wheel_folder() is None
 
 
@@ -87,10 +82,7 @@ def written(*places: int, text: str) -> list[str]:
 
 def test_words_are_found_by_their_places() -> None:
     assert written(0, 0, 4, 8, 12, text="one two-six ten") == ["0.0 one", "0.2 two-six", "0.4 ten"]
-
-
-def test_a_word_that_is_said_with_the_one_before_belongs_to_it() -> None:
-    assert written(0, 0, 7, text="on the red ball") == ["0.0 on the", "0.2 red ball"]
+    assert written(0, 0, 7, text="on the red ball") == ["0.0 on the", "0.2 red ball"]  # said together
     assert written(3, 3, text="- one -") == ["0.0 - one -"]
 
 
@@ -151,24 +143,14 @@ def starts(labels: list[tuple[str, float]], audio: Audio) -> list[float]:
 def test_a_stop_begins_with_its_closure() -> None:
     for stop in ("p", "t2", "k", "tS", "b", "d", "g", "dZ"):
         assert starts([("a", 0.1), (stop, 0.4), ("i:", 0.5)], sound((0.35, 0.42))) == [0.1, 0.35, 0.5]
-
-
-def test_a_long_silence_is_not_all_closure() -> None:
-    assert starts([("a", 0.1), ("p", 0.4)], sound((0.2, 0.4))) == [0.1, 0.34]
-
-
-def test_other_silences_stay() -> None:
-    for before, label in (("a", "s"), ("a", "m"), ("_:", "p"), ("_", "k")):
+    assert starts([("a", 0.1), ("p", 0.4)], sound((0.2, 0.4))) == [0.1, 0.34]  # a long silence is not all closure
+    for before, label in (("a", "s"), ("a", "m"), ("_:", "p"), ("_", "k")):  # other silences stay
         assert starts([(before, 0.1), (label, 0.4)], sound((0.35, 0.4))) == [0.1, 0.4]
-
-
-def test_a_closure_never_reaches_past_the_phone_before() -> None:
+    # it never reaches past the phone before, and without silence or at the start it stays
     assert starts([("a", 0.1), ("s", 0.38), ("t", 0.4)], sound((0.35, 0.4))) == [0.1, 0.38, 0.38]
-
-
-def test_a_stop_without_silence_or_at_the_start_stays() -> None:
     assert starts([("a", 0.1), ("b", 0.4)], sound()) == [0.1, 0.4]
     assert starts([("a", 0.0), ("b", 0.0)], sound()) == [0.0, 0.0]
+    assert starts([("a", 0.1), ("p", 0.5)], Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)) == [0.1, 0.5]
 
 
 def test_an_l_that_is_late_gets_its_share_of_the_vowel() -> None:
@@ -180,10 +162,6 @@ def test_an_l_that_is_late_gets_its_share_of_the_vowel() -> None:
 def test_the_last_lasts_to_the_end() -> None:
     phones = corrected_phone_times([("a", 0.1), ("s", 0.5)], sound())
     assert [(span.label, span.end_s) for span in phones] == [("a", 0.5), ("s", 1.0)]
-
-
-def test_silence_is_closed_everywhere() -> None:
-    assert starts([("a", 0.1), ("p", 0.5)], Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)) == [0.1, 0.5]
 
 
 WORDS = {
