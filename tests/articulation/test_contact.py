@@ -1,5 +1,3 @@
-"""Contact: when lips touch, for how long, and in which pictures."""
-
 import numpy as np
 import pytest
 

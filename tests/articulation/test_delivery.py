@@ -1,5 +1,3 @@
-"""Intensity, anticipation, offset and held poses, on motion with known closures."""
-
 from dataclasses import replace
 from itertools import pairwise
 

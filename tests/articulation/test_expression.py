@@ -1,5 +1,3 @@
-"""Moods: a table of facts, curves over time, and a mouth that still says what it says."""
-
 import numpy as np
 import pytest
 

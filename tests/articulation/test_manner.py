@@ -1,5 +1,3 @@
-"""Manners of speaking: larger and smaller movements, closures that stay."""
-
 import numpy as np
 import pytest
 

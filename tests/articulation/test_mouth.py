@@ -1,5 +1,3 @@
-"""The spoken mouth: gap, width, jaw and articulatory channels of motion and phones."""
-
 import numpy as np
 import pytest
 

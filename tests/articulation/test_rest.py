@@ -1,5 +1,3 @@
-"""Pauses: the mouth rests in them, softly, and starts no earlier than a breath before the next phrase."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""Sounds of recorders, and tables of offsets."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""What every engine promises, whatever it does inside."""
-
 from dataclasses import replace
 from functools import cache
 

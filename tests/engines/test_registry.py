@@ -1,5 +1,3 @@
-"""Engines as a command line asks for them."""
-
 import pytest
 
 from lipmotion.engines import ENGINES, engine_from_settings, engine_named, preset_visual

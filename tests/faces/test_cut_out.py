@@ -1,5 +1,3 @@
-"""Characters of pictures: which file is which shape, pictures over one another, sizes and backgrounds."""
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Faces that are drawn, and their frames for the encoder, which look like those for people."""
-
 from typing import Any
 
 import numpy as np
@@ -205,14 +203,11 @@ def test_planes_are_those_of_the_picture(design, background):
         assert np.abs(luma - brightness).max() < 16  # a line that is off by a pixel would be
 
 
-def test_a_frame_does_not_depend_on_the_ones_before():
+def test_a_frame_does_not_depend_on_the_ones_before_and_all_even_sizes_have_planes():
     drawing = PlanarRasteriser(WOMAN, 96)
     used = drawing.canvas()
     for pose in (*POSES, *POSES[::-1]):
         assert np.array_equal(drawing.picture(pose, used), drawing.picture(pose, drawing.canvas()))
-
-
-def test_all_even_sizes_have_planes():
     for size in (64, 66):
         drawing = PlanarRasteriser(MAN, size)
         frame = drawing.picture(POSES[0], drawing.canvas())

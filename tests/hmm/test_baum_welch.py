@@ -1,5 +1,3 @@
-"""Single steps of training: the E-step against enumeration, and the models of the M-step."""
-
 from dataclasses import replace
 from itertools import pairwise
 

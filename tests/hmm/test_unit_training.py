@@ -1,5 +1,3 @@
-"""The whole training, on utterances of a speaker whose units are known."""
-
 from itertools import groupby, pairwise
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Pictures that are painted, moved and blended, against their definitions."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""Weights of blendshapes as motion of a mouth, of eyes and brows; visemes add up to 1."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -42,14 +40,6 @@ def weights(**curves: list[float]) -> Motion:
     return Motion(np.array(list(curves.values())).T, 100.0, tuple(Channel(name, WEIGHT) for name in curves))
 
 
-def test_other_motion_stays_as_it_is() -> None:
-    said = motion()
-    assert with_mouth(said) is said
-    no_jaw = weights(mouthPucker=[0.0, 1.0])
-    assert with_mouth(no_jaw) is no_jaw
-    assert not is_of_blendshapes(no_jaw)
-
-
 def test_the_jaw_opens_and_mouth_close_closes() -> None:
     moved = with_mouth(weights(jawOpen=[0.0, 0.5, 1.0, 0.5], mouthClose=[0.0, 0.0, 0.0, 0.5]))
     opening = moved["opening"]
@@ -77,21 +67,21 @@ def test_motion_that_became_weights_comes_back() -> None:
     assert np.corrcoef(back["width"], said["width"])[0, 1] > 0.9
 
 
-def test_the_blendshapes_of_facegood_are_converted() -> None:
-    found = arkit_weights(weights(mouth_stretch_c=[0.0, 0.6], mouth_pucker_l=[0.4, 0.0], mouth_pucker_r=[0.4, 0.0]))
-    assert found["jawOpen"].tolist() == [0.0, 0.6]
-    assert found["mouthPucker"].tolist() == pytest.approx([0.4, 0.0])
-    assert is_of_blendshapes(weights(mouth_stretch_c=[0.0, 0.6]))
-
-
-def test_weights_that_are_given_are_taken() -> None:
+def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> None:
     given = find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
     assert given is not None
     assert given.names == arkit_mouth().names
     assert given["jawOpen"].tolist() == [0.2, 1.0]
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]
-    assert find_own_weights(motion(), arkit_mouth()) is None
-    assert find_own_weights(weights(mouthPucker=[0.1, 0.2]), arkit_mouth()) is None
+    for other in (motion(), weights(mouthPucker=[0.1, 0.2])):  # without a jaw
+        assert find_own_weights(other, arkit_mouth()) is None
+        assert with_mouth(other) is other
+        assert not is_of_blendshapes(other)
+    facegood = weights(mouth_stretch_c=[0.0, 0.6], mouth_pucker_l=[0.4, 0.0], mouth_pucker_r=[0.4, 0.0])
+    found = arkit_weights(facegood)
+    assert found["jawOpen"].tolist() == [0.0, 0.6]
+    assert found["mouthPucker"].tolist() == pytest.approx([0.4, 0.0])
+    assert is_of_blendshapes(facegood)
 
 
 def test_a_mesh_shows_the_weights_that_are_given() -> None:

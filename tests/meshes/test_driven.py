@@ -1,5 +1,3 @@
-"""Characters from files to vertices."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -127,9 +125,8 @@ def test_control_points_raise_the_corners_in_a_smile(files):
     character = load_character(files / "head.obj", points=files / "points.csv")
     placement = character.placement
     corner = placement.vertices[placement.row(61)]
-    plain, happy = (
-        next(character.vertices(of, units(), TIME_S)) for of in (motion(), with_moods(motion(), parse_moods("happy")))
-    )
+    happy, plain = (with_moods(motion(), parse_moods(mood)) for mood in ("happy", ""))
+    happy, plain = (next(character.vertices(of, units(), TIME_S)) for of in (happy, plain))
     assert happy[corner, 1] > plain[corner, 1] + 0.05 * placement.scale
 
 
@@ -154,10 +151,9 @@ def _parted(character, weights):
 def test_any_names_are_understood_by_their_rows(file):
     plain = load_character(file).weights(motion(), units())
     shapes = {shape.name: f"あ {number}" for number, shape in enumerate(head().shapes)}
-    halves = [
-        replace(shape, name=shapes[shape.name], displacements=shape.displacements / (1 + (shape.name == "mouthFunnel")))
-        for shape in head().shapes
-    ]
+    halves = [replace(shape, name=shapes[shape.name]) for shape in head().shapes]
+    funnel = [shape.name for shape in head().shapes].index("mouthFunnel")
+    halves[funnel] = replace(halves[funnel], displacements=halves[funnel].displacements / 2)
     halves.append(replace(next(each for each in halves if each.name == shapes["mouthFunnel"]), name="other half"))
     write_glb(file, replace(head(), shapes=tuple(halves)))
     rows = "".join(f"{own},{known},,\n" for known, own in shapes.items())

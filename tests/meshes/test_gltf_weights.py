@@ -1,5 +1,3 @@
-"""Animations of glTF as motion: even and uneven keys, steps, splines, several meshes, expressions of VRM."""
-
 from pathlib import Path
 from typing import Any
 

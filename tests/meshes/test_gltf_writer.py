@@ -1,5 +1,3 @@
-"""What is written as glb is read again; a user's own .glb gets an animation, and all else in it stays."""
-
 import json
 import struct
 from dataclasses import replace

@@ -1,5 +1,3 @@
-"""Meshes check themselves; blendshapes add up."""
-
 import numpy as np
 import pytest
 
@@ -29,12 +27,9 @@ def _mesh(**changes) -> Mesh:
     return Mesh(**({"vertices": CORNERS, "triangles": SQUARE, "shapes": (up, out)} | changes))
 
 
-def test_displacements_of_some_vertices():
+def test_displacements_of_some_vertices_and_of_what_moves_alone():
     moved = _mesh().displacements(np.array([3, 0]))
     np.testing.assert_allclose(moved, [[[0, 2, 0], [0, 0, 0]], [[0, 0, 4], [0, 0, 0]]], atol=1e-12)
-
-
-def test_a_blendshape_keeps_only_what_moves():
     shape = CORNERS.copy()
     shape[1] += [0, 0, 1e-9]
     shape[2] += [0, 0, 0.5]
@@ -147,16 +142,12 @@ def test_curves_stay_within_the_tolerance(tolerance: float) -> None:
     assert np.abs(between((time_s, rows)) - ROWS).max() <= tolerance + 1e-12
 
 
-def test_coarser_keys_are_fewer() -> None:
+def test_coarser_keys_are_fewer_and_closed_lips_stay_closed() -> None:
     counts = [len(Thinning(tolerance).choose(TIME_S, ROWS)) for tolerance in (0.0, 0.003, 0.01, 0.05, 2.0)]
     assert counts == sorted(counts, reverse=True)
     assert (counts[0], counts[-1]) == (300, 2)
     assert len(EVERY_KEY.choose(TIME_S[:0], ROWS[:0])) == 0
-
-
-def test_closed_lips_stay_closed() -> None:
-    kept = Thinning(2.0, (0.703, 2.995)).choose(TIME_S, ROWS)
-    assert kept.tolist() == [0, 69, 70, 71, 298, 299]
+    assert Thinning(2.0, (0.703, 2.995)).choose(TIME_S, ROWS).tolist() == [0, 69, 70, 71, 298, 299]
 
 
 def test_a_held_pose_still_changes_at_once() -> None:

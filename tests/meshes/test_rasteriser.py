@@ -43,9 +43,6 @@ def test_the_height_of_the_picture_is_as_stated_and_nearer_things_are_larger():
     assert near[2] < high[2]
     light = gradient(Camera(100, 100))  # the background is brightest in the middle
     assert light[42, 50].sum() > light[5, 5].sum()
-
-
-def test_an_unusable_camera_is_refused():
     for size in ((63, 100), (120, 62), (120, 101)):
         with pytest.raises(InputError, match="even number of at least 64"):
             Camera(*size)

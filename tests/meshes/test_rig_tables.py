@@ -1,5 +1,3 @@
-"""A user's table of controls: rows add up, limits hold, damaged tables are refused."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""Weights follow the points, stay in range, and close the lips where they should."""
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -140,32 +138,18 @@ def test_all_frames_together_are_the_exact_solution():
     frames, matrix = 7, rng.normal(size=(3, 8))
     targets = rng.normal(size=(frames, 8))
     found = fit_bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.7), np.array([[0.3, -0.3, 0.0]]))
-    second = np.zeros((frames - 2, frames))
-    for row in range(frames - 2):
-        second[row, row : row + 3] = 1, -2, 1
-    rows = np.concatenate(
-        [
-            np.kron(np.eye(frames), matrix.T),
-            np.sqrt(1e-2) * np.eye(3 * frames),
-            np.kron(np.eye(frames), [[0.3, -0.3, 0.0]]),
-            np.sqrt(0.7) * np.kron(second, np.eye(3)),
-        ]
-    )
+    fit, ridge = np.kron(np.eye(frames), matrix.T), np.sqrt(1e-2) * np.eye(3 * frames)
+    near, smooth = np.kron(np.eye(frames), [[0.3, -0.3, 0.0]]), np.kron(np.diff(np.eye(frames), 2, axis=0), np.eye(3))
+    rows = np.concatenate([fit, ridge, near, np.sqrt(0.7) * smooth])
     wanted = np.concatenate([targets.reshape(-1), np.zeros(len(rows) - targets.size)])
     exact = lsq_linear(rows, wanted, (0, 1), tol=1e-12).x.reshape(frames, 3)
     np.testing.assert_allclose(found, exact, atol=1e-4)
 
 
 def test_more_cost_is_smoother():
-    targets = np.random.default_rng(2).random((50, 4))
-    rough, smooth = (
-        np.abs(np.diff(fit_bounded_curves(np.eye(4), targets, CurveCosts(smooth=cost)), axis=0)).sum()
-        for cost in (0.0, 5.0)
-    )
+    targets, costs = np.random.default_rng(2).random((50, 4)), (CurveCosts(smooth=cost) for cost in (0.0, 5.0))
+    rough, smooth = (np.abs(np.diff(fit_bounded_curves(np.eye(4), targets, each), axis=0)).sum() for each in costs)
     assert smooth < rough / 2
-
-
-def test_what_does_not_fit_is_refused():
     with pytest.raises(InputError, match="do not fit"):
         fit_bounded_curves(np.zeros((2, 3)), np.zeros((5, 4)))
     with pytest.raises(InputError, match="not finite"):

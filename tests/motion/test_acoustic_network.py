@@ -1,5 +1,3 @@
-"""Acoustic networks: interpolation, training on acoustic conditions, serialisation."""
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""The table of articulation: its curves, its place in a speaker's range, and how far contexts are known."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Long recordings are generated block by block."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Regression on what another model makes of the same speech."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The convolutional network: gradients, reach, blocks, learning, determinism."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""The recurrent network: gradients, ends of sequences, pieces, learning, determinism."""
-
 import numpy as np
 import pytest
 

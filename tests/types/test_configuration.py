@@ -1,5 +1,3 @@
-"""Configurations check themselves, and are parsed from texts and mappings."""
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar

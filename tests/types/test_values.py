@@ -1,5 +1,3 @@
-"""Documents are checked against tables of types and ranges; what stands in no table is not looked at."""
-
 import pytest
 
 from lipmotion.errors import InputError

@@ -1,5 +1,3 @@
-"""Phones of all languages become those of the nearest mouth shape."""
-
 import unicodedata
 from itertools import groupby
 

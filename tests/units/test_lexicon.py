@@ -1,5 +1,3 @@
-"""Words that are in no dictionary are read by a network, where it is installed, else by rules."""
-
 from pathlib import Path
 
 import pytest

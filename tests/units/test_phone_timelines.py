@@ -1,5 +1,3 @@
-"""Words in time, of phones in time."""
-
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit

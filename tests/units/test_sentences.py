@@ -1,5 +1,3 @@
-"""Text to sentences that a synthesiser can say."""
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

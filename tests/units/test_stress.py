@@ -1,5 +1,3 @@
-"""Which syllables are stressed, as far as rules know."""
-
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
 from lipmotion.units.stress import NUCLEI, find_stress, find_stressed_vowel

@@ -1,5 +1,3 @@
-"""Written forms: every one in the words that a voice says, and the sound that chooses among readings."""
-
 import pytest
 
 from lipmotion import load_model

@@ -1,5 +1,3 @@
-"""Explanations of frames, against all paths of small chains and against the numbers of a fitted model."""
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,5 +1,3 @@
-"""The joint engine: what is given wins, and what it recognises are its own units."""
-
 from dataclasses import replace
 from functools import cache
 

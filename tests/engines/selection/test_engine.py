@@ -1,5 +1,3 @@
-"""The engine: sources of units, edits, reports."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Windows of phones, and the index that finds them."""
-
 from dataclasses import replace
 
 import numpy as np

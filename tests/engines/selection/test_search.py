@@ -1,5 +1,3 @@
-"""The dynamic programming: exact, with and without pruning."""
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,5 +1,3 @@
-"""Units other than phones: what trees ask, what is saved, and that lips meet all the same."""
-
 from functools import cache
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Filmed faces as files: there and back, and nothing but a whole face is read."""
-
 import io
 import json
 import re
@@ -124,27 +122,21 @@ def test_nothing_is_left_where_it_cannot_be_written(small: FilmedFace, tmp_path:
 
 @pytest.mark.long
 def test_every_array_is_needed(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
+    def without(name: str) -> str:
+        return refusal(tmp_path / "a.face", header, {key: arrays[key] for key in arrays if key != name})
+
     assert refusal(tmp_path / "a.face", header, arrays) == ""
-    read = [
-        name
-        for name in arrays
-        if "missing" not in refusal(tmp_path / "a.face", header, {key: arrays[key] for key in arrays if key != name})
-    ]
+    read = [name for name in arrays if "missing" not in without(name)]
     assert read == ["appearance/mouth_distances", "background/cuts"]  # which older faces have not
 
 
-def test_every_array_is_declared(arrays: dict[str, np.ndarray]) -> None:
+def test_every_array_is_declared(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
     named = {f"appearance/{name}" for name in APPEARANCE}
     named |= {f"background/{name}" for name in (*BACKGROUND, *STORED_VIDEO)}
     named |= {f"take{number}/{name}" for number in range(2) for name in TAKE}
     parts = tuple(f"appearance/{part}/" for part in PARTS)
     assert {name for name in arrays if not name.startswith(parts)} == named
     assert all(any(name.startswith(part) for name in arrays) for part in parts)
-
-
-def test_an_array_that_nothing_declares(
-    arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path
-) -> None:
     for more in "appearance/more appearance/noise/more background/more take0/more take2/sound jaw/mean".split():
         message = refusal(tmp_path / "a.face", header, arrays | {more: np.zeros(3)})
         assert "undeclared '" in message
@@ -171,13 +163,8 @@ def test_damaged_pictures_are_refused_or_shown(
     """A stream whose frames are not all there is refused before anything is shown of it."""
     for name in CODED:
         data = arrays[name]
-        for changed in (
-            data[: len(data) // 2],
-            data[:0],
-            np.random.default_rng(0).integers(0, 256, len(data), np.uint8),
-            np.concatenate([data, data]),
-            data.astype(np.float32),
-        ):
+        noise = np.random.default_rng(0).integers(0, 256, len(data), np.uint8)
+        for changed in (data[: len(data) // 2], data[:0], noise, np.concatenate([data, data]), data.astype(np.float32)):
             assert "damaged" in refusal(tmp_path / "a.face", header, arrays | {name: changed})
         refusal(tmp_path / "a.face", header, arrays | {name: data[1:]})  # the start code may lack its zero
 
@@ -215,11 +202,13 @@ def test_faces_of_before(arrays: dict[str, np.ndarray], header: dict[str, object
     assert len(face.appearance.predict_codes(load_face(path).takes[0].motion)) > 0
 
 
-def test_arrays_that_do_not_fit_together(
+def test_arrays_and_headers_that_do_not_fit_together(
     arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path
 ) -> None:
     for what, (changed, words) in CHANGES.items():
         assert re.search(words, refusal(tmp_path / "a.face", header, {**arrays, **changed})), what
+    for of_header, words in HEADERS:
+        assert words in refusal(tmp_path / "a.face", header | of_header, arrays)
 
 
 HEADERS: list[tuple[dict[str, object], str]] = [
@@ -237,11 +226,6 @@ HEADERS: list[tuple[dict[str, object], str]] = [
     ({"channels": [{"name": "opening", "unit": "a"}] * 3}, "repeat"),
     ({"channels": 7}, "the face is damaged"),
 ]
-
-
-def test_other_headers(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
-    for changed, words in HEADERS:
-        assert words in refusal(tmp_path / "a.face", header | changed, arrays)
 
 
 def files(face: Path) -> Iterator[tuple[str, bytes]]:

@@ -1,5 +1,3 @@
-"""Stitching: the footage comes back where nothing is to change, and what is to change is what was drawn."""
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,5 +1,3 @@
-"""The figure of the 3D head: its form, its poses, and these as weights of blendshapes."""
-
 import numpy as np
 import pytest
 
@@ -21,16 +19,13 @@ def rows(name: str) -> np.ndarray:
     return figure().place(REST)[0][figure().rows[name]]
 
 
-def test_all_parts_are_of_finite_places_and_unit_normals():
+def test_eyes_are_one_eye_distance_apart_at_their_outer_corners_and_normals_of_length_one():
+    corners = [figure().place(REST)[0][figure().skin.lid_rows(eye)[1]] for eye in (0, 1)]
+    assert corners[0][:, 0].max() - corners[1][:, 0].min() == pytest.approx(1.0, abs=0.02)
     places, normals = figure().place(OPEN)
     assert np.isfinite(places).all()
     used = np.unique(figure().triangles)
     assert np.linalg.norm(normals[used], axis=1) == pytest.approx(np.ones(len(used)), abs=0.01)
-
-
-def test_eyes_are_one_eye_distance_apart_at_their_outer_corners():
-    corners = [figure().place(REST)[0][figure().skin.lid_rows(eye)[1]] for eye in (0, 1)]
-    assert corners[0][:, 0].max() - corners[1][:, 0].min() == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_head_is_the_same_on_both_sides():
@@ -66,9 +61,8 @@ def test_shut_eyes_cover_the_eyeballs():
 
 
 def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
-    straight, aside = (
-        figure().frame(CharacterPose(turn=turn), VIEWER).places for turn in ((0, 0, 0), (0.3, 0.1, 0.05))
-    )
+    turns = (0, 0, 0), (0.3, 0.1, 0.05)
+    straight, aside = (figure().frame(CharacterPose(turn=turn), VIEWER).places for turn in turns)
     body = figure().rows["clothing"]
     assert np.array_equal(straight[body], aside[body])
     nose = int(np.argmax(straight[figure().rows["skin"], 2]))
@@ -108,9 +102,7 @@ def test_a_shape_at_full_weight_is_its_pose(mesh):
 
 def test_mouth_close_brings_the_lips_of_an_open_jaw_together_and_sided_shapes_leave_the_other_side_alone(mesh):
     lips = figure().skin.lip_rows()[9]
-    apart, together = (
-        shaped(mesh, weights)[lips] for weights in ({"jawOpen": 1.0}, {"jawOpen": 1.0, "mouthClose": 1.0})
-    )
+    apart, together = (shaped(mesh, {"jawOpen": 1.0, "mouthClose": closed})[lips] for closed in (0.0, 1.0))
     assert apart[20, 1] - apart[60, 1] > 0.25
     assert together[20, 1] - together[60, 1] < 0.03
     moved = shaped(mesh, {"mouthSmileLeft": 1.0}) - mesh.vertices
@@ -155,10 +147,8 @@ def places(mesh: Mesh) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     found = {}
     for number, (name, pose) in enumerate(SAID.items()):
         weights = {each: float(curve[10 * number + 5]) for each, curve in curves.items()}
-        summed = mesh.vertices[rows] + sum(
-            weight * moved[mesh.shape_names.index(each)] for each, weight in weights.items()
-        )
-        found[name] = (summed, figure().skin.places(pose))
+        added = sum(weight * moved[mesh.shape_names.index(each)] for each, weight in weights.items())
+        found[name] = (mesh.vertices[rows] + added, figure().skin.places(pose))
     return found
 
 

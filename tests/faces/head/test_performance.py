@@ -1,5 +1,3 @@
-"""Motion becomes poses; each sound has a mouth that can be named from the picture alone."""
-
 from typing import NamedTuple
 
 import numpy as np
@@ -67,21 +65,19 @@ def test_tracked_jaws_are_followed_within_limits():
     assert jaws[1] < jaws[2] < jaws[3] < 0.25
 
 
-def test_an_unusable_motion_is_refused():
-    with pytest.raises(InputError, match="no channel 'opening'"):
-        head_poses(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID, 25.0)
-    with pytest.raises(InputError, match="frame rate"):
-        head_poses(opening(0.0), NOTHING_SAID, 0.0)
-
-
 def test_articulatory_channels_of_the_motion_come_before_the_phones():
-    names = ("opening", "tongue", "lip_tuck", "teeth")
-    rows = np.tile([0.08, 1.0, 0.0, 1.0], (31, 1))
-    motion = Motion(rows, 25.0, tuple(map(Channel, names)))
+    names = ("opening", "tongue", "lip_tuck", "teeth", "lip_press")
+    motion = Motion(np.tile([0.08, 1.0, 0.0, 1.0, 0.0], (31, 1)), 25.0, tuple(map(Channel, names)))
     pose = head_poses(motion, said("f", "aa", "f"), 25.0)[15]
     assert pose.tongue_out > 0.99
     assert pose.bite > 0.99
     assert head_poses(motion, said("f", "f", "f"), 25.0)[15].tuck < 0.01
+    pressed = Motion(np.tile([0.0, 1.0], (41, 1)), 100.0, tuple(map(Channel, ("opening", "lip_press"))))
+    assert head_poses(pressed, said("ah"), 25.0)[5].press == pytest.approx(1.0)
+    with pytest.raises(InputError, match="no channel 'opening'"):
+        head_poses(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID, 25.0)
+    with pytest.raises(InputError, match="frame rate"):
+        head_poses(opening(0.0), NOTHING_SAID, 0.0)
 
 
 def test_a_loud_high_voice_raises_the_brows():
@@ -89,9 +85,8 @@ def test_a_loud_high_voice_raises_the_brows():
     level[150:170], pitch[150:170] = -10.0, np.log(260.0)
     motion = opening(*[0.05] * 75)
     flat = Prosody(np.full(300, -10.0), np.full(300, np.log(150.0)))
-    with_voice, without = (
-        head_poses(motion, said("aa", duration_s=3), 25.0, prosody=p) for p in (Prosody(level, pitch), flat)
-    )
+    voices, units = (Prosody(level, pitch), flat), said("aa", duration_s=3)
+    with_voice, without = (head_poses(motion, units, 25.0, prosody=voice) for voice in voices)
     assert with_voice[35].brows > without[35].brows + 0.005
 
 
@@ -189,12 +184,6 @@ def test_teeth_part_when_a_spread_mouth_is_wide_open():
     flat, wide = pose_of("iy", 0.08, 0.03), pose_of("iy", 0.25, 0.03)
     assert flat.bite > 0.4
     assert wide.bite < 0.1
-
-
-def test_pressed_lips_of_the_motion_come_before_the_phones():
-    names = ("opening", "lip_press")
-    motion = Motion(np.tile([0.0, 1.0], (41, 1)), 100.0, tuple(map(Channel, names)))
-    assert head_poses(motion, said("ah"), 25.0)[5].press == pytest.approx(1.0)
 
 
 def test_the_tongue_of_th_is_seen_and_is_narrower_than_the_mouth():

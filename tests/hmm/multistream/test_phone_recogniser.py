@@ -1,5 +1,3 @@
-"""The joint model as a recogniser of phones, for the speakers of its training."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The second stage of training, on speech without motion."""
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
