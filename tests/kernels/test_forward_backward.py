@@ -97,28 +97,6 @@ def test_posteriors_of_every_frame_sum_to_one(seed, loudness):
         assert stay[u].sum() == pytest.approx(frames - moves, abs=1e-6)
 
 
-def test_too_short_an_utterance_has_no_path_and_harms_no_other():
-    batch, _ = padded(3, [(6, 3), (2, 3)])
-    alone, _ = padded(3, [(6, 3)])
-    posterior, stay, log_likelihood = chain_posteriors(*batch)
-    assert log_likelihood[1] <= LOG_ZERO / 2
-    assert not posterior[:, 1].any()
-    assert not stay[1].any()
-    for together, apart in zip((posterior, stay, log_likelihood), chain_posteriors(*alone), strict=True):
-        whole = together[:, :1] if together.ndim == 3 else together[:1]
-        assert whole == pytest.approx(apart, abs=1e-12)
-
-
-def test_order_of_utterances_changes_nothing():
-    batch, _ = padded(7, [(6, 3), (4, 2), (5, 1)])
-    log_emission, log_stay, log_move, frames, states = batch
-    back = [2, 0, 1]
-    shuffled = chain_posteriors(log_emission[:, back], log_stay[back], log_move[back], frames[back], states[back])
-    for mixed, straight in zip(shuffled, chain_posteriors(*batch), strict=True):
-        wanted = straight[:, back] if straight.ndim == 3 else straight[back]
-        assert np.array_equal(mixed, wanted)
-
-
 EMISSION = np.array([0, 1, 0, 2])
 ARCS = {(0, 0): -0.5, (0, 1): -1.0, (1, 1): -0.7, (1, 2): -0.3, (2, 2): -1.2, (2, 3): -0.4, (3, 0): -0.6, (3, 3): -2.0}
 INITIAL = np.array([-0.2, -np.inf, -1.5, -np.inf])
