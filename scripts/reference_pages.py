@@ -1,4 +1,4 @@
-"""Writes the tables of the reference that follow from the code: verbs and options, formats, limits, bad input.
+"""Writes the tables of the reference that follow from the code: verbs, formats, limits, bad input.
 
 In a page such a table stands between ``<!-- made: NAME -->`` and ``<!-- end made -->``. Run
 ``python scripts/reference_pages.py`` after a change of the command line or of a registry.
@@ -88,27 +88,13 @@ def actions(part: argparse.ArgumentParser) -> list[argparse.Action]:
 
 
 def verb_table() -> str:
-    """Return the table of all verbs: what they must be given, what they do, the pages on them."""
-    rows = []
+    """Return the table of all verbs: what they must be given, what they do, and, once a verb, the pages on it."""
+    rows, pages = [], dict(SEE)
     for name, says, part in verbs(whole_parser()):
         needed = [shown(a) for a in actions(part) if not a.option_strings or a.required]
-        see = ", ".join(f"[{page}]({page}.md)" for page in SEE.get(name.split()[0], "").split())
+        see = ", ".join(f"[{page}]({page}.md)" for page in pages.pop(name.split()[0], "").split())
         rows.append([f"`{' '.join([name, *needed])}`", says, see])
     return table(["verb", "what it does", "more"], iter(rows))
-
-
-def option_table() -> str:
-    """Return the table of the options that four verbs or more take, each once for each meaning."""
-    found: dict[tuple[str, str], dict[str, None]] = {}
-    for name, _, part in verbs(whole_parser()):
-        for action in actions(part):
-            if action.option_strings and not action.required:
-                says = re.sub(r"\s+", " ", part._get_formatter()._expand_help(action))
-                found.setdefault((shown(action), says), {})[name.split()[0]] = None
-    rows = (
-        [f"`{option}`", says, ", ".join(names)] for (option, says), names in sorted(found.items()) if len(names) > 3
-    )
-    return table(["option", "what it does", "verbs"], rows)
 
 
 def exit_codes() -> str:
@@ -129,9 +115,10 @@ def motion_formats() -> str:
     rows = []
     for name in MOTION_FORMATS.built_in:
         chosen = MOTION_FORMATS.load(name)
-        rate = f"{chosen.rate_hz:g}" if chosen.rate_hz else "the motion's"
-        rows.append([f"`.{name}`", line_on(name, chosen.write.__module__), "yes" if chosen.read else "no", rate])
-    return table(["file", "what it holds", "read back", "frames a second"], iter(rows))
+        says = line_on(name, chosen.write.__module__)
+        says += f"; {chosen.rate_hz:g} frames a second" if chosen.rate_hz else ""
+        rows.append([f"`.{name}`", says, "yes" if chosen.read else "no"])
+    return table(["file", "what it holds", "read back"], iter(rows))
 
 
 def cue_formats() -> str:
@@ -156,26 +143,13 @@ def bad_input() -> str:
     return "; ".join(f"{name.lower()} {rows.count(chr(10) + '| ') - 1}" for name, _, rows in groups) + "."
 
 
-def moods() -> str:
-    """Return the action units of every mood."""
-    from lipmotion.articulation.expression import ACTION_UNITS, mood_rows
-
-    rows: dict[str, list[str]] = {}
-    for row in mood_rows():
-        ours = "*" if row.source == "ours" else ""
-        rows.setdefault(row.mood, []).append(f"{row.unit} {ACTION_UNITS[row.unit]} {row.intensity:g}{ours}")
-    return table(["mood", "action units, and how strong"], ([mood, ", ".join(units)] for mood, units in rows.items()))
-
-
 TABLES: dict[str, Callable[[], str]] = {
     "verbs": verb_table,
-    "options": option_table,
     "exit-codes": exit_codes,
     "motion-formats": motion_formats,
     "cue-formats": cue_formats,
     "character-limits": character_limits,
     "bad-input": bad_input,
-    "moods": moods,
 }
 
 

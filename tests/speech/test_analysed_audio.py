@@ -13,7 +13,7 @@ from lipmotion.speech.features import analysed_audio as module
 from lipmotion.speech.features import mfcc as front_end
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc
-from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS, SpeakerSimilarity, speaker_similarity
+from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.agreement import agreement_score
 from lipmotion.speech.recognition.general.front_end import general_features
@@ -243,40 +243,3 @@ def test_a_constant_offset_hides_no_pause(offset: float) -> None:
         assert [(p.first, p.own) for p in audio.passages] == [(p.first, p.own) for p in plain.passages]
         assert audio.mfcc().values == pytest.approx(plain.mfcc().values, abs=0.02)
     assert np.array_equal(of_samples(sound).samples, sound.astype(np.float32))
-
-
-def test_a_warped_voice_is_warped_back(toy_model: Model) -> None:
-    """Its spectra are those of the known voice, stretched."""
-    audio = toy_sentences(3)[0].audio
-    before = speaker_similarity(toy_model.phones, analysed(audio)).score
-    for factor, expected in ((1.12, 0.88), (0.89, 1.12)):
-        positions = np.arange(0, len(audio.samples) - 1, factor)
-        other = Audio(np.interp(positions, np.arange(len(audio.samples)), audio.samples).astype(np.float32), 16_000)
-        similarity = speaker_similarity(toy_model.phones, analysed(other))
-        assert abs(similarity.warp - expected) < 0.07
-        assert similarity.score < before
-
-
-def test_the_warp_chosen_is_the_most_similar(toy_model: Model) -> None:
-    audio = analysed(toy_sentences(3)[1].audio)
-    similarity = speaker_similarity(toy_model.phones, audio)
-    (passage,) = audio.passages
-    fits = {warp: toy_model.phones.fit(passage.audio.mfcc(warp).values) for warp in WARPS}
-    assert similarity.warp == max(fits, key=lambda warp: fits[warp])
-    assert similarity.score == pytest.approx(max(fits.values()) - toy_model.phones.typical_fit)
-
-
-def test_a_recording_is_judged_by_its_longest_passage(toy_model: Model) -> None:
-    """Silence, and a short line by another voice, change nothing."""
-
-    def judged(*parts: np.ndarray) -> SpeakerSimilarity:
-        return speaker_similarity(toy_model.phones, of_samples(*parts))
-
-    line, other, quiet = whole_frames(0), toy_sentences(3)[1].audio.samples, np.zeros(5 * 16_000)
-    alone = judged(np.pad(line, 8000))
-    short = np.interp(np.arange(160 * 200) * 1.3, np.arange(len(other)), other)
-    for parts in ((quiet, line, quiet), (short, quiet, line, quiet), (quiet, line, quiet, short)):
-        found = judged(*parts)
-        assert found.warp == alone.warp
-        assert found.score == pytest.approx(alone.score, abs=1e-3)
-    assert judged(short).score != alone.score

@@ -114,6 +114,8 @@ class UnitHmm:
 
     log_stay    : float32 array [shape=(G,)], log P(stay in the state), of the states without context
     typical_fit : mean ``fit`` of the recordings that the models were trained on
+    speaker     : mean speaker vector of these recordings (``speech.features.speaker_similarity``) [shape=(128,)];
+                  None: a model of an earlier version
     """
 
     config: HmmConfig
@@ -122,6 +124,7 @@ class UnitHmm:
     log_stay: NDArray[np.float32]
     bigram: Bigram
     typical_fit: float = 0.0
+    speaker: NDArray[np.float32] | None = None
 
     def __repr__(self) -> str:
         densities, components, features = self.mixtures.size
@@ -157,6 +160,7 @@ def hmm_to_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) 
         "log_stay": hmm.log_stay,
         "bigram": hmm.bigram.log_probability,
         "typical_fit": np.array([hmm.typical_fit]),
+        **({} if hmm.speaker is None else {"speaker": hmm.speaker.astype(precision)}),
     }
 
 
@@ -175,7 +179,13 @@ def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
         table = StateTable(units, counts, names, free)
         bigram = bigram_from_array(units, stored["bigram"])
         return UnitHmm(
-            config, table, mixtures_from_arrays(stored), stored["log_stay"], bigram, float(stored["typical_fit"][0])
+            config,
+            table,
+            mixtures_from_arrays(stored),
+            stored["log_stay"],
+            bigram,
+            float(stored["typical_fit"][0]),
+            stored["speaker"] if "speaker" in arrays else None,
         )
 
 
@@ -190,5 +200,6 @@ MODELS = {
     **BIGRAM,
     "log_stay": ArraySpec(np.float32, "R", -1e4, NEGATIVE),
     "typical_fit": ArraySpec(np.float64, "1", -1e6, 1e6),
+    "speaker": ArraySpec(np.float32, "128", -1e4, 1e4, optional=True),
 }
 """How unit models are stored: G states, R of them without context."""

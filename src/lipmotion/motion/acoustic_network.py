@@ -46,7 +46,8 @@ SURE_POSTERIORS = (0.75, 0.9)
 """For an unknown voice it has no share at the first mean posterior, all of its share at the second one. A known voice
 has all of it in a clear recording, too."""
 ENCODING_SHARE = 0.5
-"""Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none."""
+"""Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none. As
+it is trained in quiet, it has it where the posteriors are sure."""
 
 TARGETS = {
     "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
@@ -120,21 +121,21 @@ class AcousticNetwork(Predictor):
         motion, distortion = speech.cached(self, lambda: self._predict(spectrum))
         network, posteriors, strange = self.posterior_network, speech.posteriors, unseen_share(speech.voice)
         if network is not None and posteriors is not None:
-            (known, unknown), (none, full) = POSTERIOR_SHARES, SURE_POSTERIORS
-            sure = np.clip((posteriors.mean - none) / (full - none), 0, 1)
+            known, unknown = POSTERIOR_SHARES
+            sure = _rate_sureness(speech)
             fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
             share = (fitting * (known + strange * (unknown - known)))[:, None]
             motion = motion + share * (network.predict(speech)[0] - motion)
         encoded = self.predict_encoded(speech)
         if encoded is not None:
-            motion = motion + ENCODING_SHARE * min(2 * strange, 1.0) * (encoded - motion)
+            motion = motion + ENCODING_SHARE * encoded[1] * (encoded[0] - motion)
         return motion, distortion
 
-    def predict_encoded(self, speech: Speech) -> Array | None:
-        """Return motion from the encoding of the sound alone, for voices that training does not know."""
+    def predict_encoded(self, speech: Speech) -> tuple[Array, float] | None:
+        """Return motion from the encoding alone, and how far it applies: to unknown voices, where phones are sure."""
         if self.encoding is None or speech.encoding is None or speech.voice >= 1:
             return None
-        return self.encoding.predict(speech)[0]
+        return self.encoding.predict(speech)[0], min(2 * unseen_share(speech.voice), 1.0) * _rate_sureness(speech)
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""
@@ -179,6 +180,12 @@ class AcousticNetwork(Predictor):
         kinds: tuple[Any, Any] = (PosteriorNetwork, EncodingRegression)
         inner = [None if arrays.keys().isdisjoint(k.ARRAYS) else k.from_arrays(arrays, dimensions) for k in kinds]
         return cls(network, mean, scale, stored["network_variances"], *inner)
+
+
+def _rate_sureness(speech: Speech) -> float:
+    """Return how sure the posteriors are, 0 to 1; 1 without posteriors."""
+    mean = SURE_POSTERIORS[1] if speech.posteriors is None else speech.posteriors.mean
+    return float(np.interp(mean, SURE_POSTERIORS, (0, 1)))
 
 
 def _train(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:

@@ -92,7 +92,7 @@ class LearnedMotion:
         closing_units: Container[str] = (),
         reliability: NDArray[np.float64] | float = 1.0,
         voice: float = 1.0,
-        encoded: NDArray[np.float64] | None = None,
+        encoded: tuple[NDArray[np.float64], float] | None = None,
     ) -> tuple[Motion, ReducedVariance]:
         """Return the motion of all channels at 100 Hz, and its variance, by parameter generation.
 
@@ -108,7 +108,7 @@ class LearnedMotion:
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
-        encoded       : motion from the encoding of the sound alone, for other voices [shape=(T, Q)]
+        encoded       : as of ``Predictor.predict_encoded``
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
@@ -121,7 +121,7 @@ class LearnedMotion:
                 statistics = speaker.raise_contrast(statistics)
                 statistics = speaker.open_before_speech(statistics)
                 if encoded is not None:
-                    statistics = speaker.follow_encoding(statistics, encoded)
+                    statistics = speaker.follow_encoding(statistics, *encoded)
                 gain = widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling, reach_s = scaling._replace(factors=scaling.factors * gain), choose_closing_reach(voice)
         ranges = find_closable_ranges(units, frames, closing_units, reach_s) if close else []

@@ -68,14 +68,17 @@ class UnseenSpeaker:
     reliability: Array | float
     voice: float
 
-    def follow_encoding(self, statistics: Predict, encoded: Array) -> Predict:
-        """Draw the motion in and near speech towards that from the encoding of the sound alone [shape=(T, Q)]."""
+    def follow_encoding(self, statistics: Predict, encoded: Array, applies: float) -> Predict:
+        """Draw the motion in and near speech towards that from the encoding of the sound alone [shape=(T, Q)].
+
+        applies : how far, 0 to 1 (``Predictor.predict_encoded``)
+        """
         spoken = np.zeros((self.frames, 1))
         for span in self.units:
             if not is_silent(span.label.phone):
                 first, stop = frames_of(span, self.frames)
                 spoken[max(first - NEAR_FRAMES, 0) : stop + NEAR_FRAMES] = 1
-        share = LATE_ENCODING_SHARE * min(2 * unseen_share(self.voice), 1.0) * smooth_steps(spoken)[:, :, None]
+        share = LATE_ENCODING_SHARE * applies * smooth_steps(spoken)[:, :, None]
 
         def predict(chosen: slice) -> Statistics:
             means, precisions = statistics(chosen)

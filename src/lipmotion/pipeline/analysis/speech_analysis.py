@@ -30,7 +30,7 @@ from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
-from lipmotion.speech.features.speaker_similarity import speaker_similarity
+from lipmotion.speech.features.speaker_similarity import voice_knowledge
 from lipmotion.speech.features.voice_events import voice_events, without_laughter
 from lipmotion.speech.recognition.agreement import TranscriptFit, label_fit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
@@ -49,7 +49,6 @@ from lipmotion.speech.recognition.recogniser import (
     Recogniser,
     cached_recogniser,
     network_of,
-    voice_knowledge,
 )
 from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
@@ -182,15 +181,10 @@ def with_voice(
     """
 
     def knowledge_of(sound: Audio) -> float:
-        return voice_knowledge(speaker_similarity(phones, analysed(sound)).score)
+        return voice_knowledge(phones, analysed(sound))
 
     by_engine, parts = recognition is None and not given and not speech.units_known, speech.parts
-    if by_engine or not speech.features.values.any():
-        voice = 1.0
-    elif recognition is not None and recognition.similarity is not None:
-        voice = voice_knowledge(recognition.similarity)
-    else:
-        voice = knowledge_of(audio)
+    voice = 1.0 if by_engine or not speech.features.values.any() else knowledge_of(audio)
     if parts is not None:
         sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
         is_recognised = not given and not speech.units_known

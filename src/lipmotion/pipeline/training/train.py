@@ -40,6 +40,7 @@ from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, mean_speaker_vector
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
 from lipmotion.speech.recognition.phone_models import train_phone_models
@@ -221,6 +222,8 @@ def phones_and_examples(
     """
     learning, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
     phones = _train_phone_models(utterances, lexicon, recogniser, learning, checkpoint, each)
+    judged = utterances[:: -(-len(utterances) // JUDGED_RECORDINGS)]
+    phones = replace(phones, speaker=mean_speaker_vector(analysed(utterance.audio) for utterance in judged))
     examples: list[Example] = []
     skipped: dict[str, str] = {}
     labelled: list[tuple[Utterance, Timeline[Unit]]] = []

@@ -164,9 +164,24 @@ class Encoder(NamedTuple):
 @cache
 def shipped_encoder() -> Encoder:
     """Return the network of the package."""
+    return encoder_of(_shipped_arrays())
+
+
+@cache
+def speaker_background() -> tuple[Array, Array]:
+    """Return mean and deviation of the features of many voices [shape=(128,)], and what whitens them.
+
+    The whitening is a matrix, of the covariance of recordings of one speaker in many conditions [shape=(128, 128)].
+    """
+    arrays = _shipped_arrays()
+    return arrays["speaker_centre"], arrays["speaker_whitening"].astype(np.float32)
+
+
+@cache
+def _shipped_arrays() -> dict[str, NDArray[Any]]:
     path = resources.files("lipmotion") / "models" / WEIGHTS
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        return encoder_of(dict(stored))
+        return dict(stored)
 
 
 def encoder_of(arrays: Mapping[str, NDArray[Any]]) -> Encoder:

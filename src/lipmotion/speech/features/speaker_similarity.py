@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
+from lipmotion.speech.features.encoding import COMPONENTS, speaker_background
 from lipmotion.stats.mixture import QuadraticForm
 
 WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)
 """The lengths of adults' vocal tracts differ by about so much."""
 JUDGED_FRAMES = 2000
 """20 seconds are enough to judge a speaker by."""
+STRANGER_SCORE, OWN_SCORE = -9.0, -3.0
+"""Of a voice with the first speaker similarity score a model knows nothing, one with the second is that of its training.
+The score of another speaker in the same studio is -4 to -6 for GRID's models, of other voices in other rooms -7 to -15,
+and of the training's own in noise no more."""
+STRANGER_LIKENESS, OWN_LIKENESS = 0.2, 0.75
+"""The same of the likeness of speaker vectors, which noise and rooms change little (docs/results/voices.md)."""
+SURE_SCORE = 0.5
+"""A voice that is known so well by its score is judged by it alone."""
+QUIET_SHARE = 0.4
+"""So many of the frames, the most quiet, are not used for a speaker vector: pauses sound like the room alone."""
+JUDGED_RECORDINGS = 100
+"""Recordings of a training whose speaker vectors are enough."""
 
 
 class SpeakerSimilarity(NamedTuple):
@@ -32,22 +47,69 @@ class SpeakerSimilarity(NamedTuple):
 def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
     """Return the speaker similarity of a recording to the training data of some models, at the best of ``WARPS``.
 
-    A recording is judged by what is recorded of its longest passage, of which ``JUDGED_FRAMES`` are enough: silence
-    that was added to it would be like that of every voice.
+    A recording is judged by its longest passage.
     Source: Lee & Rose 1996 (vocal tract length normalisation); the best density of each frame stands for the
     state path, so that the warp is chosen before anything is recognised.
     """
-    stretch = max((passage.audio for passage in audio.passages), key=lambda part: part.frames, default=audio)
+    stretch = _longest_passage(audio)
 
     def judge() -> SpeakerSimilarity:
-        recorded = stretch.recorded
-        part = stretch.stretch(recorded.start, min(recorded.stop, recorded.start + JUDGED_FRAMES))
+        part = _judged_part(stretch)
         form, warped = _densities(hmm), zip(WARPS, part.mfcc_of_warps(WARPS), strict=True)
         fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
         warp = best_warp(fits)
         return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
 
     return stretch.cached(("similarity to", hmm), judge)
+
+
+def voice_knowledge(hmm: UnitHmm, audio: AnalysedAudio) -> float:
+    """Return how well a model knows the voice of a recording, 0 (as little as any) to 1 (its own).
+
+    By the speaker similarity; where that is low, by the likeness of speaker vectors, if it says more: noise makes
+    every voice dissimilar, and vectors in quiet do not tell the voices of one studio apart.
+    """
+    known = (STRANGER_SCORE, OWN_SCORE), (0.0, 1.0)
+    by_score = float(np.interp(speaker_similarity(hmm, audio).score, *known))
+    if hmm.speaker is None or by_score >= SURE_SCORE:
+        return by_score
+    stretch = _longest_passage(audio)
+    vector, own = stretch.cached("speaker vector", lambda: speaker_vector(stretch)), hmm.speaker.astype(float)
+    likeness = float(vector @ own) / float(own @ own)
+    by_likeness = float(np.interp(likeness, (STRANGER_LIKENESS, OWN_LIKENESS), (0, 1)))
+    return by_score + (1 - by_score / SURE_SCORE) * max(by_likeness - by_score, 0.0)
+
+
+def speaker_vector(audio: AnalysedAudio) -> NDArray[np.float64]:
+    """Return a vector of the speaker and the room, in units of what differs within them [shape=(2 · 64,)].
+
+    It is the mean and the deviation of the encoding over the louder frames of the longest passage, from those of many
+    voices (``speaker_background``). In digital silence it is 0.
+    Source: Fisher 1936 (linear discriminant analysis): differences from the mean voice, whitened by the covariance of
+    recordings of one speaker in quiet, in noise and in rooms.
+    """
+    part = _judged_part(_longest_passage(audio))
+    centre, whitening = speaker_background()
+    if not part.samples.any():
+        return np.zeros(2 * COMPONENTS)
+    rows = part.encoding[part.log_energy >= np.quantile(part.log_energy, QUIET_SHARE)].astype(float)
+    vector: NDArray[np.float64] = (np.concatenate([rows.mean(axis=0), rows.std(axis=0)]) - centre) @ whitening
+    return vector
+
+
+def mean_speaker_vector(recordings: Iterable[AnalysedAudio]) -> NDArray[np.float32]:
+    """Return the mean speaker vector of recordings, for ``UnitHmm.speaker`` [shape=(2 · 64,)]."""
+    return np.mean([speaker_vector(audio) for audio in recordings], axis=0).astype(np.float32)
+
+
+def _longest_passage(audio: AnalysedAudio) -> AnalysedAudio:
+    return max((passage.audio for passage in audio.passages), key=lambda part: part.frames, default=audio)
+
+
+def _judged_part(stretch: AnalysedAudio) -> AnalysedAudio:
+    """Return what is recorded of a passage, ``JUDGED_FRAMES`` at most: silence that was added is like every voice's."""
+    recorded = stretch.recorded
+    return stretch.stretch(recorded.start, min(recorded.stop, recorded.start + JUDGED_FRAMES))
 
 
 @lru_cache(maxsize=2)

@@ -35,7 +35,7 @@ def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
 
 def log_bands(samples: NDArray[np.float32], warp: float = 1.0) -> NDArray[np.float32]:
     """Return the natural log power in ``SPECTRUM_BANDS`` mel bands, not normalised [shape=(T, 40)]; as ``spectrum``."""
-    return log_mel(samples, _filters(warp))
+    return log_mel(samples, band_filters(warp))
 
 
 @cache
@@ -51,7 +51,7 @@ def _edges() -> NDArray[np.float64]:
 
 
 @cache
-def _filters(warp: float) -> NDArray[np.float32]:
+def band_filters(warp: float) -> NDArray[np.float32]:
     """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, 40)]."""
     bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
     return triangles(bins, _edges()).astype(np.float32)

@@ -359,11 +359,6 @@ def own_model_weight(score: float) -> float:
     return min(max((score - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
 
 
-def voice_knowledge(score: float) -> float:
-    """Return how well a model knows a voice, 0 (as little as any) to 1 (its own), at a speaker similarity score."""
-    return min(max((score - NO_WEIGHT_SCORE) / (OWN_VOICE_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
-
-
 def _first_frame(start_s: float) -> int:
     """Return the first frame of a phone that ``_timeline`` made."""
     return round(start_s * FRAME_RATE_HZ + 0.5) if start_s > 0 else 0

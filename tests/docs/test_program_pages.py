@@ -12,7 +12,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from meshes.speech import motion, units
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted((ROOT / "docs" / "recipes").glob("*.md"))
+PAGES = sorted((ROOT / "docs" / "for").glob("*.md"))
 TABLES = sorted((ROOT / "examples" / "rigs").glob("*.csv"))
 MAX_LINES = 60
 
@@ -27,7 +27,7 @@ def test_pages_are_short() -> None:
     assert [page for page in PAGES if len(page.read_text(encoding="utf-8").splitlines()) > MAX_LINES] == []
 
 
-def test_every_table_moves_its_rig_and_is_in_a_recipe() -> None:
+def test_every_table_moves_its_rig_and_is_on_a_page() -> None:
     text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     assert TABLES
     for table in TABLES:
