@@ -54,6 +54,13 @@ def test_a_recording_is_judged_by_its_longest_passage(toy_model: Model) -> None:
     assert speaker_similarity(toy_model.phones, analysed(Audio(short.astype(np.float32), 16_000))).score != alone.score
 
 
+def test_voices_are_known_by_their_similarity(toy_model: Model) -> None:
+    audio, phones = analysed(toy_sentences(3)[1].audio), replace(toy_model.phones, speaker=None)
+    score = speaker_similarity(phones, audio).score
+    shifted = [replace(phones, typical_fit=phones.typical_fit + score - other) for other in (-20, -9, -6, -3, 2)]
+    assert [voice_knowledge(hmm, audio) for hmm in shifted] == pytest.approx([0, 0, 0.5, 1, 1])
+
+
 def test_a_known_voice_in_noise_is_not_a_stranger(toy_model: Model) -> None:
     """Noise makes it dissimilar to its training; its speaker vector says more, and never less."""
     sounds = [analysed(sentence.audio) for sentence in toy_sentences(6)]

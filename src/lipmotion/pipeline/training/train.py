@@ -40,8 +40,8 @@ from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, mean_speaker_vector
 from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, mean_speaker_vector
 from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
 from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
