@@ -80,8 +80,8 @@ def test_motion_of_a_camera_alone_is_named(tmp_path: Path) -> None:
 
 
 def spelled(separator: str, quote: bool, decimal: str, above: str = "", end: str = "\n") -> str:
-    text, quoting = io.StringIO(), csv.QUOTE_ALL if quote else csv.QUOTE_MINIMAL
-    rows = csv.writer(text, delimiter=separator, quoting=quoting, lineterminator=end)
+    text = io.StringIO()
+    rows = csv.writer(text, delimiter=separator, quoting=csv.QUOTE_ALL if quote else 0, lineterminator=end)
     rows.writerow(["Timecode", "BlendshapeCount", "JawOpen", "MouthClose"])
     for number, jaw in enumerate(JAW):
         rows.writerow([code(number).replace(".", decimal), 2, str(jaw).replace(".", decimal), 0])
