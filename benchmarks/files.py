@@ -31,8 +31,7 @@ from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Generation
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import head_poses
-from lipmotion_faces.head.shape_fit import mouth_weights
-from lipmotion_faces.head.stage import figure, head_mesh
+from lipmotion_faces.head.stage import figure, head_mesh, mouth_weights
 from lipmotion_faces.outputs.scenes import character_scene, head_scene, write_scene
 from programs import gltf_report, gltf_validator, python_with, run_with
 

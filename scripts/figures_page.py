@@ -5,9 +5,10 @@ its stamp; ``stated``, what the text of that page says in figures beside the tab
 ``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
 ``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A page shows the model, and
 the command as long as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file;
-an engine and the digest of its default options; ``none``, where no model takes part; or words.
+an engine and the digest of its default options; ``none``, where no model takes part; or words. Of several models,
+``in row`` or ``in rows`` says which rows one made. A table without columns and stamp need not stand in a page.
 
-In a page a table stands between ``<!-- figures: SHEET.TABLE -->`` and ``<!-- end -->``. Run
+In a page a table stands between ``<!--figures:SHEET.TABLE-->`` and ``<!--end-->``. Run
 ``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.
 """
 
@@ -24,7 +25,7 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 SHEETS, OVERVIEW, SHIPPED = DOCS / "results" / "figures", DOCS / "results" / "figures.md", "grid-s1.lipmotion"
-REGION = re.compile(r"(<!-- figures: ([\w-]+)\.([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+REGION = re.compile(r"(<!--figures:([\w-]+)\.([\w-]+)-->\n).*?(<!--end-->)", re.DOTALL)
 UNITS = "%|ms|MB|GB|kB|dB|s|frames a second|times as fast"
 FIGURE = re.compile(rf"(?<![\w.,])\d[\d,]*(?:\.\d+(?![\w]|\.\d)|(?= (?:{UNITS})(?!\w)))")
 EXACT = re.compile(r"(?<![\w.,])0\.\d{3}(?!\d)")
@@ -41,7 +42,7 @@ def sheets() -> dict[str, Sheet]:
 def current_models() -> frozenset[str]:
     """Return the stamps of what makes figures now: the shipped model, every engine with its defaults, no model."""
     from lipmotion.engines import ENGINES
-    from lipmotion_lab.stamp import engine_digest
+    from lipmotion_lab.runner import engine_digest
 
     (model,) = (ROOT / "src" / "lipmotion").rglob(SHIPPED)
     shipped = f"shipped {hashlib.sha256(model.read_bytes()).hexdigest()[:8]}"
@@ -50,7 +51,7 @@ def current_models() -> frozenset[str]:
 
 def made_by(model: str, current: frozenset[str]) -> str:
     """Return what a page says of the models of a stamp; of one that is not the current one it says so."""
-    earlier = [part for part in model.split(", ") if part not in current]
+    earlier = [part for part in model.split(", ") if part.split(" in row")[0] not in current]
     if model == "none":
         return ""
     return f"Earlier model ({', '.join(earlier)})" if earlier else model
@@ -76,7 +77,8 @@ def rendered(table: Sheet, current: frozenset[str]) -> str:
         return f"{line}\n" if (line := stamp(table, current)) else ""
     cells = [table["columns"], *table["rows"]]
     head, *rows = (re.sub(r"\| +(?=\|)", "| ", f"| {' | '.join(row)} |") for row in cells)
-    return "\n".join([head, "|" + "---|" * len(table["columns"]), *rows, "", stamp(table, current), ""])
+    below = filter(None, [stamp(table, current)])
+    return "\n".join([head, "|" + "---|" * len(table["columns"]), *rows, "", *below, ""])
 
 
 def written(text: str, found: Mapping[str, Sheet], current: frozenset[str]) -> str:

@@ -1,6 +1,6 @@
-"""Writes the tables of the reference that follow from the code: verbs, formats, limits, bad input.
+"""Writes the lists of the reference that follow from the code: verbs, formats, limits, bad input.
 
-In a page such a table stands between ``<!-- made: NAME -->`` and ``<!-- end made -->``. Run
+In a page such a list stands between ``<!--made:NAME-->`` and ``<!--end-->``. Run
 ``python scripts/reference_pages.py`` after a change of the command line or of a registry.
 ``--check`` writes nothing, and fails where something would change.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-REGION = re.compile(r"(<!-- made: ([\w-]+) -->\n).*?(<!-- end made -->)", re.DOTALL)
+REGION = re.compile(r"(<!--made:([\w-]+)-->\n).*?(<!--end-->)", re.DOTALL)
 SEE = {
     "animate": "faces controls formats transcripts meshes filmed-face",
     "batch": "batch",
@@ -43,13 +43,6 @@ SEE = {
     "completion": "verbs",
 }
 """The pages on each verb, without suffix."""
-
-
-def table(head: list[str], rows: Iterator[list[str]]) -> str:
-    """Return a table in Markdown; bars in cells are escaped."""
-    cells = ([cell.replace("|", "\\|") for cell in row] for row in rows)
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head), *(f"| {' | '.join(row)} |" for row in cells)]
-    return re.sub(r"\| +(?=\|)", "| ", "\n".join(lines))
 
 
 def verbs(parser: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, str, argparse.ArgumentParser]]:
@@ -87,14 +80,14 @@ def actions(part: argparse.ArgumentParser) -> list[argparse.Action]:
     return [action for action in part._actions if action.dest != "help" and action.help != argparse.SUPPRESS]
 
 
-def verb_table() -> str:
-    """Return the table of all verbs: what they must be given, what they do, and, once a verb, the pages on it."""
-    rows, pages = [], dict(SEE)
+def verb_list() -> str:
+    """Return the list of all verbs: what they must be given, what they do, and, once a verb, the pages on it."""
+    lines, pages = [], dict(SEE)
     for name, says, part in verbs(whole_parser()):
         needed = [shown(a) for a in actions(part) if not a.option_strings or a.required]
         see = ", ".join(f"[{page}]({page}.md)" for page in pages.pop(name.split()[0], "").split())
-        rows.append([f"`{' '.join([name, *needed])}`", says, see])
-    return table(["verb", "what it does", "more"], iter(rows))
+        lines.append(f"- `{' '.join([name, *needed])}`: {says}" + (f" ({see})" if see else ""))
+    return "\n".join(lines)
 
 
 def exit_codes() -> str:
@@ -109,24 +102,24 @@ def line_on(name: str, module: str) -> str:
 
 
 def motion_formats() -> str:
-    """Return the table of motion files that are built in."""
+    """Return the list of motion files that are built in, and which are only written."""
     from lipmotion.formats.base import MOTION_FORMATS
 
-    rows = []
+    lines, only_written = [], []
     for name in MOTION_FORMATS.built_in:
         chosen = MOTION_FORMATS.load(name)
         says = line_on(name, chosen.write.__module__)
         says += f"; {chosen.rate_hz:g} frames a second" if chosen.rate_hz else ""
-        rows.append([f"`.{name}`", says, "yes" if chosen.read else "no"])
-    return table(["file", "what it holds", "read back"], iter(rows))
+        lines.append(f"- `.{name}`: {says}")
+        only_written += [] if chosen.read else [f"`.{name}`"]
+    return "\n".join([*lines, "", f"Not read back: {', '.join(only_written)}."])
 
 
 def cue_formats() -> str:
-    """Return the table of cue files."""
+    """Return the list of cue files."""
     from lipmotion.formats.cues import CUE_FORMATS
 
-    rows = ([f"`.{name}`", line_on(name, form.text.__module__)] for name, form in CUE_FORMATS.items())
-    return table(["file", "what it holds"], rows)
+    return "\n".join(f"- `.{name}`: {line_on(name, form.text.__module__)}" for name, form in CUE_FORMATS.items())
 
 
 def character_limits() -> str:
@@ -144,7 +137,7 @@ def bad_input() -> str:
 
 
 TABLES: dict[str, Callable[[], str]] = {
-    "verbs": verb_table,
+    "verbs": verb_list,
     "exit-codes": exit_codes,
     "motion-formats": motion_formats,
     "cue-formats": cue_formats,

@@ -90,10 +90,7 @@ class DrawsSingly(Protocol):
     """A face that can draw single pictures; a face has this ability if it has the method."""
 
     def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[Any]:
-        """Return the pictures of ``Face.render``, each of which can be drawn alone. Raises as ``render``.
-
-        A face that is asked again, for other motion, does not paint again what does not move.
-        """
+        """Return the pictures of ``Face.render``, each of which can be drawn alone. Raises as ``render``."""
 
 
 @runtime_checkable
@@ -101,10 +98,7 @@ class Stageable(Protocol):
     """A face that can be staged; a face has this ability if it has the method."""
 
     def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> Face:
-        """Return the same face with other settings.
-
-        prosody : of the speech that will be rendered, for movements of brows and head; None: not known
-        """
+        """Return the same face with other settings, and the speech's prosody (None: not known) for brows and head."""
 
 
 @runtime_checkable

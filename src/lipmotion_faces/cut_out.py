@@ -34,10 +34,7 @@ _NAME = re.compile(r"(?:^|[^A-Za-z])([A-Za-z]{1,4})$")
 
 @dataclass(frozen=True, eq=False)
 class CutOut:
-    """The pictures of a character.
-
-    pictures : RGBA with straight alpha, by the letter of the mouth shape [each shape=(H, W, 4)], all of one size
-    """
+    """The pictures of a character by mouth shape: RGBA with straight alpha, of one size [each shape=(H, W, 4)]."""
 
     pictures: Mapping[str, Picture]
 
@@ -47,10 +44,7 @@ class CutOut:
         return "".join(self.pictures)
 
     def frames(self, shapes: Iterable[str], staging: Staging) -> Iterator[Picture]:
-        """Yield a picture for each shape: RGB, or RGBA on a transparent background, of even sizes.
-
-        staging : size (0: that of the drawings) and background (``scene``: white) count
-        """
+        """Yield a picture for each shape, RGB or RGBA, of even sizes, with size and background of the staging."""
         staged = {name: _stage(picture, staging) for name, picture in self.pictures.items()}
         for shape in shapes:
             yield staged[shape]
@@ -63,10 +57,7 @@ def picture_files(folder: Path) -> list[Path]:
 
 
 def read_cut_out(folder: Path) -> CutOut:
-    """Return the character of a folder of pictures.
-
-    Raises InputError: a shape from A to F is missing or drawn twice, a picture cannot be read, or their sizes differ.
-    """
+    """Return the character of a folder of pictures. Raises InputError: a shape is missing or twice, or sizes differ."""
     files = picture_files(folder)
     named = {path: match[1].lower() for path in files if (match := _NAME.search(path.stem))}
     readings = (_shapes(named, names) for names in (LETTERS, BLAIR))

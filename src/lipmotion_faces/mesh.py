@@ -10,13 +10,14 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.mouth import frame_times
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
-from lipmotion.meshes.model.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
+from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
@@ -55,7 +56,6 @@ NECK_SHARE = 0.4
 STILL: Turn = (0.0, 0.0, 0.0)
 WIDTH, HEIGHT = 1280, 720
 FRAMES_AHEAD = 2
-"""Pictures that are drawn before they are asked for."""
 
 
 class MeshPose(NamedTuple):
@@ -73,7 +73,6 @@ class MeshFace(Face):
     character     : from ``load_character``
     width, height : of the pictures in pixels, even; a size of the staging counts instead, 16 to 9
     staging       : background, seed, and what moves on its own; None: the defaults
-    prosody       : of the speech that will be rendered, for accents of brows and head; None: not known
     """
 
     def __init__(
@@ -93,9 +92,8 @@ class MeshFace(Face):
         return self._character
 
     def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
-        """Return the same character with other settings.
-
-        prosody : of the speech that will be rendered, for accents of brows and head; None: not known
+        """Return the same character with other settings, and the prosody (None: not known) for accents of brows and
+        head.
         """
         return MeshFace(self._character, *self._size, staging, prosody)
 
@@ -136,10 +134,8 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
 
 
 class MeshStage:
-    """A mesh before the camera, in light; may be used by several threads at once.
-
-    width, height : of the pictures in pixels, even
-    colour        : red, green and blue of the background, 0 to 255; None: a soft gradient
+    """A mesh before the camera, in light, for several threads; ``colour`` of the background, 0 to 255 (None: a
+    gradient).
     """
 
     def __init__(
@@ -239,8 +235,7 @@ class MeshStage:
             return np.clip(share, 0, 1), pivot if usual and not np.ptp(share) < 1e-9 else PIVOT
         if self._rest[face, 1].min() > 2 * NECK_TOP:  # a head without a neck
             return np.ones(len(self._rest)), PIVOT
-        along = np.clip((self._rest[:, 1] - NECK_BOTTOM) / (NECK_TOP - NECK_BOTTOM), 0, 1)
-        return along * along * (3 - 2 * along), PIVOT
+        return smooth_step((self._rest[:, 1] - NECK_BOTTOM) / (NECK_TOP - NECK_BOTTOM)), PIVOT
 
     def _eye(self, bone: Bone) -> tuple[Rows, Array, Array]:
         """Return the vertices of an eye, how far each follows it [shape=(N, 1)], and its middle [shape=(3,)]."""

@@ -44,10 +44,8 @@ def is_drawings(face: str | Path, folder: Path = Path()) -> bool:
 
 
 def stage_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
-    """Return a face, or the one of a name, with settings.
-
-    prosody : of the speech that will be rendered; None: not known
-    Raises InputError: as ``make_face``, or the face cannot be staged and settings differ from the defaults.
+    """Return a face, or the one of a name, with settings and prosody. Raises InputError: as ``make_face``, or it has
+    none.
     """
     if isinstance(face, str):
         face = make_face(face)

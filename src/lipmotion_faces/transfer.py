@@ -95,10 +95,7 @@ def measure_pair(
 
     person   : of the model; None: the mean person
     name     : of the recording
-    request  : the recording
     measured : tracked motion, or the model that generates it
-    where    : name of the person, for messages
-    speaker  : of the model in ``measured``
     Raises InputError: the person's motion has other channels.
     """
     try:
@@ -149,7 +146,14 @@ def _list_takes(
         for number, take in enumerate(opened.takes):
             yield f"take {number + 1}", Request(take.sound), Track(take.motion, take.seen)
     elif isinstance(opened, Corpus):
-        names = _choose_names(opened, where, speaker)
+        known = [name for name in opened.speakers if name]
+        if (speaker and speaker not in known) or (not speaker and len(opened.speakers) > 1):
+            problem = f"no speaker {speaker!r}" if speaker else f"{len(opened.speakers)} speakers"
+            raise InputError(f"{where}: {problem}, required one of: {', '.join(known)}; name it (--onto-speaker)")
+        speakers = [speaker] if speaker else []
+        names = opened.names("train", speakers) or opened.names(None, speakers)
+        if not names:
+            raise InputError(f"{where}: the corpus is empty; prepare recordings of the person")
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
         for index in choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
             utterance = opened.utterance(names[index])
@@ -161,16 +165,3 @@ def _list_takes(
         audio = read_audio(opened)
         first = Audio(audio.samples[: round(MOST_FOOTAGE_S * audio.rate_hz)], audio.rate_hz)
         yield where, Request(first), track(opened, crops=False, span=VideoSpan(0.0, MOST_FOOTAGE_S))
-
-
-def _choose_names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
-    """Return the utterances of one person: those of the training list if there are any."""
-    known = [name for name in corpus.speakers if name]
-    if (speaker and speaker not in known) or (not speaker and len(corpus.speakers) > 1):
-        problem = f"no speaker {speaker!r}" if speaker else f"{len(corpus.speakers)} speakers"
-        raise InputError(f"{where}: {problem}, required one of: {', '.join(known)}; name it (--onto-speaker)")
-    speakers = [speaker] if speaker else []
-    names = corpus.names("train", speakers) or corpus.names(None, speakers)
-    if not names:
-        raise InputError(f"{where}: the corpus is empty; prepare recordings of the person")
-    return names

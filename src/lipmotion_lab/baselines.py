@@ -91,10 +91,7 @@ class Baseline(Animator[FrameRegressionModel]):
         valid: Sequence[NDArray[np.bool_]],
         monitor: Monitor,
     ) -> Any:
-        """Return a map from features [each shape=(T, 39)] to reduced motion [each shape=(T, Q)].
-
-        valid : frames whose motion was observed [each shape=(T,)]
-        """
+        """Return a map from features to reduced motion, from valid frames [each shape=(T, 39), (T, Q), (T,)]."""
 
     @abstractmethod
     def predict(self, learned: Any, features: Float32Array) -> Array:
@@ -182,10 +179,7 @@ class TrainedNetwork:
 @final
 @dataclass(frozen=True)
 class BlstmBaseline(Baseline):
-    """Two bidirectional layers of 192 long short-term memory cells and a linear layer; least squared error.
-
-    seed : of the initial weights, of the order of recordings, and of dropout
-    """
+    """Two bidirectional layers of 192 LSTM cells and a linear layer, for least squared error."""
 
     seed: int = 0
 

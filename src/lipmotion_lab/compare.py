@@ -31,7 +31,6 @@ HIGHEST_RATE_HZ = 120.0
 LEAST_FRAMES = 4
 """Without them there is no third difference."""
 UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "eyeBlink", "eyeSquint", "eyeWide")))
-"""Curves of the upper face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +46,6 @@ def compare(reference: Source, *others: Source, monitor: Monitor = silent_monito
     """Return how far other motion is from that of a reference, by name (docs/compare.md).
 
     reference, others : motion files, videos that show a face (they are tracked), or motion
-    monitor           : called with reports of progress
     Motion is compared at the slower of its two rates, where both last; ``notes`` say what was done for it. Figures that
     do not exist are None.
     Raises InputError: a file that cannot be read, values that are not finite, no common channel, too few frames.
@@ -170,7 +168,6 @@ def _common_times(reference: _Side, other: _Side, rate_hz: float) -> tuple[Array
 
 
 def _values(motion: Motion, names: Sequence[str]) -> Array:
-    """Return the values of some channels [shape=(T, len(names))]."""
     return np.asarray(motion.values[:, [motion.column(name) for name in names]], np.float64)
 
 
@@ -204,10 +201,7 @@ def _channel_figures(
 
 
 def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
-    """Return the figures of points in millimetres; None for lips and upper face where no point is theirs.
-
-    Points of the upper face are above the eyes; their place at rest is the median in the original.
-    """
+    """Return the figures of points in mm (None: no points); at rest, points above the eyes are at their median."""
 
     def places(side: Motion, wanted: Sequence[str]) -> Array:
         coordinates = _values(side, [axis for point in wanted for axis in points[point]])

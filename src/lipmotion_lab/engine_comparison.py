@@ -21,8 +21,7 @@ from lipmotion.storage.files import make_folder, unfinished_work
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
-from lipmotion_lab.comparison import correlation_statistic, opening_curves, significance_mark
-from lipmotion_lab.evaluation.evaluate import figures_of
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
 from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,
@@ -42,10 +41,7 @@ CHECKED = ("corpus", "split", "minutes")
 
 @dataclass(frozen=True, eq=False)
 class EngineModel:
-    """A model of one engine.
-
-    seconds : of its training in this run; None: it was there already
-    """
+    """A model of one engine, and the seconds of its training in this run (None: it was there already)."""
 
     model: Model
     seconds: float | None
@@ -57,7 +53,6 @@ def engine_models(
     """Return models of the corpus's training list, each engine by its defaults.
 
     folder : holds the models; what is not there yet is trained and put there. None: all are trained and not kept
-    names  : of the engines
     A run that was stopped goes on where it was.
     Raises CorpusError: no training list. Raises InputError: a file in the folder is a model of something else.
     Raises ModelFormatError: a file in the folder is no model.
@@ -176,7 +171,6 @@ def engines(
 ) -> dict[str, Any]:
     """Return the figures of all engines on ``split``.
 
-    split  : the recordings to compare; none of them may be in the training list
     models : folder of the engines' models (``models.engine_models``); None: they are trained and not kept
     The phones in time are those of the trajectory engine's phone models, for all of them.
     Raises CorpusError: no training list, no utterances of this split or some of the training list among them, or
@@ -239,10 +233,7 @@ def _row(
     systems: Mapping[str, Sequence[ComparedClip]],
     seed: int,
 ) -> dict[str, Any]:
-    """Return the figures of one system; ``unpinned``: those of the opening without forced closures.
-
-    ``acc_gain_95`` has the paired 95 % interval of its ACC minus that of each of the systems.
-    """
+    """Return the figures of one system, with ACC gains over each system; ``unpinned``: without forced closures."""
     acc = correlation_statistic(*opening_curves(recordings, pinned))
     gains = {
         name: acc.gain(correlation_statistic(*opening_curves(recordings, clips)), seed)

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.engines.joint.config import JointEngineConfig
-from lipmotion.engines.joint.engine import JointEngine, JointModel
+from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream.streams import SPEECH
@@ -25,14 +24,14 @@ from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS, Lexicon
-from lipmotion_lab.comparison import (
+from lipmotion_lab.evaluation.evaluate import (
     closing_score_statistic,
     correlation_statistic,
+    figures_of,
     opening_curves,
     sign_of_difference,
     significance_mark,
 )
-from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
@@ -43,33 +42,20 @@ from lipmotion_lab.evaluation.held_out import (
     load_held_out,
     make_speech,
 )
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    ExperimentSettings,
-    PartKey,
-    check_opening,
-    open_parts,
-    opening_row,
-)
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, PartKey, check_opening, open_parts, opening_row
 
 PAPER_SCORES: dict[str, float] = {"eVis": 68.8, "pbVis": 67.7, "sVis": 67.4, "2vis": 66.5, "phone": 65.2}
 """Closure scores of Table 1, the best first."""
 REFERENCE_SET = "phone"
-"""The unit set that every other one is compared with."""
 PRESET = "hofer2008"
 PINS = {"as printed": False, "lips made to meet on p b m": True}
 """Whether motion is generated with pins in p, b and m, by the name of the block of the table."""
 _ACC, _COUNTS = "table1/acc", "table1/gaussians"
-"""Names of the arrays of a kept model that say how its number of Gaussians was chosen."""
 
 
 @dataclass(frozen=True)
 class Table1Options:
-    """What is trained.
-
-    states   : numbers of states a unit
-    mixtures : numbers of Gaussians a state for speech, powers of two; of these one is chosen on ``val`` for each model
-    """
+    """What is trained: numbers of states a unit, and of Gaussians for speech, of which one is chosen on ``val``."""
 
     states: Sequence[int] = (3, 5)
     mixtures: Sequence[int] = (1, 2, 4, 8)
@@ -80,11 +66,7 @@ FULL, QUICK = Table1Options(), Table1Options(mixtures=(1, 2))
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """A trained system of one unit set.
-
-    gaussians : a state for speech, as chosen on ``val``
-    acc       : correlation of the opening on ``val``, by number of Gaussians
-    """
+    """A trained system of one unit set, its Gaussians a state, and the ACC of all that were tried on ``val``."""
 
     engine: JointEngine
     model: JointModel
@@ -113,8 +95,6 @@ def hofer2008(
 ) -> dict[str, Any]:
     """Train the system of the paper on ``train`` with each unit set; return figures of each model on ``split``.
 
-    work     : a folder for finished models, from which the same call continues after it was stopped; None: none
-    settings : its workers share the forced alignment that training starts from
     Every system recognises its own units (``audio only``), or aligns those of given words itself (``with transcript``),
     each with and without pins in p, b and m. Intervals are 95 % bootstrap intervals over clips; those of differences
     are of the same draws of clips.
@@ -189,11 +169,7 @@ def _train_system(
     checkpoint: Checkpoint,
     monitor: Monitor,
 ) -> _System:
-    """Return a system with the number of Gaussians whose motion correlates best with that of some recordings.
-
-    Among equals, the smallest is chosen. A system is the same, whether it was trained now or found.
-    Raises InputError: training ends before any of the numbers of Gaussians.
-    """
+    """Return a system with the number of Gaussians of the highest ACC. Raises InputError: training ends before any."""
     stage = f"{engine.config.units}-{engine.config.states}-{'.'.join(map(str, counts))}"
     arrays = checkpoint.load(stage)
     if arrays is None:

@@ -36,7 +36,6 @@ SIZES = (20, 50, 100, 200)
 OTHERS = ("width", "outer")
 """Channels that are compared beside the opening."""
 _ROW = "row"
-"""Name of the array of a kept size: the threshold of a closed mouth, and its row."""
 
 
 @one_thread()
@@ -51,10 +50,7 @@ def learning_curve(
 ) -> dict[str, Any]:
     """Train on the first N utterances of a list, for every N of ``sizes``; return figures of each model on ``split``.
 
-    order    : names of utterances; by default the training list, shuffled with the seed
     sizes    : by default 20, 50, 100, 200, as far as the list goes, and the whole list
-    work     : a folder for the figures of finished sizes, from which the same call goes on after a stop; None: none
-    settings : its seed is also that of the shuffled list
     Phone models and engine are both trained on those N utterances alone; the phone models also align and recognise
     the utterances of the split.
     Raises InputError: sizes under 1 or over the list, or an empty list.
@@ -88,10 +84,8 @@ def learning_curve(
 
 
 def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
-    """Return the sizes, each once, in rising order; the default ones where none are given.
-
-    listed : number of names in the list
-    Raises InputError: sizes under 1 or over the list, or an empty list.
+    """Return the sizes, or the usual ones, rising. Raises InputError: sizes under 1 or over ``listed``, or an empty
+    list.
     """
     if not listed:
         raise InputError("the list of utterances to train on is empty; give one name a line")

@@ -31,9 +31,8 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
-from lipmotion_lab.comparison import correlation_statistic, opening_curves, significance_mark
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
-from lipmotion_lab.evaluation.evaluate import figures_of
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     DISTANCES,
@@ -98,7 +97,6 @@ def join_figures(
 ) -> dict[str, Any]:
     """Return how many joins some speech takes, and how much the velocity of the opening changes there.
 
-    utterances : the recordings of the speech, whose own changes are the measure
     ``hard`` is the share of joins in which units abut; ``smooth`` that of joins where the velocity changes by no more
     than the 95th percentile of the recordings.
     """
@@ -158,7 +156,6 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
 }
 """Other readings of the print, and what it leaves open."""
 _ROW, _SUMS = "row", "correlation"
-"""Names of the arrays of a kept row: its figures, and the sums over clips of its correlation."""
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
@@ -188,7 +185,6 @@ def minnis2000(
 
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
-    quick  : train for few epochs; the model is not kept
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:

@@ -1,10 +1,18 @@
-"""Training one system on some recordings and generating the motion of held-out ones: shared by all experiments."""
+"""What experiments share: training on some recordings, motion of held-out ones, finished parts, and the stamp."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
+import platform
+import shlex
+import shutil
+import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timezone
+from importlib import metadata
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
@@ -14,11 +22,12 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.engines import Engine
+from lipmotion.engines import ENGINES, Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.kernels.threads import blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
-from lipmotion.pipeline.training.fingerprint import fingerprint_training
+from lipmotion.pipeline.training.fingerprint import digest_corpus, fingerprint_training
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -47,11 +56,9 @@ _CURVES, _ABOUT = ("original", "generated", "time_s"), "about"
 class ExperimentSettings:
     """Settings that all experiments have in common.
 
-    recogniser : configuration of the phone models
     lexicon    : pronunciations; None: those of the dictionary
     seed       : of the shuffled training list, and of the bootstrap intervals
     workers    : number of processes, as in ``train``
-    monitor    : receives the progress
     receive    : receives the motion that every system generates, once, before its figures are kept
     """
 
@@ -68,13 +75,7 @@ DEFAULT_SETTINGS = ExperimentSettings()
 
 @dataclass(frozen=True, eq=False)
 class HeldOutResult:
-    """Motion that one trained system generates for held-out recordings.
-
-    recordings : the held-out recordings
-    clips      : generated and original curves of each recording, by condition
-    used       : names of the utterances that the system was trained on
-    seconds    : time of training, phone models and motion
-    """
+    """Motion generated for held-out recordings, by condition; utterances used, and seconds, of the training."""
 
     recordings: HeldOutRecordings
     clips: Mapping[str, Sequence[ComparedClip]]
@@ -92,7 +93,6 @@ def train_and_generate(
 ) -> HeldOutResult:
     """Train the default engine on the utterances ``names``; return the ``channels`` it generates for ``held_out``.
 
-    work : a folder from which training that was stopped goes on; None: none
     The names are sorted, so their order does not matter: all names of a list give the model of ``lipmotion train``.
     Raises as ``train`` and ``evaluate``.
     """
@@ -124,10 +124,7 @@ def train_and_generate(
 
 
 def check_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the channels to compare in some utterances: called before the long work.
-
-    Raises CorpusError: the opening is not among them, or the utterances have different channels.
-    """
+    """Return the channels to compare, before long work. Raises CorpusError: no opening, or different channels."""
     channels, _ = choose_channels([corpus.utterance(name) for name in names])
     if OPENING not in channels:
         raise CorpusError(f"{corpus.path}: systems are compared by the channel {OPENING!r}, which is not in it")
@@ -146,14 +143,7 @@ def take_quick_part(corpus: Corpus, seed: int) -> Corpus:
 
 @dataclass(frozen=True)
 class PartKey:
-    """What the finished parts of an experiment depend on, beside corpus and settings.
-
-    engine : with its configuration
-    names  : of the utterances
-    visual : kind of the channels
-    model  : on which the parts stand, or None
-    others : everything else, as text
-    """
+    """What the finished parts of an experiment depend on, beside corpus and settings."""
 
     engine: Engine[Any]
     names: Sequence[str]
@@ -163,10 +153,7 @@ class PartKey:
 
 
 def open_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSettings, key: PartKey) -> Checkpoint:
-    """Return the finished parts of an experiment, from which a call goes on after a stop.
-
-    folder : made if need be, in one that exists; None: nothing is kept
-    """
+    """Return the finished parts of an experiment, from which a call goes on after a stop."""
     if folder is None:
         return NO_CHECKPOINT
     make_folder(folder)
@@ -213,3 +200,86 @@ def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:
         "nrmse": opening["nrmse"],
         "global_variance": opening["global_variance"],
     }
+
+
+PACKAGES = ("lipmotion", "numpy", "scipy", "numba", "av", "pocketsphinx", "hama", "matplotlib")
+"""Packages on which figures, or pictures, depend."""
+ROOT = Path(__file__).parents[3]
+"""The root of a checkout of the source, where the package is in one."""
+DIGITS = 8
+CPU_INFO = Path("/proc/cpuinfo")
+
+
+class Stamp:
+    """What the figures of an experiment are stamped with; its time begins when it is made."""
+
+    def __init__(self) -> None:
+        self._begun = datetime.now(timezone.utc)
+        self._start_s = perf_counter(), sum(os.times()[:4])
+
+    def content(self, command: Sequence[str], corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        """Return command, time, corpus, seed, options, commit, engines, machine and versions, by name.
+
+        command : its words; of absolute paths the last name is kept, for figures are given to others
+        The time is that of this call: a call that goes on after a stop does not count what was finished before.
+        """
+        seconds, used = perf_counter() - self._start_s[0], sum(os.times()[:4]) - self._start_s[1]
+        words = (word.rpartition("=") for word in command)
+        lists = {split: len(corpus.names(split)) for split in SPLITS}
+        lexicon = "the user's" if settings.lexicon else "none but the dictionary"
+        return {
+            "command": shlex.join(
+                f"{option}{equals}{Path(value).name if Path(value).is_absolute() else value}"
+                for option, equals, value in words
+            ),
+            "begun": self._begun.isoformat(timespec="seconds"),
+            "seconds": round(seconds, 1),
+            "processor seconds": round(used, 1),
+            "corpus": {"name": corpus.path.resolve().name, "SHA-256": digest_corpus(corpus), **lists},
+            "seed": settings.seed,
+            "options": {"workers": settings.workers, "lexicon": lexicon},
+            "commit": commit(ROOT),
+            "engines": {name: engine_digest(name) for name in ENGINES.built_in},
+            **_machine(),
+        }
+
+
+def engine_digest(name: str) -> str:
+    """Return the digits that name the default options of an engine."""
+    options = json.dumps(ENGINES.load(name).Config().as_mapping(), sort_keys=True)
+    return hashlib.sha256(options.encode()).hexdigest()[:DIGITS]
+
+
+def _machine() -> dict[str, Any]:
+    try:
+        lines = CPU_INFO.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    versions: dict[str, str | None] = {"Python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            versions[package] = None
+    machine = {
+        "cores": os.cpu_count(),
+        "processor": named[0] if named else platform.processor() or platform.machine(),
+        "system": platform.platform(),
+        "linear algebra": ", ".join(map(str, blas_kernels())),
+    }
+    return {"machine": machine, "versions": versions}
+
+
+def commit(root: Path) -> str | None:
+    """Return the commit of a checkout of the source, and whether its ``src`` was changed since; None: it is none."""
+    git = shutil.which("git")
+    if git is None or not (root / ".git").exists():
+        return None
+
+    def ask(*arguments: str) -> str | None:
+        done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, check=False)
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    head = ask("rev-parse", "HEAD")
+    return f"{head}, changed since" if head and ask("status", "--porcelain", "--", "src") else head

@@ -19,8 +19,7 @@ from starlette.routing import Route
 
 from lipmotion.formats.web_page import colour_code
 from lipmotion_studio.folder import RevisionError
-from lipmotion_studio.project_replies import ProjectReplies
-from lipmotion_studio.recording_replies import RecordingReplies
+from lipmotion_studio.page_replies import ProjectReplies, RecordingReplies
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, failed
@@ -61,10 +60,7 @@ def read_page(folder: Traversable, before: str = "") -> Iterator[tuple[str, tupl
 
 
 def studio_application(studio: Studio, access: Access) -> Starlette:
-    """Return the application.
-
-    access : the token, and the addresses that the server has
-    """
+    """Return the application; access: the token, and the addresses that the server has."""
     recordings, project = RecordingReplies(studio, access), ProjectReplies(studio)
     page = dict(read_page(files("lipmotion_studio") / "page"))
 

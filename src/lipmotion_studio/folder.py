@@ -71,7 +71,6 @@ class RevisionError(LipMotionError):
 class EditsSummary:
     """What a recording's file of edits holds, but for its phones.
 
-    count  : how many edits
     digest : of their commands
     state  : digest of all that changes with an edit, and with taking it back; empty: there is no file yet
     error  : why the file cannot be read, and how it is restored; empty: it can
@@ -93,10 +92,7 @@ def summary_of(file: EditFile) -> EditsSummary:
 
 
 def revision_of(recording: ProjectRecording, edits: EditsSummary) -> int:
-    """Return the revision of a recording: another number after every change that somebody can make of it.
-
-    It follows from the content, and is the same after a restart: a change names the revision that its author saw.
-    """
+    """Return the revision of a recording: another number after every change that somebody can make of it."""
     versions = [[version.number, *version.steps] for version in recording.versions]
     return _revision([recording.transcript, recording.mark, versions, edits.state])
 
@@ -114,8 +110,6 @@ def check_revision(what: str, now: int, seen: int) -> None:
 class ProjectFolder:
     """A project in its folder; may be used by several threads.
 
-    path     : the folder
-    project  : as it is now
     revision : how often it has changed since it was opened
     lock     : is held while something is checked and then changed; never while motion is made
     """
@@ -160,20 +154,14 @@ class ProjectFolder:
 
     @contextmanager
     def check_out(self, number: int, revision: int) -> Iterator[ProjectRecording]:
-        """Give a recording to be changed by somebody who saw this revision; nobody else changes it in the meantime.
-
-        Raises RevisionError: it has changed since. InputError: there is no such recording any more.
-        """
+        """Give a recording, seen at this revision, to be changed. Raises RevisionError: changed. InputError: gone."""
         with self.lock:
             recording = self.recording(number)
             check_revision("the recording", revision_of(recording, self.summary(recording)), revision)
             yield recording
 
     def summary(self, recording: ProjectRecording) -> EditsSummary:
-        """Return what a recording's file of edits holds; ``NO_EDITS`` where it is not analysed yet.
-
-        What this process writes is known; a file is read again where others have written it: else it is the same value.
-        """
+        """Return what a recording's file of edits holds; ``NO_EDITS`` where it is not analysed yet."""
         with self.lock:
             state, cached = self._file_state(recording), self._summaries.get(recording.number)
             if cached is None or cached[0] != state:
@@ -210,9 +198,8 @@ class ProjectFolder:
         return InputError(f"the edits of the recording are damaged, and are left as they are: {error}; {way_out}")
 
     def read_edits(self, recording: ProjectRecording) -> EditFile:
-        """Return a recording's file of edits.
-
-        Raises InputError: it is damaged, and where a copy is; or it is of another sound.
+        """Return a recording's file of edits. Raises InputError: it is damaged (and where a copy is), or of another
+        sound.
         """
         with self.lock:
             try:
@@ -278,9 +265,8 @@ class ProjectFolder:
             return False
 
     def restore_edits(self, recording: ProjectRecording) -> None:
-        """Put the last good copy in the place of a damaged file of edits, which stays beside it under another name.
-
-        Raises InputError: the file is not damaged, or there is no good copy. ExportError: it cannot be written.
+        """Replace a damaged file of edits by its copy, and keep it beside. Raises InputError: no damage or copy.
+        ExportError: no write.
         """
         with self.lock:
             if not self.is_restorable(recording):
@@ -289,9 +275,8 @@ class ProjectFolder:
             restore_copy(self.edits(recording), self._copy(recording))
 
     def change(self, changed: Callable[[Project], Project], *, save: bool = True) -> None:
-        """Replace the project by what a function makes of it; ``save``: write it at once.
-
-        Raises ExportError: it cannot be written; it is then as before.
+        """Replace the project by what a function makes of it; ``save``: at once. Raises ExportError: not written, and
+        as before.
         """
         with self.lock:
             before = self.project
@@ -321,10 +306,8 @@ class ProjectFolder:
                 temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
-        """Add a recording, or those of a folder or a list, which stay where they are; return their numbers.
-
-        Those that the project has already are left out.
-        Raises InputError: no recordings. ExportError: as ``change``; or names that no folder can hold.
+        """Add new recordings, also of folders or lists, where they are; return their numbers. Raises InputError.
+        ExportError.
         """
         with self.lock:
             listed = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
@@ -369,10 +352,7 @@ class ProjectFolder:
         return {_key(recording.name) for recording in self.project.lines.values()}
 
     def _choose_name(self, recording: ProjectRecording, taken: set[str]) -> ProjectRecording:
-        """Return a new recording with a name that is free, and take it; a number is added if needed.
-
-        A name under which edits of another sound lie, as of a recording that was removed, is not free.
-        """
+        """Return a new recording with a name that is free, and take it; a number is added if needed."""
 
         def is_free(named: ProjectRecording) -> bool:
             if _key(named.name) in taken:
@@ -431,11 +411,7 @@ class ProjectFolder:
         return _revision([word, self.lexicon().user.get(word, ())])
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...], revision: int) -> None:
-        """Write a pronunciation into the project's lexicon, ahead of earlier ones.
-
-        revision : of the word, as it was seen
-        Raises RevisionError: there is another one since. ExportError: it cannot be written.
-        """
+        """Write a pronunciation into the lexicon, ahead of earlier ones. Raises RevisionError, ExportError."""
         with self.lock:
             check_revision(f"the word {word}", self.word_revision(word), revision)
             known = self.lexicon().user
@@ -476,10 +452,7 @@ def _is_new(source: Path) -> bool:
 
 @contextmanager
 def open_folder(source: Path | None, out: Path | None = None) -> Iterator[ProjectFolder]:
-    """Open the project of ``project_path``, created if needed, with the recordings of the source.
-
-    Raises ExportError: another process works on it, or it cannot be written.  Raises InputError: it cannot be read.
-    """
+    """Open the project of ``project_path``, or create it. Raises ExportError: in use. InputError: unreadable."""
     path = project_path(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with lock_folder(path):
@@ -503,10 +476,7 @@ def copy_file(source: Path, target: Path) -> None:
 
 
 def write_with_copy(path: Path, copy: Path, write: Callable[[Path], object]) -> None:
-    """Write a file and its copy. Raises ExportError: one of them cannot be written.
-
-    What fails between the two leaves what was acknowledged, and never a copy alone: that would be a damage.
-    """
+    """Write a file and its copy. Raises ExportError: one of them cannot be written."""
     first, second = (copy, path) if path.exists() else (path, copy)
     write(first)
     copy_file(first, second)

@@ -29,11 +29,7 @@ TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
 
 
 class Faces:
-    """The faces of a project, by their names: those that are built in, its own characters and filmed faces.
-
-    characters : paths of characters and of filmed faces by their names
-    made       : returns those of filmed faces that were built here, which may become more
-    """
+    """The faces of a project by name: built in, its own characters, and filmed faces, also those made here."""
 
     def __init__(self, characters: Mapping[str, Path], made: Callable[[], Mapping[str, Path]] = dict) -> None:
         self._given, self._made = characters, made

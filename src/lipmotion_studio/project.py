@@ -1,7 +1,8 @@
-"""Projects as values: the recordings that are worked on, what was decided of them, and what was exported."""
+"""Projects as values: recordings, what was decided of them, what was exported, and the presets of exports."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
@@ -11,6 +12,7 @@ from typing import Any
 from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
+from lipmotion.pipeline.outputs.output import OutputSettings, output_suffixes
 from lipmotion.types.values import (
     SchemaError,
     any_members,
@@ -26,13 +28,13 @@ from lipmotion.types.values import (
     value_of,
     whole,
 )
+from lipmotion_faces.outputs.shown_faces import shown_face
 
 FORMAT, VERSION = "lipmotion.project", 1
 HEADER = ("format", "version", "made_by")
 NO_MARK, APPROVED, REDO = MARKS = ("none", "approved", "redo")
 MAX_RECORDINGS, MAX_TEXT = 100_000, 1 << 24
 MAX_VERSIONS = 100
-"""Versions that are kept of a recording."""
 EDITS_SUFFIX = "edits.json"
 """How files of edits end, after the name of the recording and a dot."""
 
@@ -42,10 +44,8 @@ class ExportRecord:
     """What was exported of a recording.
 
     preset  : the preset that was used; empty: files were chosen
-    files   : digest of each file (SHA-256), by its path from the folder of the project
     edits   : path of the file of edits that the files were made from: a copy, which gives the same files again
     steps   : digest of the edits as they were
-    model   : digest of the model
     version : of lipmotion
     """
 
@@ -59,11 +59,7 @@ class ExportRecord:
 
 @dataclass(frozen=True)
 class EditVersion:
-    """Edits of a recording as they once were, to compare with and to go back to.
-
-    number : of the version, unique in its recording, from 1
-    steps  : its edits, as sentences
-    """
+    """Edits of a recording as they once were, as commands; ``number`` is unique in the recording, from 1."""
 
     number: int
     steps: tuple[str, ...]
@@ -83,7 +79,6 @@ class EditVersion:
 class ProjectRecording:
     """A recording that is worked on.
 
-    number     : of the recording in the project; never used again
     name       : path of its files without suffix, with ``/`` between folders; unique
     sound      : path of its sound from the folder of the project, or absolute
     sha256     : digest of the sound; empty: of an earlier version's project, until the recording is opened
@@ -92,7 +87,6 @@ class ProjectRecording:
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
     mark       : one of ``MARKS``
     marked     : digest of the edits when it was marked; empty: not known
-    exports    : in their order
     versions   : that were kept, in their order
     """
 
@@ -142,8 +136,6 @@ class Project:
     model      : path of the model from the folder of the project; empty: the one that ships
     language, recogniser : of new recordings, as of ``Request``
     preset     : that was used last for an export
-    characters : paths of characters, by their names
-    recordings : path of a folder of recordings that a voice or a face can be made of; empty: none
     given_model : path of the model that was used before one that was trained here; empty: the one that ships
     next_number : of the next recording
     """
@@ -235,3 +227,63 @@ def digest_of(sentences: Iterable[str]) -> str:
     '2a0d1f5a'
     """
     return sha256("\n".join(sentences).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Files that a program reads.
+
+    title  : programs that read the files
+    curves : what motion files hold, as of ``Outputs.curves``
+    fps    : frames a second of motion files and videos; None: as usual
+    """
+
+    name: str
+    title: str
+    files: tuple[str, ...]
+    curves: str = ""
+    fps: float | None = None
+
+
+PRESETS = {
+    each.name: each
+    for each in (
+        Preset("arkit", "Unreal, MetaHuman: a take of Live Link Face", (".livelink.csv",)),
+        Preset("curves", "ARKit's curves as a table", (".csv",), "arkit", 60.0),
+        Preset("visemes", "Oculus, Ready Player Me: visemes as a table", (".csv",), "visemes", 60.0),
+        Preset("unity", "Unity", (".anim",)),
+        Preset("godot", "Godot", (".tres",)),
+        Preset("blender", "Blender: a script, and a take for the add-on", (".blender.py", ".livelink.csv")),
+        Preset("web", "three.js and 3D programs: a moving head", (".glb",)),
+        Preset("vrm", "VRM", (".vrma",)),
+        Preset("moho", "Moho, OpenToonz", (".cues.dat",)),
+        Preset("papagayo", "Papagayo", (".cues.pgo",)),
+        Preset("rhubarb", "Rhubarb: mouth shapes", (".cues.json", ".cues.tsv")),
+        Preset("spine", "Spine", (".cues.spine.json",)),
+        Preset("live2d", "Live2D", (".motion3.json",)),
+        Preset("video", "A video of the face", (".mp4",)),
+        Preset("labels", "Praat, ELAN, subtitles", (".TextGrid", ".vtt")),
+    )
+}
+_SUFFIX = re.compile(r"(?:\.[A-Za-z0-9]{1,10}){1,3}")
+
+
+def find_preset(name: str, files: tuple[str, ...]) -> Preset:
+    """Return a preset of a name, or, of an empty one, of suffixes. Raises InputError: there is none."""
+    if name:
+        if name not in PRESETS:
+            raise InputError(f"no preset {shorten(repr(name))}; required one of: {', '.join(PRESETS)}")
+        return PRESETS[name]
+    known = suffixes()
+    for suffix in files:
+        if suffix not in known or not _SUFFIX.fullmatch(suffix):
+            raise InputError(f"nothing is written as {shorten(repr(suffix))}; required some of: {' '.join(known)}")
+    if not files:
+        raise InputError("no preset and no files; required one of both")
+    return Preset("", "", tuple(dict.fromkeys(files)))
+
+
+def suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all files that can be exported."""
+    everything = output_suffixes(OutputSettings(shown_face("head")))
+    return tuple(suffix for suffix in everything if _SUFFIX.fullmatch(suffix))

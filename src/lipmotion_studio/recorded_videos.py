@@ -28,10 +28,7 @@ LOUDNESS_HZ = 100
 
 
 def find_real_video(recording: Path) -> Path | None:
-    """Return the path of the real video of a recording; None: there is none.
-
-    recording : a sound or a video
-    """
+    """Return the path of the real video of a recording, a sound or a video; None: there is none."""
     if recording.suffix.lower() in VIDEO_SUFFIXES:
         return recording if has_video(recording) else None
     siblings = (recording.with_suffix(suffix) for suffix in sorted(VIDEO_SUFFIXES))
@@ -39,10 +36,7 @@ def find_real_video(recording: Path) -> Path | None:
 
 
 def media_type(path: Path) -> str | None:
-    """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew.
-
-    What begins later than 0 is written anew, too, so that no browser has to say what its times are.
-    """
+    """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew."""
     kind, codecs = PLAYED.get(path.suffix.lower(), ("", ()))
     if not kind:
         return None
@@ -72,7 +66,6 @@ def sound_begins_s(video: Path, sound: Path) -> float:
 
 
 def _loudness(path: Path) -> NDArray[np.float64]:
-    """Return the loudness of a sound, ``LOUDNESS_HZ`` values a second."""
     samples, each = np.abs(read_audio(path, warn=False).samples), SPEECH_RATE_HZ // LOUDNESS_HZ
     return np.sqrt(samples[: len(samples) // each * each].reshape(-1, each).mean(axis=1, dtype=float))
 
@@ -85,10 +78,7 @@ def _correlate(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 
 def write_playable(video: Path, sound: Path, path: Path) -> None:
-    """Write a video as browsers play it, with the sound of a recording. Raises InputError: it cannot be read.
-
-    Raises ExportError: it cannot be written.
-    """
+    """Write a video as browsers play it, with a recording's sound. Raises InputError, ExportError."""
     frames, rate_hz = read_video_frames(video)
     even = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame in frames)
     write_mp4(path, even, fps=rate_hz, audio=read_sound(sound))

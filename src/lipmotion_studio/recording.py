@@ -25,17 +25,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session, read_pronunciations
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import (
-    Audio,
-    Channel,
-    Generation,
-    Monitor,
-    Motion,
-    Span,
-    Timeline,
-    Unit,
-    silent_monitor,
-)
+from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import Pronunciation, group_words, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.film.filmed_video import write_film
@@ -63,10 +53,8 @@ WITH_TRANSCRIPT = ("transcript", "mapped transcript")
 class OpenRecording:
     """A recording that is open, for one thread at a time.
 
-    file    : its edits; what is written at each change
     folder, number : the project, and its number there
     summary : of the file as it was read, or written last
-    audio   : the sound, which has been read
     onto    : the person onto whose face the motion is mapped; None: it stays as it is
     settled : whether the full motion is up to date; else only what lies around the last edits is
     Raises as ``EditFile.session``.
@@ -93,9 +81,8 @@ class OpenRecording:
         self.session.generate(file.edits)
 
     def with_model(self, model: Model, onto: FilmedFace | None) -> OpenRecording:
-        """Return it with its edits as another model moves it, or mapped onto another person; to be read only.
-
-        Raises InputError: the model cannot make an edit, or there is no such person.
+        """Return it, to be read, with another model or mapped onto a person. Raises InputError: an edit fails, or no
+        such person.
         """
         key = id(model), id(onto)
         if key not in self._others:
@@ -170,9 +157,8 @@ class OpenRecording:
         return changed | {"guessed": rows}
 
     def restore_version(self, revision: int, version: str) -> dict[str, Any]:
-        """Go back to a version that was kept; the edits as they are become one, too. Raises as ``edit``.
-
-        Raises InputError: no such version, or too many.
+        """Go back to a kept version; the edits as they are become one. Raises as ``edit``; InputError: no such version,
+        too many.
         """
         check_revision("the recording", self.revision, revision)
         recording, now = self.folder.recording(self.number), self.file.edits.sentences
@@ -240,10 +226,7 @@ class OpenRecording:
         return generation.motion
 
     def weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
-        """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them.
-
-        frames : which of them are computed alone; None: all
-        """
+        """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them."""
         weights = with_turn(delivered_scene(self.performance(face), frames))
         if frames is None or len(weights.values) == frames.stop - frames.start:
             return weights
@@ -268,9 +251,8 @@ class OpenRecording:
         write_mp4(path, pictures, fps=DRAWN_HZ, audio=sound)
 
     def write_film(self, path: Path, start_s: float, end_s: float, person: ShownPerson) -> None:
-        """Write a stretch as a video of a filmed face: its pictures are those of the full video.
-
-        Raises InputError: as ``write_video``, or edits ask for what a filmed face cannot do.
+        """Write a stretch as a video of a filmed face. Raises InputError: as ``write_video``, or edits that it cannot
+        show.
         """
         performance = self.performance(person)
         person.check(performance.settings)
@@ -329,10 +311,7 @@ def find_moved(before: Motion, after: Motion) -> dict[str, float] | None:
 
 
 def phone_rows(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:
-    """Return phones in time as objects of JSON.
-
-    plain : the phones before all edits: what is not one of them was edited
-    """
+    """Return phones in time as objects of JSON; those that are not among ``plain`` were edited."""
 
     def identity(span: Span[Unit]) -> tuple[str, float, float]:
         return span.label.phone or span.label.unit, span.start_s, span.end_s
@@ -400,7 +379,6 @@ def analyse_recording(
     """Find words and phones of a recording, and write them as its file of edits; return its sound.
 
     The project's lexicon is not named there: what it says of later words stands in the edits that say them.
-    Its words: those that were given, else those of a file beside it; else they are recognised.
     Raises InputError, AlignmentError: the sound or its words are not usable. ExportError: it cannot be written.
     """
     audio, project = load_sound(folder, recording), folder.project
@@ -431,11 +409,8 @@ def analyse_recording(
 def open_recording(
     folder: ProjectFolder, recording: ProjectRecording, model: Model, audio: AnalysedAudio | None = None
 ) -> OpenRecording:
-    """Open a recording that has been analysed; the project is told its length and doubt, where it has neither.
-
-    audio : its sound, where it has been read
-    Raises InputError: its sound or its file of edits cannot be read, or belongs to another recording. ExportError: the
-    project cannot be written.
+    """Open an analysed recording (``audio``: if read); note its length and doubt. Raises InputError: unreadable.
+    ExportError.
     """
     file = folder.read_edits(recording)
     audio = audio or load_sound(folder, replace(recording, sha256=recording.sha256 or file.sha256))

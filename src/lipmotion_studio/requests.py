@@ -25,11 +25,7 @@ KEY_DIGITS = 32
 
 @dataclass(frozen=True)
 class Access:
-    """What a request must bring.
-
-    token : of this run of the server
-    hosts : what browsers call the server: names with the port, in lower case
-    """
+    """What a request must bring: the token of this run, and a host (name with port, lower case) of this server."""
 
     token: str
     hosts: frozenset[str]
@@ -43,10 +39,7 @@ class Access:
         return f"{path}?key={self.key(path)}"
 
     def refusal(self, method: str, path: str, query: bytes, headers: dict[str, str]) -> tuple[int, str] | None:
-        """Return why a request is refused, with a status; None: it is not.
-
-        headers : by their names in lower case
-        """
+        """Return why a request is refused, with a status; None: it is not."""
         foreign = foreign_refusal(path, headers, self.hosts.__contains__)
         if foreign or (path != API and not path.startswith(f"{API}/")):
             return foreign
@@ -90,9 +83,8 @@ def seconds(given: Mapping[str, Any], name: str, usual: float | None = None) -> 
 
 
 def stretch(given: Mapping[str, Any], rate_hz: float, frames: int) -> slice:
-    """Return the frames from ``start_s`` to ``end_s`` of a request; all, where neither is there.
-
-    Raises InputError: no times, or none of the recording's.
+    """Return the frames from ``start_s`` to ``end_s`` of a request, or all. Raises InputError: no times of the
+    recording.
     """
     last_s = (frames - 1) / rate_hz
     start_s, end_s = seconds(given, "start_s", 0.0), min(seconds(given, "end_s", last_s), last_s)

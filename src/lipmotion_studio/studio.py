@@ -32,8 +32,17 @@ from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, revision_of
 from lipmotion_studio.meshes import Faces
-from lipmotion_studio.presets import PRESETS, Preset, suffixes
-from lipmotion_studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectRecording, digest_of
+from lipmotion_studio.project import (
+    EDITS_SUFFIX,
+    MARKS,
+    PRESETS,
+    ExportRecord,
+    Preset,
+    Project,
+    ProjectRecording,
+    digest_of,
+    suffixes,
+)
 from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
 from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer
@@ -46,16 +55,11 @@ ORDERS = ("", "doubt")
 OTHER = "other"
 """What requests call the model that the project's is compared with."""
 DIGEST_DIGITS = 8
-"""Figures of a digest that people see."""
 
 
 @dataclass(frozen=True)
 class KnownModel:
-    """A model, and what tells it from others.
-
-    name   : of its file, without suffix: what its owner calls it
-    digest : of its file (SHA-256)
-    """
+    """A model: the name of its file, without suffix, and the file's digest (SHA-256)."""
 
     model: Model
     name: str
@@ -73,12 +77,7 @@ def known_model(file: Path | None) -> KnownModel:
 
 
 class Studio:
-    """A project that is open.
-
-    folder : the project
-    used   : the model that moves its recordings; None: as the project says, or, where that is gone, the one that ships
-    against : a model with which its motion is compared; None: there is none
-    """
+    """A project that is open, the model that moves its recordings, and one that is compared with it, or None."""
 
     def __init__(
         self, folder: ProjectFolder, used: KnownModel | None = None, against: KnownModel | None = None
@@ -115,11 +114,7 @@ class Studio:
     def list_recordings(
         self, first: int, count: int, *, order: str = "", status: str = "", mark: str = ""
     ) -> dict[str, Any]:
-        """Return the project, and so many of its recordings from one on, for the list.
-
-        order  : ``doubt``: what is least sure first; empty: that of the project
-        status, mark : only recordings with these; empty: all
-        """
+        """Return the project, and ``count`` recordings from one on, of a status and mark if given."""
         if order not in ORDERS:
             raise InputError(f"order is {shorten(repr(order))}, required doubt, or nothing")
         with self.folder.lock:
@@ -189,10 +184,7 @@ class Studio:
         return document | {"training": self.trainer.short_document()}
 
     def voices(self) -> dict[str, str]:
-        """Return the models that the project may use by the names of their files, as paths from its folder.
-
-        Name and path of the one that ships are empty.
-        """
+        """Return the models that the project may use by the names of their files, as paths from its folder."""
         project = self.folder.project
         made = {name: path.relative_to(self.folder.path).as_posix() for name, path in self.trainer.files(VOICE).items()}
         others = [path for path in (project.given_model, project.model) if path and path not in made.values()]
@@ -209,7 +201,6 @@ class Studio:
     def use_voice(self, path: str, voice: KnownModel, revision: int) -> None:
         """Let another model move the recordings of the project, from now on; their phones and edits stay.
 
-        path     : from the folder of the project; empty: the one that ships
         revision : of the voice, as it was seen
         Raises RevisionError: another one is used since. ExportError: the project cannot be written.
         """
@@ -255,10 +246,7 @@ class Studio:
         }
 
     def add_phones(self, sentences: Sequence[str]) -> tuple[Step, ...]:
-        """Return edits; those that say words of the project's lexicon with the phones, which then stand in the edits.
-
-        Raises InputError: a sentence is no edit.
-        """
+        """Return edits; those that say words of the lexicon with its phones. Raises InputError: not an edit."""
         steps = [parse_step(sentence) for sentence in sentences]
         if not any(isinstance(step, WordIs | WordsSaid) for step in steps):
             return tuple(steps)
@@ -295,10 +283,7 @@ class Studio:
         return True
 
     def mark(self, number: int, revision: int, mark: str) -> dict[str, Any]:
-        """Mark a recording as its edits are now; return its row.
-
-        Raises InputError: no such mark, or its edits are damaged. RevisionError: somebody else has changed it.
-        """
+        """Mark a recording as it is now; return its row. Raises InputError: no mark, damaged edits. RevisionError."""
         with self.folder.check_out(number, revision) as recording:
             self.folder.has_edits(recording)  # which is refused where they are damaged
             marked = replace(recording, mark=mark, marked=self.folder.summary(recording).digest)
@@ -327,10 +312,7 @@ class Studio:
         return self._videos[sound]
 
     def prepare_video(self, number: int) -> tuple[Path, str]:
-        """Return the path of a recording's real video as browsers play it, and its media type.
-
-        Raises HTTPException: it has none. InputError: it cannot be read.
-        """
+        """Return path and media type of a recording's video for browsers. Raises HTTPException: none. InputError."""
         video, _ = self.find_video(number) or (None, 0.0)
         if video is None or not video.is_file():
             raise HTTPException(404, "the recording has no video")
@@ -346,7 +328,6 @@ class Studio:
     def vary(self, number: int, recording: OpenRecording, by: str, face: str = "") -> OpenRecording:
         """Return an open recording as it once was, or as the other model moves it, or mapped onto another person.
 
-        by   : the name of a version that was kept; ``OTHER``: the model it is compared with; empty: as it is
         face : the name of the face that is shown; a filmed one may be of another person
         Raises InputError: there is no such version or model, or it cannot make an edit.
         """
@@ -375,8 +356,6 @@ class Studio:
     def export(self, number: int, preset: Preset, face: str = "") -> dict[str, Any]:
         """Write files of a recording, and record what was written from which edits; return their paths.
 
-        face : the name of that which videos show; empty: the usual one
-        Of exports of the same files only the last one is recorded.
         Raises InputError: it is not analysed yet, its edits are damaged, its sound is another one, or there is no
         such face. ExportError: a file cannot be written.
         Others as ``Job.run``.

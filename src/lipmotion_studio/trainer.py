@@ -46,20 +46,13 @@ FORMAT, VERSION = "lipmotion.training", 1
 MAX_WARNINGS = 200
 """Warnings, and recordings that are not used, that the page shows."""
 MAX_LISTED = 500
-"""Videos of a project that the page lists."""
 MAX_UNFINISHED = 0.99
 """The share of the work that is shown, at most, until it is done."""
 
 
 @dataclass(frozen=True)
 class TrainingRequest:
-    """What was asked for.
-
-    kind   : ``voice`` or ``face``
-    name   : of what is made
-    lines  : numbers of the recordings that are learned from; none: the folder of recordings is
-    options : values of ``VoiceOptions`` by name
-    """
+    """What was asked for; without recordings' numbers (``lines``) the folder of recordings is learned from."""
 
     kind: str
     name: str
@@ -122,10 +115,7 @@ class Trainer:
             return TrainingJob(self._request, self.short_document()).document() if self._request else None
 
     def short_document(self) -> dict[str, Any]:
-        """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s``, warnings and the report.
-
-        ``left_s`` is by the last estimate; 0: it takes longer than that; None: not known yet
-        """
+        """Return the state of a job: ``stage``, ``share``, ``left_s`` (0: longer than estimated), warnings, report."""
         with self._lock:
             left_s = None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
             return dict(self._status) | ({"left_s": left_s} if self.is_working else {})
@@ -148,12 +138,8 @@ class Trainer:
         return {path.stem: path for path in paths if path.is_file() and not path.name.startswith(".")}
 
     def begin(self, kind: str, name: str, numbers: Sequence[int], options: VoiceOptions) -> None:
-        """Begin to make a voice or a face.
-
-        name    : of its file, which is made one that is free
-        numbers : of recordings that are videos; none: the project's folder of recordings
-        Raises InputError: something is being made, no such kind, no name, no videos of these numbers, or no folder.
-        ExportError: the folder of the project cannot be written.
+        """Begin to make a voice or a face. Raises InputError: busy, or no such kind, name or videos. ExportError: no
+        write.
         """
         if kind not in KINDS:
             raise InputError(f"no kind {shorten(repr(kind))}; required {' or '.join(KINDS)}")
@@ -243,7 +229,6 @@ class Trainer:
         )
 
     def _follow(self, process: BaseProcess, pipe: Connection) -> None:
-        """Take what the process reports until it ends."""
         with pipe, suppress(EOFError, OSError):
             while True:
                 self._take(pipe.recv())
@@ -327,9 +312,8 @@ class Trainer:
             return False
 
     def restore(self) -> None:
-        """Put the last good copy in the place of a damaged file, which stays beside it under another name.
-
-        Raises InputError: it is not damaged, or there is no good copy. ExportError: it cannot be written.
+        """Replace a damaged file by its copy, and keep it beside. Raises InputError: no damage or copy. ExportError: no
+        write.
         """
         with self._lock:
             if not self.damage or not self.is_restorable:

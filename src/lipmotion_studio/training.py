@@ -57,10 +57,7 @@ class VoiceOptions(Configuration):
 
 @dataclass(frozen=True)
 class TrainingRecording:
-    """A recording of the project that is learned from, and its words; empty: those beside it.
-
-    sha256 : digest of the recording that the words are of; empty: not known
-    """
+    """A recording that is learned from, its digest (empty: not known), and its words (empty: those beside it)."""
 
     path: Path
     name: str
@@ -72,12 +69,9 @@ class TrainingRecording:
 class TrainingOrder:
     """What is to be made.
 
-    kind    : ``voice`` or ``face``
-    target  : the file that it becomes
     work    : folder for what is prepared, which another order goes on with
     source  : a folder of recordings, or recordings of the project
     lexicon : pronunciations of the project; None: it has none
-    workers : number of processes
     """
 
     kind: str
@@ -125,8 +119,6 @@ def run_training(order: TrainingOrder, report: Report) -> None:
 
 
 class _WarningHandler(logging.Handler):
-    """Reports warnings."""
-
     def __init__(self, report: Report) -> None:
         super().__init__(logging.WARNING)
         self._report = report
@@ -198,10 +190,7 @@ def _train_voice(order: TrainingOrder, recordings: Path, monitor: Monitor) -> di
 
 
 def split_names(corpus: Corpus, names: Sequence[str], *, held_out: bool) -> tuple[list[str], list[str]]:
-    """Return which of some utterances are learned from, and which show how good the voice is.
-
-    held_out : as of ``VoiceOptions``
-    """
+    """Return which of some utterances are learned from, and which show how good the voice is (``VoiceOptions``)."""
     names = sorted(names)
     if not held_out:
         return names, []

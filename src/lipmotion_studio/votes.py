@@ -20,7 +20,6 @@ DIGEST = re.compile(r"[0-9a-f]{64}|")
 class Side:
     """One of two motions of a recording.
 
-    name  : of the model that made it; of votes from before digests were kept, what the page called it
     model : digest of the model's file (SHA-256); empty: it was not kept
     edits : digest of the edits it was made with; empty: it was not kept
     Raises InputError: no name, or no digests.
@@ -44,7 +43,6 @@ class Side:
 class Vote:
     """One answer of a blind comparison.
 
-    line   : name of the recording
     shown  : the two motions, in the order in which they were shown
     better : place of the one that was found better, 0 or 1; None: neither
     Raises InputError: these are not two, or the better one is neither.

@@ -51,10 +51,7 @@ class StoppedError(LipMotionError):
 class Work:
     """What happens to a recording.
 
-    number  : of the recording
-    status, stage, share, error : as the page shows them
     since_s : when the status changed, by a clock that only grows
-    recording : once it is open
     thread  : in which it is worked on, once it has been opened
     users   : requests that need it now
     stopped : whether what is done for it is to end soon
@@ -86,10 +83,7 @@ class Work:
 
 
 class Workspace:
-    """The recordings of a project at work.
-
-    model : of the project
-    """
+    """The recordings of a project at work."""
 
     def __init__(self, folder: ProjectFolder, model: Model) -> None:
         self.folder, self.model = folder, model
@@ -154,9 +148,8 @@ class Workspace:
         return work
 
     async def run(self, number: int, do: Callable[[OpenRecording], ResultT]) -> ResultT:
-        """Do something with an open recording, in its thread; return the result.
-
-        Raises NotReadyError: it is still being analysed. LipMotionError: it has failed, and why; or as ``do``.
+        """Do something with an open recording, in its thread. Raises NotReadyError: in analysis. LipMotionError: it
+        failed.
         """
         work = self.open(number)
         recording, thread = work.recording, work.thread
@@ -188,10 +181,7 @@ class Workspace:
                 self._waiting.remove(work)
 
     def use(self, model: Model) -> None:
-        """Go over to another model: recordings that are open are opened with it, once they are wanted again.
-
-        Edits that are on their way are made and written before that.
-        """
+        """Go over to another model: recordings that are open are opened with it, once they are wanted again."""
         self.model = model
         for number, work in list(self._works.items()):
             if work.recording is None or work.thread is None:

@@ -8,8 +8,15 @@ from lipmotion import Corpus
 from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.stats.pca import fit_pca
-from lipmotion_faces.appearance.candidates import choose_candidates, make_candidates
-from lipmotion_faces.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, sharpen
+from lipmotion_faces.appearance.candidates import (
+    PAPER,
+    RefinementOptions,
+    Refiner,
+    best_sequence,
+    choose_candidates,
+    make_candidates,
+    sharpen,
+)
 
 TRAINING, HELD_OUT = np.split(pictures(count=160), [120])
 
@@ -98,7 +105,7 @@ def test_parts_of_a_video_are_those_of_the_whole(space: Eigenlips, refiner: Refi
 def test_blocks_of_distances_do_not_matter(space: Eigenlips, refiner: Refiner, monkeypatch: pytest.MonkeyPatch) -> None:
     wanted = space.project(HELD_OUT[:30])
     whole = refiner.choose(wanted)
-    monkeypatch.setattr("lipmotion_faces.appearance.refinement.BLOCK", 7)
+    monkeypatch.setattr("lipmotion_faces.appearance.candidates.BLOCK", 7)
     assert np.array_equal(refiner.choose(wanted), whole)
 
 

@@ -24,7 +24,7 @@ NUMBA = "Only kernels may import numba"
 FORBIDDEN = [
     # the contract, a module, and an import that the contract forbids there
     (CORE, "lipmotion/motion/space.py", "def late():\n    from lipmotion_faces import base"),
-    (CORE, "lipmotion_studio/workspace.py", "from lipmotion_lab import stamp"),
+    (CORE, "lipmotion_studio/workspace.py", "from lipmotion_lab import runner"),
     (DOWN, "lipmotion/errors.py", "import lipmotion.types"),
     (DOWN, "lipmotion/units/phones.py", "from lipmotion.speech.sound import audio_files"),
     (DOWN, "lipmotion/types/audio.py", "import lipmotion.storage.files"),

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.expression import (
-    ACTION_UNITS,
     PREFIX,
     action_units,
     is_mood,
@@ -17,6 +16,8 @@ from lipmotion.types import Channel, Motion, Prosody
 from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, parse_moods
 from meshes.speech import motion, units
 
+ACTION_UNITS = {1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 20, 23, 24, 25, 26, 43, 53, 54, 55, 56, 57, 58, 64}
+"""Those that faces show."""
 SOURCES = {"EMFACS", "Ekman2003", "Harrigan1996", "Sundelin2013", "ours"}
 PROTOTYPES = {
     "happy": {6, 12}, "sad": {1, 4, 15}, "angry": {4, 5, 7, 23}, "afraid": {1, 2, 4, 5, 7, 20}, "disgusted": {9, 15},

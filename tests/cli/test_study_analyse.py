@@ -7,8 +7,7 @@ import numpy as np
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion_studio.study.analysis.analyse import analyse_study
-from lipmotion_studio.study.analysis.analysis_table import analysis_table
+from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
 from lipmotion_studio.study.answers import write_answers
 from study.analysis.simulated import Effects, comparisons, paired_answers, rated_answers, ratings
 

@@ -9,7 +9,7 @@ import pytest
 
 from docs.test_links import DOCS
 from lipmotion.engines.coupled.config import CoupledConfig
-from lipmotion.engines.joint.config import JointEngineConfig
+from lipmotion.engines.joint.engine import JointEngineConfig
 from lipmotion.engines.selection.config import SelectionConfig
 
 ROOT = DOCS.parent

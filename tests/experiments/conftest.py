@@ -6,7 +6,6 @@ from functools import partial
 import pytest
 
 from lipmotion.measures.curves import bootstrap_interval
-from lipmotion_lab import comparison
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
 
 
@@ -14,6 +13,5 @@ from lipmotion_lab.evaluation import evaluate as evaluation_figures
 def few_draws() -> Iterator[None]:
     """Bootstrap intervals of 50 draws, for speed; their values are tested with the measures."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (comparison, evaluation_figures):
-            patch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=50))
+        patch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=50))
         yield

@@ -5,7 +5,7 @@ import pytest
 
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closure_figures
-from lipmotion_lab.comparison import (
+from lipmotion_lab.evaluation.evaluate import (
     ClipStatistic,
     closing_score_statistic,
     correlation_statistic,

@@ -10,8 +10,7 @@ from lipmotion.errors import InputError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.noise import noisy_audio
-from lipmotion_lab.evaluation.held_out import HeldOutRecordings, load_held_out
-from lipmotion_lab.noise import LONGEST_S, add_noise, read_talkers
+from lipmotion_lab.evaluation.held_out import LONGEST_S, HeldOutRecordings, add_noise, load_held_out, read_talkers
 
 
 @pytest.fixture(scope="module")

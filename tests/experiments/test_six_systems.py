@@ -17,8 +17,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
-from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
-from lipmotion_lab.noise import NoiseConditions
+from lipmotion_lab.evaluation.held_out import NoiseConditions, generate_clips, load_held_out
 from lipmotion_lab.runner import ExperimentSettings
 from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_FILES

@@ -7,7 +7,7 @@ from PIL import Image
 
 from lipmotion.errors import ExportError
 from lipmotion.types import Audio
-from lipmotion_faces.video.transparent import write_pictures, write_with_alpha
+from lipmotion_faces.video.mp4 import write_pictures, write_with_alpha
 
 HZ = 16_000
 

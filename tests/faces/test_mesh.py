@@ -5,8 +5,7 @@ import pytest
 
 from lipmotion import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
-from lipmotion.meshes.model.bones import HEAD, NECK, Bone
-from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
+from lipmotion.meshes.model.mesh import HEAD, NECK, Bone, Material, Mesh, MeshPart
 from lipmotion_faces.mesh import MeshFace, MeshStage
 from lipmotion_faces.testing import check_face
 from meshes.heads import head, write_glb

@@ -11,7 +11,7 @@ from formats.examples import written as write
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.formats.bvh import CENTIMETRES
-from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
 
 FRAMES = 60

@@ -11,7 +11,7 @@ from formats.examples import generation, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError
 from lipmotion.meshes.files.gltf_document import read_gltf_document
-from lipmotion.meshes.model.bones import ANGLES, head_quaternions
+from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
 from lipmotion.types import Generation
 
 NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lipmotion.hmm.align import align_units, choose_pronunciations
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig, UnitHmm, make_plain_states
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures

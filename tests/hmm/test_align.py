@@ -4,7 +4,7 @@ import pytest
 from hmm.synthetic import PAUSE, SILENCE, align, choose, known_hmm, random_hmm, speaker
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.align import align_units, expand_states, place_words, spread_windows
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.kernels.paths import Windows
 from oracles import sequences
 

@@ -10,8 +10,8 @@ from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
 from lipmotion.hmm import baum_welch as module
 from lipmotion.hmm.align import align_states, expand_states
 from lipmotion.hmm.baum_welch import accumulate_statistics, adapt_contexts, baum_welch
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.hmm.unit_training import add_contexts
 from oracles import paths
 

@@ -5,8 +5,8 @@ import pytest
 
 from hmm.synthetic import SILENCE, UNITS, known_hmm, random_hmm, sentences, speaker, within_silence
 from lipmotion.hmm.decode import build_unit_loop, decode_units
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.network import compute_log_likelihoods
 from oracles import sequences
 
 INVENTORY = (SILENCE, "a", "b")

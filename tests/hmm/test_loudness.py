@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 from lipmotion.hmm.align import align_units, choose_pronunciations
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods, penalise_silence, penalise_speech
 from lipmotion.hmm.loudness import (
     LEAST_FRAMES,
     PAUSE_FRAMES,
@@ -17,6 +16,7 @@ from lipmotion.hmm.loudness import (
     find_spoken_frames,
     measure_levels,
 )
+from lipmotion.hmm.network import compute_log_likelihoods, penalise_silence, penalise_speech
 
 ROOM = -10.0
 """The level of the room in ``line``, in which the loudest moments have 0."""

@@ -20,8 +20,8 @@ from lipmotion.hmm import unit_training
 from lipmotion.hmm.align import choose_pronunciations
 from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES
 from lipmotion.hmm.decode import build_unit_loop, decode_units
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.hmm.unit_training import TranscribedUtterance, train_hmm
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.types.progress import silent_monitor

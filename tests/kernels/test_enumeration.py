@@ -16,8 +16,7 @@ from lipmotion.kernels import paths as kernel_paths
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
 from lipmotion.kernels.network import ForwardBackwardNetwork
-from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, sample_paths
-from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, cheapest_arrivals, sample_paths, trace_back
 from oracles import factorial as factorial_oracle
 from oracles import paths
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.trellis import best_segments, cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import best_segments, cheapest_arrivals, trace_back
 from oracles import paths
 
 SEEDS = st.integers(0, 2**32 - 1)

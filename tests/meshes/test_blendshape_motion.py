@@ -20,10 +20,14 @@ from lipmotion.meshes.fitting.blendshape_motion import (
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights
 from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
-from lipmotion.meshes.fitting.oculus_visemes import MAX_CLOSED_WEIGHT, VISEME_OF_PHONE, weigh_visemes
-from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
-from lipmotion.meshes.model.bones import ANGLES
+from lipmotion.meshes.fitting.shape_weights import (
+    MAX_CLOSED_WEIGHT,
+    VISEME_OF_PHONE,
+    solve_shape_weights,
+    weigh_visemes,
+)
 from lipmotion.meshes.model.face_shapes import find_face_shapes
+from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit

@@ -10,9 +10,19 @@ from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.files.gltf_scene import read_gltf
 from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
 from lipmotion.meshes.fitting.driven import JAW_OPEN, load_character, with_jaw
-from lipmotion.meshes.model.bones import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merge_bones
 from lipmotion.meshes.model.face_shapes import life_scale
-from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.mesh import (
+    HEAD,
+    JAW,
+    LEFT_EYE,
+    NECK,
+    RIGHT_EYE,
+    Blendshape,
+    Bone,
+    Mesh,
+    bone_kind,
+    merge_bones,
+)
 from lipmotion.types.moods import parse_moods
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, head, lip_points, shaped, write_glb, write_obj

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
-from lipmotion.meshes.model.scene import HeadTurn, Scene, compute_shading_normals
+from lipmotion.meshes.model.scene import EVERY_KEY, HeadTurn, Scene, Thinning, compute_shading_normals, place_keys
 from lipmotion.meshes.model.shape_names import (
     ARKIT_MOUTH,
     ARKIT_OTHERS,

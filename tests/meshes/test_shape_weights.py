@@ -4,9 +4,8 @@ from scipy.optimize import lsq_linear
 
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, move_points
 from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
-from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.meshes.fitting.shape_weights import (
     CurveCosts,
     SolverOptions,

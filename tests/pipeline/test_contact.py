@@ -27,8 +27,7 @@ from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrac
 from lipmotion.types.moods import MOODS
 from lipmotion.units import mark_closing_phones
 from lipmotion_faces.head.pose import head_poses
-from lipmotion_faces.head.shape_fit import lip_gap
-from lipmotion_faces.head.stage import figure, head_mesh
+from lipmotion_faces.head.stage import figure, head_mesh, lip_gap
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 from meshes.heads import head, lip_points, write_glb, write_obj

@@ -76,7 +76,7 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
         return face
 
     monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.stage_face", staged)
-    monkeypatch.setattr("lipmotion_faces.video.transparent.write_pictures", lambda *_: None)
+    monkeypatch.setattr("lipmotion_faces.video.mp4.write_pictures", lambda *_: None)
     for offset_ms in (0, 500):
         path = tmp_path / "a%d.png"
         write(generation, path, speech=toy_speech, fps=1, face="woman", delivery=Delivery(offset_ms=offset_ms))

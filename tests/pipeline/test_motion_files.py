@@ -18,8 +18,8 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, write_rig_table
 from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_living_curves, eye_and_brow_weights
-from lipmotion.meshes.model.bones import ANGLES as HEAD
-from lipmotion.meshes.model.keys import Thinning
+from lipmotion.meshes.model.mesh import ANGLES as HEAD
+from lipmotion.meshes.model.scene import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.calibration import POSES, calibrate_rows, pose_sources
 from lipmotion.pipeline.outputs.curve_sets import make_curves

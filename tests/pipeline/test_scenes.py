@@ -15,8 +15,7 @@ from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
 from lipmotion.meshes.fitting.driven import load_character
-from lipmotion.meshes.model.keys import Thinning
-from lipmotion.meshes.model.scene import Scene
+from lipmotion.meshes.model.scene import Scene, Thinning
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Pin, StateTrace, Timeline

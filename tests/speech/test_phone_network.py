@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lipmotion import load_model
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.hmm.log_likelihoods import wrap_log_likelihoods
+from lipmotion.hmm.network import wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network import network_search, posteriors
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored

@@ -7,9 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo, write_manifest
+from lipmotion_studio.study.manifest import (
+    VIDEOS,
+    Study,
+    StudyVideo,
+    anchor_trials,
+    attention_trials,
+    list_questions,
+    main_trials,
+    practice_trials,
+    write_manifest,
+)
 from lipmotion_studio.study.settings import SCALES
-from lipmotion_studio.study.trials import anchor_trials, attention_trials, list_questions, main_trials, practice_trials
 
 CONDITIONS = ("recording", "visemes", "phones")
 SENTENCES = ("one", "two", "three", "four", "five", "six")

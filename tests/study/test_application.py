@@ -12,9 +12,8 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_answers
 from lipmotion_studio.study.conduct import export_answers, forget_rater
-from lipmotion_studio.study.manifest import Study, check_videos
+from lipmotion_studio.study.manifest import Study, check_videos, order_trials
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
-from lipmotion_studio.study.trials import order_trials
 from study.asgi import Application, ask
 from study.small_study import scripted_answer, small_study
 

@@ -19,10 +19,9 @@ from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion_studio.study.design import design_study
+from lipmotion_studio.study.design import design_study, encode_video, make_condition, parse_conditions, read_sentences
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.settings import Region, StudySettings
-from lipmotion_studio.study.sources import encode_video, make_condition, parse_conditions, read_sentences
 
 DRAWN = Job(Request(), Outputs(face="portrait"))
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)

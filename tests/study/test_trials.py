@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion_studio.study.trials import (
+from lipmotion_studio.study.manifest import (
     anchor_trials,
     attention_trials,
     list_questions,

@@ -44,9 +44,8 @@ def smooth_step(share: Curve) -> Curve:
 
 
 def opening_to_gap(opening: Curve) -> Curve:
-    """Return the distance between the inner lips for a measured opening [shape=(T,)]; 0 where they touch.
-
-    Both in eye distances. It never falls where the opening rises.
+    """Return the distance of the inner lips for an opening, eye distances [shape=(T,)]; 0 where they touch; it never
+    falls.
     """
     share = np.clip((opening - CLOSED_OPENING) / (FULL_DEFICIT_GAP - CLOSED_OPENING), 0, 1)
     gap = (opening + TRACKER_DEFICIT) * share
@@ -77,10 +76,7 @@ class ClosedPhone(NamedTuple):
 
 
 def find_closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
-    """Return the closures of p, b and m, of the frame of least gap each, ascending; one for phones of one frame.
-
-    None where the motion has no ``opening``. Where the lips touch in several frames, it is the middle one.
-    """
+    """Return the closures of p, b and m, of the frame of least gap each, ascending; one for phones of one frame."""
     if "opening" not in motion.names:
         return []
     gap, phones = read_gap(motion), dict[int, ClosedPhone]()
@@ -124,7 +120,6 @@ def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
     """Return in which pictures the lips touch [shape=(len(time_s),), bool].
 
     contact : of frames at ``rate_hz`` [shape=(T,), bool]
-    time_s  : of the pictures in seconds, evenly spaced
     A picture shows contact if the frame nearest to it has it. Contact between two pictures is shown by the nearer one.
     """
     frames = np.clip(np.rint(time_s * rate_hz).astype(int), 0, max(len(contact) - 1, 0))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
-from lipmotion.kernels.trellis import best_segments
+from lipmotion.kernels.paths import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import parse_clock, parse_number
 from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones
@@ -113,12 +113,7 @@ def list_frame_shapes(sheet: CueSheet) -> list[str]:
 
 @dataclass(frozen=True)
 class PhoneShapes:
-    """The shapes that suit one part of a phone.
-
-    share   : of the phone's duration
-    best    : shapes that suit it best
-    allowed : shapes that are acceptable
-    """
+    """The shapes that suit a share of a phone's duration: those that suit best, and those that are acceptable."""
 
     share: float
     best: str
@@ -188,7 +183,6 @@ def frame_costs(generation: Generation, frames: int, fps: float, intensity: floa
     """Return the cost of every one of ``SHAPES`` in every frame [shape=(frames, 9)].
 
     Frame k is shown from ``k / fps`` to ``(k + 1) / fps``; phones and motion count by their share of that time.
-    Where the motion has no channel ``opening`` or ``width``, the phones alone decide.
     """
     edges_s = np.arange(frames + 1) / fps
     silence = _phone_values(shapes_of_phone(SILENCE)[0], silent=True)
@@ -362,10 +356,7 @@ def choose_chart(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[st
 
 
 def parse_cue_time(text: str, place: str) -> float:
-    """Return a time in seconds, as 1.5, 1,5 or 0:01.5, or a number of frames.
-
-    Raises InputError: it is none, with its place.
-    """
+    """Return a time in seconds, as 1.5, 1,5 or 0:01.5, or a number of frames. Raises InputError: it is none."""
     value = parse_clock(text)
     if math.isnan(value):
         value = parse_number(text.replace(",", "."), f"{place}: the time is", "a number from 0 on")

@@ -77,11 +77,7 @@ def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
 
 
 def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], reach: int) -> None:
-    """Bend curves through pins, in place, within ``reach`` frames of each; all pins hold exactly.
-
-    values : [shape=(T, P)]
-    pins   : frame, column and value of each; of two in one frame and column the last holds
-    """
+    """Bend curves [shape=(T, P)] through pins (frame, column, value), within ``reach`` frames; all hold exactly."""
     for frame, column, value in pins:
         if abs(lacking := value - values[frame, column]) > 1e-9:
             first, stop = max(frame - reach, 0), min(frame + reach + 1, len(values))
@@ -92,11 +88,7 @@ def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], rea
 
 
 def find_pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
-    """Return the frame of a pin in motion.
-
-    is_weight : whether its curve is a weight, 0 to 1
-    Raises InputError: a time outside the motion, or a value that is not possible.
-    """
+    """Return the frame of a pin in motion. Raises InputError: a time outside of it, or a value that is not possible."""
     if not np.isfinite(pin.value) or (is_weight and not 0 <= pin.value <= 1):
         required = "0 to 1" if is_weight else "a finite number"
         raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required {required}")
@@ -150,9 +142,8 @@ def _cut_stretch(generation: Generation, weight: Curve) -> MotionStretch:
 
 
 def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
-    """Return a generation that goes over to other motion where its share is more than 0; also variances.
-
-    other : of the same recording, with the same channels
+    """Return a generation, and its variances, that goes over to other motion of the recording where its share is over
+    0.
     """
     values, variance = first.motion.values.astype(np.float64), np.array(first.variance)
     for ours, theirs in ((values[other.frames], other.values), (variance[other.frames], other.variance)):

@@ -210,10 +210,7 @@ def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = 
 
 
 def close_on_frame_grid(generation: Generation, rate_hz: float) -> Generation:
-    """Return a generation that shows every closure of p, b and m at the nearest time n / ``rate_hz`` seconds.
-
-    Motion at that rate shows them then; between two times a closure of 10 ms would be lost.
-    """
+    """Return a generation whose closures of p, b and m lie at times n / ``rate_hz`` s, where motion shows them."""
     motion = generation.motion
     values = motion.values.copy()
     for frame, *_ in find_closures(motion, generation.units):

@@ -33,34 +33,6 @@ PREFIX: Final = "mood_"
 """The channels of moods are called so, and the mood: ``mood_happy``, a weight."""
 CHANGE_S: Final = (0.25, 0.2)
 """A mood begins to change so long before its time, and has changed so long after it."""
-ACTION_UNITS: Final = {
-    1: "inner ends of the brows raised",
-    2: "outer ends of the brows raised",
-    4: "brows lowered and drawn together",
-    5: "upper lids raised",
-    6: "cheeks raised",
-    7: "lids tightened",
-    9: "nose wrinkled",
-    10: "upper lip raised",
-    12: "corners of the lips pulled up",
-    14: "corners of the lips tightened",
-    15: "corners of the lips pulled down",
-    17: "chin raised",
-    20: "lips stretched",
-    23: "lips tightened",
-    24: "lips pressed",
-    25: "lips parted",
-    26: "jaw dropped",
-    43: "eyes half closed",
-    53: "head up",
-    54: "head down",
-    55: "head tilted to the left",
-    56: "head tilted to the right",
-    57: "head forward, and down",
-    58: "head back",
-    64: "eyes down",
-}
-"""The action units that faces show."""
 
 
 class MoodRow(NamedTuple):
@@ -117,9 +89,8 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
 
 
 def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
-    """Return the action units that the moods of a motion ask for, 0 to 1 [each shape=(N,)]; none for a neutral face.
-
-    time_s : in seconds; None: the frames of the motion
+    """Return the action units that moods ask for, 0 to 1 [each shape=(N,)], at times (None: all frames); none if
+    neutral.
     """
     units: dict[int, Curve] = {}
     for name in motion.names:

@@ -148,12 +148,7 @@ class SpokenMouth:
 
 
 class MouthAtRest(NamedTuple):
-    """Sizes of a mouth in its rest pose, in eye distances; None: its motion says nothing of them.
-
-    width     : distance of the lip corners, in the unit of their motion
-    thickness : of the lips
-    chin      : height of the chin
-    """
+    """Sizes of a mouth at rest in eye distances, width as of the corners' motion; None: its motion says nothing."""
 
     width: float | None
     thickness: float | None
@@ -243,10 +238,7 @@ def spoken_mouth(
 
 
 def check_spoken(motion: Motion, fps: float) -> None:
-    """Raise InputError if no mouth can be made of motion: no ``opening``, no frames, or values that are not finite.
-
-    fps : frames per second of what is made, required more than 0
-    """
+    """Raise InputError if no mouth can be made of motion: no ``opening``, no frames, or values that are not finite."""
     if not 0 < fps < np.inf:
         raise InputError(f"the frame rate is {fps}, required more than 0")
     if "opening" not in motion.names:

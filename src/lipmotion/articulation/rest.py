@@ -64,12 +64,7 @@ def add_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Moti
 
 
 def measure_at_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> float:
-    """Return the median of a curve at rest.
-
-    name : of the curve, for the message
-    rest : of ``find_rest_frames``
-    Raises InputError: the median is not positive.
-    """
+    """Return the median of a curve at rest. Raises InputError: it is not positive."""
     value = float(np.median(curve[rest]))
     if not value > 0:
         raise InputError(f"the {name} is {value:g} at rest, required more than 0")
@@ -113,10 +108,7 @@ def find_pauses(units: Timeline[Unit]) -> list[tuple[float, float, bool, bool]]:
 
 
 def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
-    """Return how far the mouth rests at each time, 0 to 1 [shape=(T,)]: 0 in speech and in short pauses.
-
-    It leaves 0 where a phrase ends and is 0 again where the next one begins.
-    """
+    """Return how far the mouth rests at each time, 0 to 1 [shape=(T,)]: 0 in speech and in short pauses."""
     weight = np.zeros(len(time_s))
     for start_s, end_s, after_speech, before_speech in find_pauses(units):
         needed_s = CLOSING_S + OPENING_S if after_speech and before_speech else CLOSING_S

@@ -32,10 +32,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Fit(Generic[ModelT]):
-    """A trained model, and figures of its training by name (``frames``, ``leaves``, ...).
-
-    uses_prior : whether the model stands on another one, whose output it needs in speech (``Speech.prior``)
-    """
+    """A trained model, figures of its training, and whether it needs another model's output (``Speech.prior``)."""
 
     model: ModelT
     figures: Mapping[str, float]
@@ -64,11 +61,7 @@ class Inputs:
 
 
 class Animator(ABC, Generic[ModelT]):
-    """A method that learns motion from examples and generates motion from speech.
-
-    Baselines of experiments need no more than ``fit`` and ``generate``; an ``Engine`` also has a configuration, and its
-    models can be saved and loaded.
-    """
+    """A method that learns motion from examples and generates motion from speech, as baselines of experiments do."""
 
     @abstractmethod
     def fit(self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT) -> Fit[ModelT]:
@@ -89,17 +82,11 @@ class Animator(ABC, Generic[ModelT]):
         """
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: ARG002
-        """Return what training and generation take.
-
-        motion_s : seconds of measured motion in training; infinite: what any model of the engine may take
-        """
+        """Return what training and generation take, with so many seconds of measured motion (infinite: any)."""
         return Inputs()
 
     def recognise(self, model: ModelT, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
-        """Return the phones in time that a model recognises, or None if it was not trained on this voice.
-
-        speech : its ``units`` are empty
-        """
+        """Return the phones in time that a model recognises in speech without them; None: not trained on this voice."""
         return None
 
     def without_closures(self) -> Animator[ModelT]:
@@ -125,9 +112,8 @@ class Engine(Animator[ModelT]):
 
     @abstractmethod
     def from_arrays(self, arrays: Arrays) -> ModelT:
-        """Deserialise a model.
-
-        Raises ModelFormatError: an array is missing or unknown, or has a wrong shape, type or range.
+        """Deserialise a model. Raises ModelFormatError: an array is missing or unknown, or has a wrong shape, type or
+        range.
         """
 
     def hidden(self, model: ModelT, speech: Speech) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:  # noqa: ARG002
@@ -138,10 +124,8 @@ class Engine(Animator[ModelT]):
         return None
 
     def explain(self, model: ModelT, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...] | None:  # noqa: ARG002
-        """Return an explanation of each of some frames of the motion that ``generate`` returns.
-
-        frames : numbers from 0 to T - 1
-        None: there is no more to say than the trace does (``explain_by_trace``).
+        """Return explanations of frames, 0 to T - 1, of generated motion; None: the trace says all
+        (``explain_by_trace``).
         """
         return None
 
@@ -156,12 +140,7 @@ class Engine(Animator[ModelT]):
 
 @dataclass(frozen=True)
 class SourcePiece:
-    """A piece of one recording that says several phones.
-
-    recording     : its name
-    start_s, end_s : of the piece, in the recording
-    phones_s      : where phones begin, in the recording, by their number in what is said
-    """
+    """A piece of one recording that says several phones; ``phones_s``: their beginnings in it, by number."""
 
     recording: str
     start_s: float

@@ -21,7 +21,6 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
 )
 
 DEFAULT = "trajectory"
-"""The engine that is used where none is named."""
 
 
 def engine_named(name: str, configuration: Mapping[str, Any] | None = None, *, stored: bool = False) -> Engine[Any]:
@@ -93,11 +92,7 @@ def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
 
 
 def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:
-    """Return the engine and the options of a preset.
-
-    name : the engine that was asked for; None: none was
-    Raises InputError: no engine has such a preset, or another one than that which was asked for.
-    """
+    """Return the engine and the options of a preset. Raises InputError: no engine has it, or not ``name``."""
     presets = {known: engine for engine in ENGINES.names for known in _class_of(engine).Config.presets}
     if preset not in presets:
         raise InputError(f"no preset {preset!r}; there are: {', '.join(presets)}")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
-from lipmotion.meshes.model.keys import Thinning
+from lipmotion.meshes.model.scene import Thinning
 from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.storage.files import atomic_file, check_regular
 from lipmotion.storage.json_text import as_json

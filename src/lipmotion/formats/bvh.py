@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat, format_rows
-from lipmotion.meshes.fitting.point_motion import move_points
+from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import Generation, Motion
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ def check(motion: Motion) -> None:
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
-    """Write the points; of motion with distances alone, they move as mouths usually do (``fitting.point_motion``)."""
+    """Write the points; of motion with distances alone, they move as mouths do (``fitting.blendshape_motion``)."""
     motion, template = generation.motion, mouth_template()
     moved = move_points(motion, generation.units).expressed
     offsets = [" ".join(f"{value:.5f}" for value in place * CENTIMETRES) for place in template.places]

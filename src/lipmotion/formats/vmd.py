@@ -17,7 +17,7 @@ import numpy as np
 from lipmotion.errors import InputError
 from lipmotion.formats.base import MotionFormat, key_frames
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_to_weights, weights_to_gaze
-from lipmotion.meshes.model.bones import ANGLES, head_angles, head_quaternions
+from lipmotion.meshes.model.mesh import ANGLES, head_angles, head_quaternions
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, CLOSED, VRM_VOWELS, arkit_name, vowel_name
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 from lipmotion.types.motion import RADIAN

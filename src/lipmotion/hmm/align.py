@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import NetworkBuilder, build_chain
+from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, build_chain
 from lipmotion.kernels.paths import Windows
 
 FIT_BLOCK = 2048
@@ -55,10 +54,8 @@ def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
 def align_states(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> tuple[StateSequence, NDArray[np.intp]]:
-    """Return the states of a unit sequence, and the number of the state of every frame [shape=(T,)].
-
-    windows : of the units: the frames that each may have
-    Raises AlignmentError: fewer frames than states, or none within the windows.
+    """Return the states of a unit sequence, and that of every frame [shape=(T,)]. Raises AlignmentError: too few
+    frames.
     """
     chain = expand_states(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
@@ -72,9 +69,8 @@ def align_states(
 def align_units(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> NDArray[np.intp]:
-    """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
-
-    Parameters and errors as for ``align_states``.
+    """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)]. Raises as
+    ``align_states``.
     """
     chain, path = align_states(hmm, log_likelihoods, units, windows)
     return np.append(np.searchsorted(chain.positions[path], np.arange(len(units))), log_likelihoods.frames)
@@ -97,8 +93,6 @@ class SpokenWord(NamedTuple):
 class PlacedWord(NamedTuple):
     """A word or a silence as it was pronounced, and where.
 
-    spoken : the pronunciation
-    start  : its first frame
     fit    : by how much its states are less probable than the best of all states, the mean of its frames in nats, 0 or
              less; NaN where it was not asked for
     """
@@ -167,25 +161,19 @@ def place_words(
     starts = np.flatnonzero(np.diff(slot_of[path], prepend=-1))
     fits = np.full(len(starts), np.nan)
     if windows is not None:
-        fits = _measure_fits(log_likelihoods, plain, network.emission[path], starts)
+        densities = network.emission[path]
+        frame_fits = np.empty(len(densities))
+        for first in range(0, len(densities), FIT_BLOCK):
+            end = min(first + FIT_BLOCK, len(densities))
+            values = log_likelihoods.log_density(first, end, plain)
+            frame_fits[first:end] = values[np.arange(end - first), densities[first:end]] - values.max(axis=1)
+        fits = np.add.reduceat(frame_fits, starts) / np.diff(starts, append=len(densities))
     placed = []
     for states, start, fit in zip(np.split(path, starts[1:]), starts.tolist(), fits.tolist(), strict=True):
         spoken = nodes[states[0]][0]
         units = tuple(spoken.units[place] for place in dict.fromkeys(nodes[state][2] for state in states.tolist()))
         placed.append(PlacedWord(spoken._replace(units=units), start, fit))
     return placed
-
-
-def _measure_fits(
-    log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp], densities: NDArray[np.intp], starts: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Return the fit of stretches of a path, given the density of each frame, and the first frame of each stretch."""
-    fit = np.empty(len(densities))
-    for first in range(0, len(densities), FIT_BLOCK):
-        end = min(first + FIT_BLOCK, len(densities))
-        values = log_likelihoods.log_density(first, end, chosen)
-        fit[first:end] = values[np.arange(end - first), densities[first:end]] - values.max(axis=1)
-    return np.add.reduceat(fit, starts) / np.diff(starts, append=len(densities))
 
 
 def _slot_windows(windows: Windows, frames: int) -> Windows:
@@ -229,9 +217,8 @@ def _check_room(hmm: UnitHmm, frames: int, words: Sequence[Sequence[Sequence[str
 def _append_units(
     builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]], pause: str
 ) -> list[tuple[int, float]]:
-    """Add the states of some units, joined to all open ends; return the new open ends: states and log P(leave).
-
-    Without units the open ends stay as they are; ``pause`` among them may be left out.
+    """Add the states of some units to all open ends (states, log P(leave)); return the new ends. ``pause`` may be left
+    out.
     """
     ends = open_ends
     for unit in units:

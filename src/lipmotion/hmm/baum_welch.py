@@ -61,10 +61,7 @@ def adapt_contexts(
     after_step: AfterStep = no_report,
     parallel_map: ParallelMap = map,
 ) -> EmResult[UnitHmm, UnitStatistics]:
-    """Adapt the states in context to their data by some steps of EM, with the states without context as their prior.
-
-    Parameters and result as for ``baum_welch``; the states without context, and all durations, stay as they are.
-    """
+    """Adapt states in context by EM, with those without as their prior, which stay; parameters as of ``baum_welch``."""
 
     def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
         plain, parents = len(model.log_stay), model.table.parents()
@@ -80,11 +77,7 @@ def adapt_contexts(
 
 
 def reestimate_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
-    """Return the densities re-estimated from the statistics (the M-step).
-
-    data : all features, whose variance gives the variance floor
-    A density with less than one frame of data stays as it is.
-    """
+    """Return the densities re-estimated from the statistics (M-step); with less than one frame of data they stay."""
     mixtures = hmm.mixtures.copy()
     floor = hmm.config.variance_floor * np.concatenate(data).var(axis=0)
     for density, x, weights in statistics.by_density():
@@ -142,10 +135,7 @@ class UtteranceStatistics(NamedTuple):
 def collect_statistics(
     sequence: StateSequence, posterior: NDArray[np.float64], stay: NDArray[np.float64]
 ) -> UtteranceStatistics:
-    """Return the statistics of an utterance from its state posteriors [shape=(T, S)].
-
-    stay : [shape=(S,)], expected number of transitions from each state to itself
-    """
+    """Return the statistics of an utterance from its state posteriors [shape=(T, S)]."""
     frame, state = np.nonzero(posterior > MIN_POSTERIOR)
     weights = posterior[frame, state].astype(np.float32)
     return UtteranceStatistics(sequence.plain, stay, posterior.sum(axis=0), frame, sequence.densities[state], weights)
@@ -173,11 +163,7 @@ def _collect_batch(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int
 
 
 def group_by_length(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
-    """Give the numbers of utterances in batches of similar length.
-
-    frames, states : of each utterance
-    Padded to its longest utterance, a batch has at most ``CELLS`` cells, unless one utterance alone has more.
-    """
+    """Give the numbers of utterances in batches of similar length, of at most ``CELLS`` cells, or of one utterance."""
     batch: list[int] = []
     max_states = 0
     for i in sorted(range(len(frames)), key=lambda i: frames[i]):
@@ -191,10 +177,7 @@ def group_by_length(frames: Sequence[int], states: Sequence[int]) -> Iterator[li
 
 
 class UnitStatistics:
-    """The sufficient statistics of one pass over the data, for the states of unit models.
-
-    log_likelihood, frames : of all utterances that have a path
-    """
+    """The sufficient statistics of one pass over the data, for the states of unit models."""
 
     def __init__(self, hmm: UnitHmm) -> None:
         self._hmm = hmm

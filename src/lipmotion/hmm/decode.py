@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import Neighbour, StateTable, UnitHmm
-from lipmotion.hmm.network import Network, NetworkBuilder
+from lipmotion.hmm.network import LogLikelihoods, Network, NetworkBuilder
 
 StateNodes = dict[Neighbour, int]
 """The nodes of one state of a unit: by neighbour, and under None the node for all other neighbours."""
@@ -18,11 +17,7 @@ StateNodes = dict[Neighbour, int]
 
 @dataclass(frozen=True, eq=False)
 class UnitLoop:
-    """The network in which every unit may follow every other, which recognition searches.
-
-    owners  : the unit of each node
-    entries : the nodes of the units' first states
-    """
+    """The network of units that may all follow each other; the unit of each node, and the nodes of first states."""
 
     network: Network
     owners: tuple[str, ...]
@@ -30,10 +25,7 @@ class UnitLoop:
 
 
 def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
-    """Return the loop over an inventory, which includes silence (the first free unit).
-
-    A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
-    """
+    """Return the loop over an inventory. Recordings begin and end in silence, or in any unit as if it were beside."""
     table, silence = hmm.table, hmm.table.free[0]
     builder = NetworkBuilder()
     owners: list[str] = []
@@ -69,11 +61,7 @@ def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
 def decode_units(
     loop: UnitLoop, log_likelihoods: LogLikelihoods, beam: float | None = None
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the most probable units, and the first frame of each, with the frame count at the end.
-
-    beam : as in ``Network.best_path``; None: exact
-    Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5).
-    """
+    """Return the most probable units, their first frames, the frame count; ``beam`` as in ``Network.best_path``."""
     return decode_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
 
 
@@ -111,10 +99,7 @@ def _distinct_neighbours(table: StateTable, unit: str, state: int, inventory: Se
 def _advance(
     builder: NetworkBuilder, hmm: UnitHmm, unit: str, state: int, sources: StateNodes, targets: StateNodes
 ) -> None:
-    """Join two successive states of a unit.
-
-    The arc into the first node that fixes the right neighbour has the score of the language model.
-    """
+    """Join two successive states of a unit; the arc that fixes the right neighbour has the language model's score."""
     move = hmm.move(unit, state - 1)
     same_side = hmm.table.side(unit, state - 1) == hmm.table.side(unit, state)
     chooses = hmm.table.side(unit, state) == ">" and not same_side

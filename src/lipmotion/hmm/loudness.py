@@ -48,10 +48,7 @@ def average_power(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
-    """Return the loud level of a recording, and that of the noise beneath its speech, as natural logarithms.
-
-    log_energy : of every frame, natural logarithm [shape=(T,)]
-    """
+    """Return the loud level of a recording and that of its noise, natural logarithms as ``log_energy`` [shape=(T,)]."""
     from scipy.ndimage import minimum_filter1d
 
     loud = float(average_power(log_energy).max())
@@ -68,12 +65,7 @@ def measure_levels(log_energy: NDArray[np.floating]) -> tuple[float, float]:
 def find_loud_frames(
     log_energy: NDArray[np.floating], drop: float = SOUND_DROP, smoothing: int = SMOOTHING_FRAMES
 ) -> NDArray[np.bool_]:
-    """Return which frames are louder than a level, and than the noise [shape=(T,)]; none where the level is constant.
-
-    log_energy : of every frame, natural logarithm [shape=(T,)]
-    drop       : how far the level lies beneath the loud level
-    smoothing  : frames averaged over, an odd number
-    """
+    """Return which frames are louder than the noise, and than a level ``drop`` beneath the loud one [shape=(T,)]."""
     loud, noise = measure_levels(log_energy)
     if loud - noise < LEAST_RANGE:
         return np.zeros(len(log_energy), bool)
@@ -82,11 +74,7 @@ def find_loud_frames(
 
 
 def find_sound_runs(sound: NDArray[np.bool_], pause: int = PAUSE_FRAMES) -> list[tuple[int, int]]:
-    """Return runs of frames with sound, each from its first frame to before its end; clicks are none.
-
-    sound : of every frame [shape=(T,)]
-    pause : so many frames without sound end a run
-    """
+    """Return runs of frames with sound, without clicks, as (first, end); ``pause`` frames without sound end a run."""
     frames = np.flatnonzero(sound)
     if not len(frames):
         return []
@@ -103,10 +91,7 @@ def find_spoken_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
 
 
 def find_quiet_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Return which frames are too quiet for speech [shape=(T,)].
-
-    log_energy : [shape=(T,)], natural logarithm
-    """
+    """Return which frames are too quiet for speech [shape=(T,)], from natural logarithms [shape=(T,)]."""
     padded = np.pad(log_energy, QUIET_REACH_FRAMES, "edge")
     loudest = sliding_window_view(padded, 2 * QUIET_REACH_FRAMES + 1).max(axis=1)
     return loudest < measure_levels(log_energy)[0] - QUIET_DROP

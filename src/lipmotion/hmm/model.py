@@ -27,8 +27,6 @@ class StateTable:
     the middle one (of an odd count) on neither: so whole sequences of context-dependent units can be searched
     exactly with units² nodes instead of units³. A state in a context too rare to be modelled is that without context.
 
-    units    : the inventory
-    counts   : number of states of each unit
     names    : of all densities: ``b.0`` (no context), ``b.0<ih`` (left), ``b.2>ih`` (right)
     free     : units whose states depend on no neighbour (silence)
     """
@@ -145,10 +143,7 @@ class UnitHmm:
 
 
 def hmm_to_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
-    """Serialise the models; the configuration is not included.
-
-    precision : of the Gaussians: half precision suffices for recognition, float32 keeps them exactly
-    """
+    """Serialise the models; the configuration is not included."""
     return {
         "units": np.array(hmm.table.units),
         "counts": np.array(hmm.table.counts, np.int32),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, CorpusError
-from lipmotion.hmm.align import StateSequence, align_states, choose_pronunciations, expand_states
+from lipmotion.hmm.align import align_states, choose_pronunciations, expand_states
 from lipmotion.hmm.baum_welch import (
     UnitStatistics,
     adapt_contexts,
@@ -21,9 +21,9 @@ from lipmotion.hmm.baum_welch import (
     max_mean_durations,
     reestimate_mixtures,
 )
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import make_equal_gaussians
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -52,10 +52,7 @@ class TranscribedUtterance:
 
 @dataclass(frozen=True)
 class UnitInventory:
-    """The units to model. ``silence`` surrounds every utterance, ``pause`` may stand between words.
-
-    energy : the column of the features that holds the log energy
-    """
+    """The units to model: ``silence`` surrounds every utterance, ``pause`` may stand between words."""
 
     silence: str
     pause: str
@@ -135,10 +132,6 @@ class _Training:
             self._done, self._sequences = int(arrays["done"]), [tuple(s.split()) for s in arrays["said"].tolist()]
             stored = {name: array for name, array in arrays.items() if name not in ("done", "said")}
             self._hmm = hmm_from_arrays(stored, config)
-        self._stages = self._list_stages(config)
-        self._total = sum(stage.steps for stage in self._stages)
-
-    def _list_stages(self, config: HmmConfig) -> list[_Stage]:
         steps = config.iterations
         stages = [
             _Stage("flat start", None, baum_welch, 2 * steps),
@@ -149,12 +142,13 @@ class _Training:
         while count < config.mixtures and frames >= 2 * count * FRAMES_A_GAUSSIAN * config.states * len(units):
             count *= 2
             stages.append(_Stage(f"{count} Gaussians", self._split, baum_welch, steps))
-        return [
+        self._stages = [
             *stages,
             _Stage("pronunciations again", self._choose_pronunciations, baum_welch, steps),
             _Stage("states in context", self._add_contexts, adapt_contexts, 0),
             _Stage("contexts", None, adapt_contexts, steps),
         ]
+        self._total = sum(stage.steps for stage in self._stages)
 
     def run(self) -> UnitHmm:
         """Take all steps that are not done yet; return the models."""
@@ -181,7 +175,6 @@ class _Training:
             stage.em(self._hmm, self._data, self._sequences, steps, after_step, self._map)
 
     def _report(self, stage: _Stage, figure: float | None) -> None:
-        """Store and report a step."""
         self._done += 1
         sequences = np.array([" ".join(units) for units in self._sequences])
         progress = {"said": sequences, "done": np.array(self._done)}
@@ -210,7 +203,6 @@ class _Training:
         self._hmm = replace(self._hmm, mixtures=self._hmm.mixtures.split())
 
     def _add_contexts(self) -> float:
-        """Add states in context; return their number."""
         silence, pause = self._inventory.silence, self._inventory.pause
         spoken = [tuple(silence if unit == pause else unit for unit in units) for units in self._sequences]
         typical_fit = float(np.mean([self._hmm.fit(x) for x in self._data]))
@@ -257,35 +249,24 @@ def _flat_start(
     for x, sequence in zip(data, sequences, strict=True):
         chain = expand_states(hmm, sequence)
         posterior = np.zeros((len(x), len(chain.plain)))
-        posterior[np.arange(len(x)), _guess_path(x[:, inventory.energy], chain, len(sequence))] = 1
+        energy = x[:, inventory.energy]
+        # silence lasts up to the first loud frame, and from the last one; the other states divide the rest evenly
+        above = np.nonzero(smooth_level(energy, ONSET_FRAMES) > 0)[0]
+        onset, offset = (int(above[0]), int(above[-1]) + 1) if len(above) else (0, len(energy))
+        silence = int((chain.positions == 0).sum())
+        speech = int(((chain.positions > 0) & (chain.positions < len(sequence) - 1)).sum())
+        path = np.empty(len(energy), np.intp)
+        path[:onset] = np.arange(onset) * silence // max(onset, 1)
+        path[onset:offset] = silence + np.arange(offset - onset) * speech // max(offset - onset, 1)
+        tail = len(energy) - offset
+        path[offset:] = silence + speech + np.arange(tail) * (len(chain.plain) - silence - speech) // max(tail, 1)
+        posterior[np.arange(len(x)), path] = 1
         statistics.add(x, collect_statistics(chain, posterior, np.zeros(len(chain.plain))))
     return replace(hmm, mixtures=reestimate_mixtures(hmm, statistics, data))
 
 
-def _guess_path(energy: NDArray[np.float32], chain: StateSequence, units: int) -> NDArray[np.intp]:
-    """Return a first guess of the state in each frame [shape=(T,)].
-
-    energy : log energy [shape=(T,)]
-    chain  : the states of the utterance, of so many units
-    Silence lasts up to the first loud frame, and from the last one; the other states divide the rest evenly.
-    """
-    above = np.nonzero(smooth_level(energy, ONSET_FRAMES) > 0)[0]
-    onset, offset = (int(above[0]), int(above[-1]) + 1) if len(above) else (0, len(energy))
-    silence = int((chain.positions == 0).sum())
-    speech = int(((chain.positions > 0) & (chain.positions < units - 1)).sum())
-    path = np.empty(len(energy), np.intp)
-    path[:onset] = np.arange(onset) * silence // max(onset, 1)
-    path[onset:offset] = silence + np.arange(offset - onset) * speech // max(offset - onset, 1)
-    tail = len(energy) - offset
-    path[offset:] = silence + speech + np.arange(tail) * (len(chain.plain) - silence - speech) // max(tail, 1)
-    return path
-
-
 def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> UnitHmm:
-    """Return models with densities for all states in context that have enough frames in an alignment of the data.
-
-    The new densities are copies of those without context.
-    """
+    """Return models with densities, at first copies, for states in context with enough frames in an alignment."""
     frames: Counter[str] = Counter()
     for x, sequence in zip(data, sequences, strict=True):
         if len(x) >= sum(hmm.table.count(unit) for unit in sequence):

@@ -50,10 +50,7 @@ class ArcWeights(NamedTuple):
 
 
 def arc_layout(arc_from: Index, arc_start: Index) -> ArcLayout:
-    """Return the layout of a network whose arcs are sorted by target.
-
-    arc_from, arc_start : as in ``kernels.paths.NetworkArrays``
-    """
+    """Return the layout of a network whose arcs are sorted by target."""
     states = len(arc_start)
     arc_to = np.repeat(np.arange(states), np.diff(arc_start, append=len(arc_from)))
     groups = _groups(arc_from, arc_start)
@@ -80,7 +77,6 @@ _Groups = list[tuple[Index, Index]]
 
 
 def _groups(arc_from: Index, arc_start: Index) -> _Groups:
-    """Return the states and arcs of all blocks."""
     members: dict[bytes, list[tuple[int, Index]]] = defaultdict(list)
     stops = np.append(arc_start[1:], len(arc_from))
     for state in np.flatnonzero(stops - arc_start >= LEAST_BLOCK):
@@ -97,10 +93,7 @@ def _groups(arc_from: Index, arc_start: Index) -> _Groups:
 
 
 def _order(states: int, groups: _Groups, source: Index, target: Index) -> Index:
-    """Return the states in their new order: the targets of each block, then the states one arc after them, and so on.
-
-    source, target : of the arcs outside blocks
-    """
+    """Return the states in their new order: the targets of each block, the states one arc after them, and so on."""
     if not groups:
         return np.arange(states)
     group, depth = np.full(states, len(groups)), np.zeros(states, np.intp)
@@ -124,7 +117,6 @@ def _runs(source: Index, target: Index) -> tuple[Index, Index]:
 
 
 def _blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
-    """Return ``blocks``, ``block_sources`` and ``block_arcs`` of ``ArcLayout``."""
     total = sum(len(arcs) for _, arcs in groups)
     widest = max((-(-len(targets) // PADDING_ROWS) * PADDING_ROWS for targets, _ in groups), default=PADDING_ROWS)
     blocks, sources, matrix = (

@@ -109,7 +109,6 @@ def _eliminated(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Row
 
 
 def _substituted(inverse: Rows, lower1: Rows, lower2: Rows, x: Rows) -> tuple[Array, Array]:
-    """Return the solution and the diagonal of the inverse from the factors."""
     values, variances = Rows(), Rows()
     value = next_value = variance = next_variance = 0.0
     beside = 0.0  # of the inverse, between the next row and the one after it
@@ -192,10 +191,7 @@ def _eliminate(
     main: Array, first: Array, second: Array, right: Array, row: int,
     t: int, x: Array, inverse: Array, lower1: Array, lower2: Array, previous: Array,
 ) -> None:  # fmt: skip
-    """Factorise one row, and eliminate it from its right-hand side.
-
-    previous : of the row before its coupling and second diagonal, and the second diagonal of the row before that
-    """
+    """Factorise a row, and eliminate it from its right-hand side; ``previous``: coupling, second diagonals before."""
     for c in range(x.shape[1]):
         pivot = main[row, c] - previous[0, c] * lower1[t + 1, c] - previous[2, c] * lower2[t, c]
         coupling = first[row, c] - previous[0, c] * lower2[t + 1, c]

@@ -28,10 +28,7 @@ _LOCK = RLock()
 
 
 def compiled(function: FunctionT) -> FunctionT:
-    """Compile a function at its first call; the result is cached on disk if possible.
-
-    It runs without the interpreter's lock. Divisions by zero give infinities, as in NumPy.
-    """
+    """Compile a function at its first call; the result is cached on disk if possible."""
     return cast(FunctionT, _Kernel(function, False))
 
 
@@ -52,10 +49,7 @@ def numba_works() -> bool:
 
 
 def pays(frames: int = 0) -> bool:
-    """Return whether to compute so many frames by the compiled form of a kernel that has one in NumPy, too.
-
-    It is used for a long recording, and wherever numba is loaded already.
-    """
+    """Return whether the compiled form of a kernel pays for so many frames: many, or numba is loaded already."""
     return (frames > LONG_FRAMES or "numba" in sys.modules) and numba_works()
 
 

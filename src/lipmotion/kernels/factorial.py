@@ -76,7 +76,6 @@ def factorial_posteriors(
 ) -> FactorialPosteriors:
     """Return the posteriors and expected counts of a recording in two loops.
 
-    logs    : log densities of the recording
     stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
         None: √T, or as many as ``ROOM_BYTES`` hold
     Log densities in single precision are processed in single precision where that loses nothing, which takes half the
@@ -114,7 +113,6 @@ class _Frame(NamedTuple):
 class _StepBack(NamedTuple):
     """The result of a step back to the frame before.
 
-    frame    : its posteriors
     backward : its backward probabilities times densities [shape=(Na, Nv)]
     audio_entered, visual_entered : [shapes=(U, U)], expected number of transitions from each unit to each, divided by
         the probability of the transition
@@ -217,7 +215,6 @@ class _Scaled:
     def back(self, before: Array, backward: Array, leaving: Array, t: int) -> _StepBack:
         """Return the result of a step back to frame ``t``.
 
-        before   : forward probabilities of frame ``t``
         backward : backward probabilities times densities of the frame after it
         leaving  : of the frame after it
         """
@@ -313,10 +310,7 @@ def _frame(joint: Double, pairs: Index, whole: float) -> _Frame:
 
 
 def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
-    """Return expected counts, from posteriors and from how often each unit was entered after each.
-
-    A state is left as often as it is entered, but for the first and last frame; it is kept in the other frames.
-    """
+    """Return expected counts, from posteriors and entries: a state is left as often as entered, but for the edges."""
     enter = entered * (loop.leave[:, None] * loop.enter)
     frames = posterior.reshape(-1, *loop.stay.shape)
     gained = frames[-1] - frames[0]
@@ -327,13 +321,11 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
 
 
 def _least_probability(loop: Loop) -> float:
-    """Return the least probability of a loop that is not 0."""
     parts = (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
     return min(float(part.min(where=part > 0, initial=1.0)) for part in parts)
 
 
 def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors:
-    """Return the result for a recording without a path."""
     counts = [
         LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
         for loop in (audio, visual)
@@ -344,9 +336,8 @@ def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -
 
 @compiled_to_rounding
 def _moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
-    """Return the last ``count`` columns of joint probabilities, moved one frame on along axis 0.
-
-    entering : [shape=(U, M)], probabilities of entering the first states
+    """Return the last columns of joint probabilities, moved one frame on along axis 0 by those of entering [shape=(U,
+    M)].
     """
     last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
     after = np.empty((len(before), count), before.dtype)
@@ -357,9 +348,8 @@ def _moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, c
 
 @compiled_to_rounding
 def _moved_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
-    """Return joint backward probabilities, moved one frame back along axis 1.
-
-    left : [shape=(N, U)], those of leaving the last states
+    """Return joint backward probabilities, moved a frame back along axis 1; ``left``: of leaving last states [shape=(N,
+    U)].
     """
     before, units = np.empty_like(after), left.shape[1]
     inner = after.shape[1] - units
@@ -435,7 +425,6 @@ def _backward(
 
 @compiled_to_rounding
 def _combine(one: Array, weight: float, other: Array, other_weight: float, into: Array) -> None:
-    """Fill in the weighted sum of two rows."""
     first, second = into.dtype.type(weight), into.dtype.type(other_weight)
     for j in range(len(into)):
         into[j] = first * one[j] + second * other[j]

@@ -147,9 +147,8 @@ class LogTransitions(NamedTuple):
         return before
 
     def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
-        """Return the best scores one frame on, along axis 0, and the decisions.
-
-        A decision is U for staying, U + 1 for the next state, else the unit that was left.
+        """Return the best scores a frame on, along axis 0, and decisions: U for staying, U + 1 for the next, else the
+        unit left.
         """
         units = len(self.leaving)
         after = score + self.stay[:, None]
@@ -186,7 +185,6 @@ def factorial_best_path(
 ) -> tuple[Index, Index, float]:
     """Return the most probable states of both loops [shapes=(T,)], and the log probability of path and recording.
 
-    logs    : log densities of the recording
     stretch : frames whose decisions are stored at once; those of the others are computed twice; None: as
         ``factorial_posteriors``
     Where there is no path: states 0, and -inf.  Of equally probable paths, any one.
@@ -221,14 +219,11 @@ _Decisions = tuple[NDArray[Any], NDArray[Any]]
 
 
 def _take_better(score: Array, decision: NDArray[Any], other: Array, number: int) -> None:
-    """Replace scores by greater ones, and their decisions by a number."""
     np.copyto(decision, number, where=other > score)
     np.maximum(score, other, out=score)
 
 
 class _FactorialSearch(NamedTuple):
-    """The search in both loops for one recording."""
-
     audio: LogTransitions
     visual: LogTransitions
     logs: FactorialLogLikelihoods

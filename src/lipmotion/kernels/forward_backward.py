@@ -139,7 +139,6 @@ def _backward(
 
 @compiled
 def _log_sum(x: float, y: float) -> float:
-    """Return log(exp(x) + exp(y))."""
     if x == y:
         return x + LOG_2
     high, low = max(x, y), min(x, y)

@@ -149,8 +149,6 @@ class ForwardBackwardNetwork(NamedTuple):
 
         log_emission : [shape=(T, G)], finite or -inf; the posteriors have the same precision
         columns      : [shape=(S,)], the density of the state at each place
-        frames       : [shape=(U,)], number of frames of each recording
-        Cost: as ``product_posteriors``.
         """
         return self.product_posteriors([log_emission], [columns], frames)
 
@@ -162,7 +160,6 @@ class ForwardBackwardNetwork(NamedTuple):
         log_emissions : one or more [shape=(T, G_c)], all of one precision, finite or -inf; the log density of the state
             at place s is the sum over chains of ``log_emissions[c][:, columns[c][s]]``
         columns       : of each chain [shape=(S,)]
-        frames        : [shape=(U,)], number of frames of each recording
         What is computed is ``log_forward_backward``: by ``_forward_backward`` in the precision of ``log_emissions``;
         for recordings of which that would lose what counts, in double precision, and at last in logarithms by NumPy.
         Cost: O(T·E), and exponentials of the chains' densities; in double precision twice, in logarithms some fifty
@@ -208,10 +205,7 @@ class ForwardBackwardNetwork(NamedTuple):
         return NetworkPosteriors(root, counts, log_likelihood + (frames - 1) * self.best_arc)
 
     def _in_logs(self, log_density: Array) -> NetworkPosteriors:
-        """Return the posteriors of one recording by NumPy, in logarithms, without underflow.
-
-        log_density : [shape=(T, S)], by place
-        """
+        """Return the posteriors of one recording, of log densities by place [shape=(T, S)], by NumPy in logarithms."""
         arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
         log_emission = log_density[:, self.layout.place]
         log_posterior, counts, log_likelihood = log_forward_backward(
@@ -274,8 +268,6 @@ def _probabilities(log: Array) -> tuple[Array, float]:
 def _weighted(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
     """Return the logarithm of the greatest probability of an arc, and the probabilities relative to that, in all forms
     that the kernels take.
-
-    arc_log : logarithms of probabilities [shape=(E,)]
     """
     relative, best = _probabilities(arc_log)
     weights = arc_weights(layout, relative, 0.0)

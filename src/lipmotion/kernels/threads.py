@@ -55,10 +55,7 @@ def _loaded_libraries(_: int) -> Any:
 
 
 def blas_kernels() -> list[str]:
-    """Return the name, version and processor of each BLAS in use, in alphabetical order.
-
-    Two machines, or two settings of ``OPENBLAS_CORETYPE``, round differently where these differ.
-    """
+    """Return the name, version and processor of each BLAS in use, sorted; where these differ, rounding does."""
     import numpy as np  # noqa: F401
     import scipy.linalg  # noqa: F401 # has a copy of its own
     from threadpoolctl import threadpool_info

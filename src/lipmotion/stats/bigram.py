@@ -16,7 +16,6 @@ from lipmotion.storage.schema import ArraySpec
 DISCOUNT = 0.5
 """Subtracted from the count of every pair of units that occurred."""
 BIGRAM = {"bigram": ArraySpec(np.float32, "U U", -1e4, 0.1)}
-"""How log probabilities are stored."""
 PERPLEXITY_STEPS = 200
 """After so many steps the shares of the units hardly change."""
 ROW_TOLERANCE = 0.01

@@ -38,10 +38,7 @@ class AffineStatistics:
 
 
 class TransformStatistics(NamedTuple):
-    """The result of the E-step for a transform.
-
-    log_likelihood : of the frames under the transform so far
-    """
+    """The statistics of the E-step for a transform, and the log likelihood of the frames under the transform so far."""
 
     statistics: AffineStatistics
     log_likelihood: float
@@ -58,10 +55,7 @@ def identity(size: int) -> Array:
 
 
 def transformed(features: NDArray[np.float32], transform: Array) -> NDArray[np.float32]:
-    """Return the features after a transform [shape=(T, D)].
-
-    features : [shape=(T, D)];  transform : [shape=(D, D + 1)]
-    """
+    """Return the features [shape=(T, D)] after a transform [shape=(D, D + 1)]."""
     matrix, offset = transform[:, :-1].T.astype(np.float32), transform[:, -1].astype(np.float32)
     return np.asarray(features @ matrix + offset, np.float32)
 
@@ -74,11 +68,7 @@ def log_determinant(transform: Array) -> float:
 def collect_transform_statistics(
     mixtures: Mixtures, features: NDArray[np.float32], densities: NDArray[np.intp], transform: Array
 ) -> TransformStatistics:
-    """Return the statistics of frames whose densities are known, with posteriors under the transform so far.
-
-    features  : before the transform [shape=(T, D)]
-    densities : the density of every frame [shape=(T,)]
-    """
+    """Return the statistics of frames of known densities [shapes=(T, D), (T,)], under the transform so far."""
     current = transformed(features, transform)
     precision, target = (np.zeros(features.shape) for _ in range(2))
     log_likelihood = len(features) * log_determinant(transform)
@@ -129,19 +119,15 @@ def improve_transform(
         for row in range(len(result)):
             columns = np.flatnonzero(free[row])
             cofactors = np.append(np.linalg.inv(result[:, :-1])[:, row], 0.0)
-            result[row, columns] = _best_row(result[row], columns, cofactors, statistics, row)
+            old = result[row]
+            fixed = np.where(np.isin(np.arange(len(old)), columns), 0.0, old)
+            inverse = np.linalg.inv(statistics.quadratic[row][np.ix_(columns, columns)])
+            target = (statistics.linear[row] - statistics.quadratic[row] @ fixed)[columns]
+            volume, offset = cofactors[columns], float(cofactors @ fixed)
+            # α maximises β log|α·a + b + offset| − α²·a / 2
+            a, b = float(volume @ inverse @ volume), float(volume @ inverse @ target) + offset
+            root = np.sqrt(b * b + 4 * a * statistics.count)
+            alphas = np.array([(-b + root) / (2 * a), (-b - root) / (2 * a)])
+            values = statistics.count * np.log(np.abs(alphas * a + b)) - alphas * alphas * a / 2
+            result[row, columns] = np.asarray((alphas[int(values.argmax())] * volume + target) @ inverse)
     return result
-
-
-def _best_row(old: Array, columns: NDArray[np.intp], cofactors: Array, statistics: AffineStatistics, row: int) -> Array:
-    """Return the best values of some columns of a row, given the other columns, and the cofactors of the other rows."""
-    fixed = np.where(np.isin(np.arange(len(old)), columns), 0.0, old)
-    inverse = np.linalg.inv(statistics.quadratic[row][np.ix_(columns, columns)])
-    target = (statistics.linear[row] - statistics.quadratic[row] @ fixed)[columns]
-    volume, offset = cofactors[columns], float(cofactors @ fixed)
-    # α maximises β log|α·a + b + offset| − α²·a / 2
-    a, b = float(volume @ inverse @ volume), float(volume @ inverse @ target) + offset
-    root = np.sqrt(b * b + 4 * a * statistics.count)
-    alphas = np.array([(-b + root) / (2 * a), (-b - root) / (2 * a)])
-    values = statistics.count * np.log(np.abs(alphas * a + b)) - alphas * alphas * a / 2
-    return np.asarray((alphas[int(values.argmax())] * volume + target) @ inverse)

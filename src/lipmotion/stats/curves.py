@@ -31,10 +31,7 @@ def with_dynamics(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def mark_known_dynamics(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return where Δ and Δ² are known [shape=(T,)]: in frames that are known with both neighbours.
-
-    mask : where the static values are known [shape=(T,)]
-    """
+    """Return in which frames Δ and Δ² are known [shape=(T,)]: those that are known with both neighbours."""
     inner = np.zeros_like(mask)
     inner[1:-1] = mask[:-2] & mask[1:-1] & mask[2:]
     return inner

@@ -29,10 +29,8 @@ MIN_WEIGHT, MAX_WEIGHT = 0.5, 1.5
 
 @dataclass(frozen=True, eq=False)
 class Mixtures:
-    """G mixture densities of M diagonal Gaussians each.
-
-    log_weights : [shape=(G, M)], -inf for an unused component
-    means, variances : [shape=(G, M, D)]
+    """G mixtures of M diagonal Gaussians: log weights [shape=(G, M)], -inf if unused, means and variances [shape=(G, M,
+    D)].
     """
 
     log_weights: NDArray[np.float32]
@@ -153,9 +151,8 @@ class Mixtures:
     def responsibilities(
         self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Return the posteriors of the components of one density, times the density's own posterior [shape=(N, M)].
-
-        x, weights : as in ``em_update``
+        """Return the posteriors of the components of a density, times its own [shape=(N, M)]; arguments as of
+        ``em_update``.
         """
         components = self.log_components(x, np.array([density]))[:, 0]
         components -= components.max(axis=1, keepdims=True)
@@ -186,10 +183,7 @@ class QuadraticForm:
         return values
 
     def log_likelihood(self, x: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the log density of every frame under every mixture [shape=(T, G)].
-
-        x : [shape=(T, D)]
-        """
+        """Return the log density of every frame under every mixture [shape=(T, G)]."""
         result = np.empty((len(x), self.constant.shape[1]), np.float32)
         for start in range(0, len(x), BLOCK):
             components = self.log_components(x[start : start + BLOCK])
@@ -203,9 +197,7 @@ class QuadraticForm:
         return result
 
 
-def normalised_components(
-    components: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+def normalised_components(components: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
     """Return the log density of mixtures [shape=(T, G)], and posteriors of their components [shape=(T, M, G)].
 
     components : log weight + log density of each [shape=(T, M, G)], overwritten by the posteriors

@@ -75,19 +75,13 @@ class SequenceNetwork(ABC):
 
     @abstractmethod
     def forward(self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None) -> tuple[Array, Any]:
-        """Return the last hidden layer of a batch [shape=(B, T, H)], and, with dropout, what ``backward`` needs.
-
-        inputs : [shape=(B, T, I)]
-        inside : the time steps before the end of each sequence [shape=(B, T)]
+        """Return the last hidden layer of a batch [shape=(B, T, H)], and what ``backward`` needs; ``inside``: before
+        each end.
         """
 
     @abstractmethod
     def backward(self, slope: Array, passed: Any) -> list[Array]:
-        """Return the gradient for every parameter but those of ``output``.
-
-        slope  : gradient for the last hidden layer [shape=(B, T, H)]
-        passed : from ``forward``
-        """
+        """Return the gradient of all parameters but ``output`` from that of the last layer [shape=(B, T, H)]."""
 
 
 class TrainingSequence(NamedTuple):
@@ -102,8 +96,6 @@ class TrainingSequence(NamedTuple):
 class TrainingPlan:
     """How a network is trained.
 
-    steps      : number of optimiser steps
-    batch_size : sequences of a step
     rate       : largest learning rate
     dropout    : share of the hidden units that are switched off at random
     seed       : of dropout and of the order of sequences
@@ -128,7 +120,6 @@ def fit_network(
     """Return a network that is trained from the given one for least weighted squared error.
 
     draw    : returns a version of a sequence, by a random generator and the number of the sequence
-    count   : number of sequences
     weights : of the outputs [shape=(O,)]
     report  : called after every step with its number, from 1, and the mean error
     Source: Loshchilov & Hutter 2019 (AdamW).
@@ -165,8 +156,6 @@ def fit_network(
 
 
 class _AdamW:
-    """Moments of the gradients of some parameters, which it changes in place."""
-
     def __init__(self, parameters: Sequence[Array]) -> None:
         self.parameters = parameters
         self.means = [np.zeros_like(array) for array in parameters]

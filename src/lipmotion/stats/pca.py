@@ -26,10 +26,8 @@ CONSTANT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Pca:
-    """The affine space of principal components.
-
-    mean  : [shape=(D,)]
-    basis : [shape=(K, D)], orthonormal rows, most variance first
+    """The affine space of principal components: mean [shape=(D,)], orthonormal rows [shape=(K, D)], most variance
+    first.
     """
 
     mean: NDArray[np.float64]
@@ -68,7 +66,6 @@ def find_principal_axes(products: NDArray[np.float64], components: int, least: f
     """Return the first principal components [shape=(K, D)] of centred values X, given XᵀX or their covariance.
 
     products : [shape=(D, D)];  least : largest eigenvalue that rounding alone may produce
-    Signs are those of ``fit_pca``.
     """
     squares, vectors = np.linalg.eigh(products)
     return _fix_signs(vectors[:, _find_largest(squares, components, least)].T)
@@ -88,10 +85,7 @@ def check_orthonormal(name: str, basis: NDArray[Any]) -> None:
 
 
 def _find_largest(squares: NDArray[np.float64], count: int, least: float) -> NDArray[np.intp]:
-    """Return the indices of the largest of ascending numbers, without those that are rounding errors.
-
-    least : largest value that rounding alone may produce
-    """
+    """Return the indices of the largest of ascending numbers, without rounding errors, up to ``least``."""
     indices = np.arange(len(squares))[::-1][:count]
     return indices[squares[indices] > max(RANK_TOLERANCE * squares[-1], least)]
 

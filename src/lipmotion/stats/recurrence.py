@@ -60,8 +60,6 @@ class _CellPass(NamedTuple):
 class RecurrentNetwork(SequenceNetwork):
     """Layers of long short-term memory cells, as many forward as backward in time, and a linear output.
 
-    layers : from the inputs to the outputs; each one's inputs are the outputs of the cells of the one before
-    output : the linear map from the last layer
     Source: Graves & Schmidhuber 2005, without connections from cells to gates.
     """
 
@@ -115,10 +113,7 @@ class RecurrentNetwork(SequenceNetwork):
 
 
 def make_recurrent_network(inputs: int, cells: int, outputs: int, layers: int, seed: int) -> RecurrentNetwork:
-    """Return an untrained network with random weights, uniform between ± 1 / √cells.
-
-    cells : of every layer, in either direction
-    """
+    """Return an untrained network of layers of cells, with random weights, uniform between ± 1 / √cells."""
     rng, bound = np.random.default_rng(seed), 1 / np.sqrt(cells)
 
     def uniform(*shape: int) -> Array:
@@ -167,10 +162,7 @@ def _run_layer(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPass
 
 
 def _differentiate_layer(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> tuple[list[Array], Array]:
-    """Return the gradients of the parameters of one layer, and that of its inputs [shape=(B, T, I)].
-
-    slope : of its outputs [shape=(B, T, 2·H)]
-    """
+    """Return the gradients of a layer's parameters and inputs [shape=(B, T, I)], from that of its outputs."""
     _, length, batch, cells = passed.cells.shape
     forth, back = _both_directions(slope)
     of_outputs = np.stack([forth[:, :, :cells], back[:, :, cells:]])

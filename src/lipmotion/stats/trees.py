@@ -21,18 +21,12 @@ Likelihood = Callable[[Array], Array]
 """Function of N sufficient statistics [shape=(N, K)], the number of frames first: returns the log likelihood of each
 under the density estimated from it [shape=(N,)]."""
 MIN_VARIANCE = 1e-12
-"""Smallest variance of a Gaussian."""
 TIE = 1e-10
 """Gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal."""
 
 
 class Question(NamedTuple):
-    """The question whether the name at one position of a context is one of some.
-
-    position : 0 the left neighbour, 1 the unit, 2 the right neighbour
-    name     : of the question
-    members  : the names for which the answer is yes
-    """
+    """Whether the name at a position (0 left, 1 the unit, 2 right) is one of ``members``."""
 
     position: int
     name: str
@@ -262,11 +256,7 @@ def _check_nodes(asked: NDArray[np.int32], no: NDArray[np.int32], questions: int
 
 @dataclass(frozen=True, eq=False)
 class RegressionStatistics:
-    """Sufficient statistics of a regression of targets r [shape=(P,)] on inputs z [shape=(F,)]; accumulated in place.
-
-    products : Σ z zᵀ [shape=(F, F)]
-    targets  : Σ z rᵀ [shape=(F, P)]
-    """
+    """Statistics of a regression, accumulated in place: Σ z zᵀ [shape=(F, F)], Σ z rᵀ [shape=(F, P)]."""
 
     products: Array
     targets: Array

@@ -64,6 +64,5 @@ def _alike(phones: Iterable[str]) -> Pronunciation:
 
 @cache
 def _pronunciations() -> frozenset[Pronunciation]:
-    """Return the pronunciations of all words of the dictionary."""
     text = (find_english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8").lower()
     return frozenset(_alike(line.split()[1:]) for line in text.splitlines())

@@ -98,10 +98,7 @@ def remove_known_tags(text: str) -> str:
 
 
 def time_moods(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodKey, ...]:
-    """Return the moods of tags at the times of the words that they stand before; the last ones at the end of speech.
-
-    units : phones in time, with the words that they are of; without words the phones count instead
-    """
+    """Return the moods of tags at the times of the words (or phones) after them; the last ones at the end of speech."""
     words = [(span.start_s, span.end_s) for span in group_words(units) if span.label]
     spans = words or [(span.start_s, span.end_s) for span in units]
     if not tags or not spans:

@@ -70,9 +70,8 @@ def list_recognised_phones(units: Timeline[Unit]) -> list[RecognisedPhone]:
 
 
 def restore_confidences(units: Timeline[Unit], recognised: Iterable[RecognisedPhone]) -> Timeline[Unit]:
-    """Return phones in time in which those that are as they were recognised have their confidence.
-
-    recognised : of ``list_recognised_phones``, when the phones were written
+    """Return phones in time in which those that are still as recognised (``list_recognised_phones``) have their
+    confidence.
     """
     confidence_of = {phone[:3]: phone.confidence for phone in recognised}
     return Timeline(

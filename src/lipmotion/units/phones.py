@@ -127,21 +127,14 @@ def mark_closing_phones(units: Timeline[Unit]) -> list[bool]:
 
 
 def describe_unknown_phone(phone: str, where: str = "") -> str:
-    """Return the error message for a phone that is not in the inventory.
-
-    phone : empty if a model recognised a unit of several phones
-    where : where the phone was found, with a blank before it
-    """
+    """Return the error message for a phone, empty or unknown, found ``where`` (with a blank before it)."""
     if not phone:
         return f"a unit without a phone{where}: only the model that recognised it can use it; give phones instead"
     return f"unknown phone {shorten(repr(phone))}{where}; the phones: {' '.join(PHONES)}"
 
 
 def find_similar_phone(phone: str, known: Collection[str]) -> str:
-    """Return the phone itself if it is known, else the most similar known phone.
-
-    Its similar phones (``SIMILAR_PHONES``) come first, then the similar phones of those, then its viseme, then any.
-    """
+    """Return a known phone, the same or most similar: ``SIMILAR_PHONES``, those of these, its viseme, or any."""
     queue = [phone]
     for candidate in queue:
         if candidate in known:

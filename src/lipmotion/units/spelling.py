@@ -42,10 +42,7 @@ PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d",
 
 
 def plain_text(text: str) -> str:
-    """Return a text in Unicode's NFKC form, with straight apostrophes, without characters that nobody sees.
-
-    ``2½`` becomes ``2 1⁄2``.
-    """
+    """Return a text in NFKC form (``2½``: ``2 1⁄2``), with straight apostrophes, without invisible characters."""
     if not text.isascii():
         marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
         if marks:  # at most so many on a letter, as Unicode Standard Annex 15: they are sorted in quadratic time
@@ -71,10 +68,8 @@ def remove_accents(word: str) -> str:
 
 
 def guess_pronunciation(word: str) -> tuple[str, ...]:
-    """Return a guessed pronunciation of a lower-case word, in ARPAbet.
-
-    Accents are left out: ``é`` is read as ``e``.
-    Raises InputError: a character is not a letter of the Latin alphabet.
+    """Return a guessed pronunciation in ARPAbet of a word, without its accents. Raises InputError: other letters than
+    Latin.
     """
     plain = remove_accents(word)
     foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", remove_accents(letter)))

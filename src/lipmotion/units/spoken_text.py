@@ -134,10 +134,7 @@ def read_line_words(text: str, where: str) -> tuple[str, ...]:
 def time_words(
     text: str, start_s: float | None = None, end_s: float | None = None, where: str = "the transcript"
 ) -> list[TimedWord]:
-    """Return the words of a line with the times of the whole: several words share them by their letters.
-
-    Raises InputError: as ``read_line_words``.
-    """
+    """Return the words of a line with times, shared by their letters. Raises InputError: as ``read_line_words``."""
     words = read_line_words(text, where)
     if len(words) < 2 or start_s is None or end_s is None:
         return [TimedWord(word, start_s, end_s) for word in words]

@@ -111,10 +111,7 @@ def find_stressed_vowel(word: str, vowels: Sequence[str]) -> int | None:
 
 
 def _stress_phones(word: str, phones: Sequence[str]) -> list[int | None]:
-    """Return the stress of each phone of a word; a syllable begins with at most two consonants.
-
-    Deviation from the maximal onset principle (Kahn 1976): s before a stop stays with the syllable before.
-    """
+    """Return the stress of each phone; syllables begin with two consonants at most (Kahn 1976), not s and a stop."""
     nuclei = [place for place, phone in enumerate(phones) if phone in NUCLEI]
     if not nuclei:
         return [None] * len(phones)

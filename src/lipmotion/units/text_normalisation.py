@@ -1,20 +1,19 @@
-"""Text normalisation: a transcript as people write it, to the words that are spoken; how long a text may be."""
+"""A text as people write it: its sentences, the words that are spoken, and how long it may be."""
 
 from __future__ import annotations
 
 import html
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 
-from lipmotion.errors import AlignmentError, InputError
+from lipmotion.errors import AlignmentError, InputError, shorten
 from lipmotion.units.lexicon import SOUNDED, expand_lengthened, in_dictionary
 from lipmotion.units.spelling import normalise_text, plain_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
-"""A Chinese character."""
 INITIALS = re.compile("[A-Z]{2,5}s?")
 """What may be letters that are said one by one."""
 RANGE = re.compile(
@@ -40,10 +39,7 @@ ALWAYS_ALLOWED_PHONES = 1000
 
 
 def split_words(text: str) -> tuple[str, ...]:
-    """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money as they are said.
-
-    Of what may be said in several ways, the usual one. Raises InputError: there is no word in it.
-    """
+    """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money as they are said."""
     return tuple(word for token in require_tokens(text) for word in list_readings(token)[0])
 
 
@@ -80,7 +76,6 @@ def tokenise(text: str) -> tuple[str, ...]:
 
 @cache
 def _scanner() -> re.Pattern[str]:
-    """Return what finds written forms, signs, words, and numbers beside letters."""
     word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
     forms = [rf"(?:{form})(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
@@ -132,3 +127,76 @@ def check_phones(count: int, duration_s: float) -> None:
             f"{count} units in time, required at most {allowed} for {duration_s:.2f} s of sound; give those of this "
             "recording"
         )
+
+
+MAX_CHARACTERS = 50_000
+"""Most characters of a text: about an hour of speech."""
+LONGEST_SENTENCE = 400
+"""A longer sentence is divided at a comma, else between words; in characters."""
+LONGEST_WORD = 200
+"""Most characters without a blank in scripts that have blanks; a longer one is no word, but would be spoken for
+minutes."""
+ABBREVIATIONS = (
+    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx"
+)
+"""What ends in a full stop that does not end a sentence, without its last stop."""
+_ABBREVIATED = frozenset(ABBREVIATIONS.split())
+_END = re.compile(r"""(?:[.!?…]+["')\]”’»]*(?=\s)|[。！？]+["')\]”’»」』]*)\s*""")
+_BREAK = re.compile(r"[,;:–—、，；：]\s*|\s-+\s")
+
+
+def clean_text(text: str) -> str:
+    """Return a text without control characters and surrogates; an empty line ends a sentence."""
+    ended = re.sub(r"(\w)[ \t]*\r?\n[ \t]*\r?\n", r"\1.\n", text)
+    return " ".join(
+        "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended).split()
+    )
+
+
+def split_sentences(text: str) -> list[str]:
+    """Return the sentences of a text, in order, each with a word in it and of at most ``LONGEST_SENTENCE`` characters.
+
+    What stands between two sentences without a word, such as a row of dots, is left out.
+    Raises InputError: more than ``MAX_CHARACTERS``, no word, or a word of more than ``LONGEST_WORD`` characters.
+
+    >>> split_sentences("Dr. Smith said: wait! Then he left...")
+    ['Dr. Smith said: wait!', 'Then he left...']
+    """
+    if len(text) > MAX_CHARACTERS:
+        raise InputError(
+            f"the text has {len(text)} characters, required at most {MAX_CHARACTERS}, about an hour of speech; "
+            "speak it in parts"
+        )
+    plain = clean_text(text)
+    longest = max(plain.split(), key=len, default="")
+    if len(longest) > LONGEST_WORD and longest.isascii():
+        raise InputError(
+            f"a word of {len(longest)} characters ({shorten(longest)!r}), required at most {LONGEST_WORD}; "
+            "write words with blanks between them"
+        )
+    parts = []
+    for sentence in _divide(plain):
+        rest = sentence
+        while len(rest) > LONGEST_SENTENCE:
+            breaks = [match.end() for match in _BREAK.finditer(rest, LONGEST_SENTENCE // 2, LONGEST_SENTENCE)]
+            blank = rest.rfind(" ", 1, LONGEST_SENTENCE)
+            cut = breaks[-1] if breaks else blank if blank > 0 else LONGEST_SENTENCE
+            parts.append(rest[:cut].strip())
+            rest = rest[cut:].strip()
+        parts.append(rest)
+    sentences = [part for part in parts if find_words(part)]
+    if not sentences:
+        raise InputError(f"the text {shorten(plain)!r} holds no word; give the words to be spoken")
+    return sentences
+
+
+def _divide(text: str) -> Iterator[str]:
+    start = 0
+    for end in _END.finditer(text):
+        before = text[start : end.start()].rsplit(" ", maxsplit=1)[-1].lstrip("\"'(“‘«")
+        is_initial = len(before) == 1 and before.isalpha() and before.isupper() and before != "I"
+        if text[end.start()] == "." and (before.lower() in _ABBREVIATED or is_initial):
+            continue
+        yield text[start : end.end()].strip()
+        start = end.end()
+    yield text[start:].strip()

@@ -92,10 +92,7 @@ class UnitSet:
         return self.unit_of_phone[phone]
 
     def unit_of(self, label: Unit) -> str:
-        """Return the unit of a label: that of its phone or, where it has no phone, its own.
-
-        Raises InputError: an unknown phone, or a unit that this set does not have.
-        """
+        """Return the unit of a label, or of its phone. Raises InputError: an unknown phone or unit."""
         if label.phone:
             return self.unit(label.phone)
         if label.unit not in self.units:

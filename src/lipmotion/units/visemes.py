@@ -63,7 +63,6 @@ SHAPES: dict[str, MouthShape] = {
 OPTIONAL = "".join(name for name, shape in SHAPES.items() if shape.fallback)
 REST = "X"
 LETTERS = {name.lower(): name for name in SHAPES}
-"""Shapes by Rhubarb's letters."""
 BLAIR = {shape.blair.lower(): name for name, shape in SHAPES.items()} | {"wq": "F"}
 """Shapes by Preston Blair's names; his E is another shape than the letter."""
 

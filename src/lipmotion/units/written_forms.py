@@ -138,7 +138,6 @@ def _number(digits: str) -> Iterator[str]:
 
 
 def _decimal(digits: str) -> Iterator[str]:
-    """Yield the readings of a decimal."""
     whole, _, part = digits.replace(",", "").partition(".")
     for first in (_cardinal(whole), "oh", "") if whole == "0" else (_cardinal(whole),) if whole else ("", "zero"):
         yield f"{first} point {_spelled(part)}"
@@ -181,13 +180,11 @@ def _hour(digits: str, later: int = 0) -> str:
 
 
 def _roman(numeral: str) -> str:
-    """Return a Roman number in digits."""
     values = [{"I": 1, "V": 5, "X": 10}[letter] for letter in numeral.upper()]
     return str(sum(-one if one < after else one for one, after in zip(values, [*values[1:], 0], strict=True)))
 
 
 def _thousands(amount: str) -> str:
-    """Return so many thousands in digits."""
     return str(round(float(amount.replace(",", "")) * 1000))
 
 
@@ -310,10 +307,7 @@ NUMERIC: Forms = (
     ),
     (rf"{S}\s?0?\.(?!00)(\d\d)", "{2:c} {1:S}"),
     (rf"{S}\s?({NUMBER})\.00", "{2} {1:s}|{2} {1:s} even"),
-    (
-        rf"{S}\s?({NUMBER})\.(\d\d)",
-        "{2:i} {1:s} and {3:c} {1:S}|{2:i} {1:s} {3:c} {1:S}|{2:i} {3:p}|{2:i} {1:s} {3:p}",
-    ),
+    (rf"{S}\s?({NUMBER})\.(\d\d)", "{2:i} {1:s} and {3:c} {1:S}|{2:i} {1:s} {3:c} {1:S}|{2:i} {3:p}|{2:i} {1:s} {3:p}"),
     (rf"{S}\s?{R}(?:\s?[-–]\s?{S})?", "{2:i} {1:s}|{2:i} {1:b}|{2:*} {1:s}"),
     (rf"{R}\s?([$£€¥₹₩¢])", "{1:i} {2:s}|{1:i} {2:b}|{1:*} {2:s}"),
     (r"'?(\d0)'?s", "{1:d}|{1} seconds"),

@@ -25,7 +25,6 @@ ROUNDING_VARIANCE = 1 / 12
 FIELD_SCALE = 2
 """Height and width of the field of noise, in heights and widths of a picture."""
 WHITE = 255
-"""The largest level of a colour."""
 LARGEST_SPREAD_PX = 3.0
 """Noise is taken to be spread over no more: what is smoother is movement."""
 MIN_CORRELATION = 0.02
@@ -82,9 +81,6 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
 class NoiseSource:
     """Adds noise to the pictures of one video.
 
-    noise : of the camera
-    size  : height and width of the pictures, px
-    seed  : of the video
     Noise is drawn once, for a field of twice the height and width that has no edges, and each frame is given
     another part of it: that is many times as fast as new noise for every frame.
     """
@@ -154,7 +150,6 @@ NOISE_ARRAYS = {
     "noise_covariance": ArraySpec(np.float64, "3 3", -(255.0**2), 255.0**2),
     "noise_spread_px": ArraySpec(np.float64, "2", 0, LARGEST_SPREAD_PX),
 }
-"""The arrays of the noise of a camera."""
 
 
 def _neighbours(values: NDArray[np.float32], axis: int) -> Array:

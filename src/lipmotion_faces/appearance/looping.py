@@ -184,7 +184,6 @@ _DYNAMICS = ((-2, 0.125), (-1, 0.375), (0, 0.375), (1, 0.125))
 class Join:
     """A place where frames that were not neighbours in the background follow one another, or its direction changes.
 
-    at    : the frame of the order before which it is
     kind  : ``turn``, the background is then shown the other way round, or ``jump``
     cost  : of a turn, the speed of the background relative to its median; of a jump, the difference of the frames and
             of their neighbours relative to the ordinary difference of neighbours
@@ -227,8 +226,6 @@ def loop_order(
 ) -> LoopOrder:
     """Return an order of a background's frames for speech of any length.
 
-    descriptors : of every frame of the background
-    count       : frames that are wanted
     rate_hz     : frame rate of the background
     usable      : the frames that may be shown, all where it is not given [shape=(T,)]
     cuts        : frames before which the camera changes
@@ -268,10 +265,8 @@ class _Joins:
 
 
 class _Plan:
-    """A background, and what joins in it would cost.
-
-    scenes   : first frame of each part without a cut, and the one after its last
-    restless : cost of turning at each frame, or of beginning or ending there [shape=(T,)]
+    """A background, its scenes (first frame, end), and the cost of turning, beginning or ending at each frame
+    [shape=(T,)].
     """
 
     def __init__(
@@ -281,7 +276,15 @@ class _Plan:
         self._scene_of = np.full(len(allowed), -1)
         for index, (start, stop) in enumerate(self.scenes):
             self._scene_of[start:stop] = index
-        self.busy = _find_blinks(descriptors.eyes, rate_hz, self.scenes)
+        from scipy.ndimage import binary_dilation
+
+        change = np.zeros(len(descriptors.eyes))
+        for first, last in self.scenes:
+            steps = np.sqrt(np.square(np.diff(descriptors.eyes[first:last], axis=0)).mean(axis=1))
+            change[first : last - 1] = steps
+            change[first + 1 : last] = np.maximum(change[first + 1 : last], steps)
+        ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
+        self.busy = binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
         self.restless = _measure_restlessness(descriptors, self.scenes) + BUSY_COST * self.busy
         self._least = max(1, round(LEAST_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
@@ -377,28 +380,10 @@ def fade_frames(rate_hz: float) -> int:
 
 
 def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int, int]]:
-    """Return the parts of a background between cuts and frames that may not be shown.
-
-    allowed : the frames that may be shown [shape=(T,)]
-    cuts    : frames before which the camera changes
-    Each part is its first frame and the one after its last.
-    """
+    """Return the parts between cuts (first frame, end) of frames that may be shown [shape=(T,)]."""
     change = np.flatnonzero(np.diff(allowed.astype(int))) + 1
     ends = sorted({0, len(allowed), *change.tolist(), *(cut for cut in cuts if 0 < cut < len(allowed))})
     return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]
-
-
-def _find_blinks(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
-    """Return the frames in a blink, or near one: the eyes change much [shape=(T,)]."""
-    from scipy.ndimage import binary_dilation
-
-    change = np.zeros(len(eyes))
-    for start, stop in scenes:
-        steps = np.sqrt(np.square(np.diff(eyes[start:stop], axis=0)).mean(axis=1))
-        change[start : stop - 1] = steps
-        change[start + 1 : stop] = np.maximum(change[start + 1 : stop], steps)
-    ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
-    return binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
 
 
 def _measure_restlessness(descriptors: FrameDescriptors, scenes: Sequence[tuple[int, int]]) -> Array:

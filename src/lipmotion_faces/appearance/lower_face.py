@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.errors import InputError
 from lipmotion.motion import mouth_region
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
@@ -44,22 +45,14 @@ CHEEK_PX = 12, 10
 
 @dataclass(frozen=True)
 class FaceShape:
-    """How large the lower face of a person is, in px.
-
-    half_width_px : of the part that is replaced
-    bottom_px     : where that part ends, below the eyes
-    """
+    """How large the lower face is, in px: half the width of the replaced part, and its end below the eyes."""
 
     half_width_px: float
     bottom_px: float
 
 
 def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
-    """Return the shape of the part that is replaced.
-
-    jaw_half_width : half the distance between the ends of the jaw line, eye distances
-    chin_px        : how far the tip of the chin is below the eyes in all frames [shape=(T,)]
-    """
+    """Return the shape of the replaced part, by how far the chin is below the eyes in all frames [shape=(T,)]."""
     half = float(np.clip(JAW_SHARE * jaw_half_width * EYE_DISTANCE_PX, NARROWEST_PX, WIDEST_PX))
     highest = float(np.percentile(chin_px, 1))
     return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
@@ -81,9 +74,8 @@ def region_map(face_to_frame: Array, scale: float, corner: tuple[float, float] =
 
 
 def best_scale(face_to_frame: Array) -> int:
-    """Return the samples a pixel with which a person's footage loses nothing: 1 to ``LARGEST_SCALE``.
-
-    face_to_frame : maps of the frames [shape=(T, 2, 3)]
+    """Return the samples a pixel, 1 to ``LARGEST_SCALE``, with which footage of these maps [shape=(T, 2, 3)] loses
+    nothing.
     """
     size = np.sqrt(np.abs(np.linalg.det(face_to_frame[:, :, :2])))
     return int(np.clip(np.floor(np.median(size) + 0.25), 1, LARGEST_SCALE))
@@ -112,10 +104,8 @@ def mouth_ellipse(scale: int) -> Mask:
 
 
 def cheek_light(mouths: NDArray[Any]) -> Array:
-    """Return the light on the face in mouth pictures: the mean red, green and blue of their corners [shape=(T, 3)].
-
-    mouths : [shape=(T, 56 · scale, 72 · scale, 3)], grey levels
-    Raises InputError: pictures of another size.
+    """Return the mean red, green, blue of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another
+    size.
     """
     scale = mouths.shape[1] // mouth_region.HEIGHT if mouths.ndim == 4 else 0
     required = (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale, 3)
@@ -154,10 +144,7 @@ between those of different people up to 0.76, and 0.83 twice in 228 pairs: GRID,
 
 
 def face_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
-    """Return what is compared of the lower faces of a recording: float32 array [shape=(N,)].
-
-    pictures : of the lower face, in px of the face [shape=(T, 128, 128, 3)], at least one; or their mean
-    """
+    """Return what is compared of the lower faces [shape=(N,)], from pictures [shape=(T, 128, 128, 3)] or their mean."""
     mean = pictures.reshape(-1, HEIGHT, WIDTH, 3).mean(axis=(0, 3), dtype=np.float64)
     part = mean[:110:3, 20:108:3].ravel()  # nose, cheeks and mouth, without neck and background
     centred = part - part.mean()
@@ -251,5 +238,4 @@ def _move_columns(picture: Pictures, chin_px: float, drops: Array, scale: int) -
 
 def _rise(values: Array, start: Array | float, stop: Array | float) -> Array:
     """Return 0 up to ``start``, 1 from ``stop`` on, and a smooth rise between (3t² − 2t³)."""
-    share = np.clip((values - start) / (np.asarray(stop) - start), 0, 1)
-    return share * share * (3 - 2 * share)
+    return smooth_step((values - start) / (np.asarray(stop) - start))

@@ -59,10 +59,7 @@ class MotionMap:
     coefficients: Floats
 
     def predict(self, motion: Motion) -> Floats:
-        """Return the values at every frame of a motion [shape=(T, V)].
-
-        Raises InputError: the motion has not all channels, or values that are not finite.
-        """
+        """Return the values at every frame [shape=(T, V)]. Raises InputError: a channel is missing, or not finite."""
         return self._regressors(channel_values(motion, self.names)) @ self.coefficients
 
     def _regressors(self, values: Array) -> Floats:
@@ -73,10 +70,7 @@ class MotionMap:
 
 
 def channel_values(motion: Motion, names: tuple[str, ...]) -> Array:
-    """Return some channels of a motion [shape=(T, len(names))].
-
-    Raises InputError: a channel is missing, or values are not finite.
-    """
+    """Return some channels of a motion [shape=(T, len(names))]. Raises InputError: one is missing, or not finite."""
     missing = [name for name in names if name not in motion.names]
     if missing:
         raise InputError(
@@ -127,9 +121,8 @@ def motion_map_arrays(fitted: MotionMap) -> dict[str, NDArray[Any]]:
 
 
 def motion_map_from_arrays(arrays: Arrays, values: int) -> MotionMap:
-    """Deserialise a regression with ``values`` targets.
-
-    Raises ModelFormatError: an array is missing, unknown, out of range, or the arrays do not fit together.
+    """Deserialise a regression with ``values`` targets. Raises ModelFormatError: an array is missing, unknown or does
+    not fit.
     """
     with format_errors("the map from motion to pictures", "build the face again"):
         refuse_undeclared(arrays, MOTION_MAP)
@@ -152,4 +145,3 @@ MOTION_MAP = {
     "centres": ArraySpec(np.float32, "N E"),
     "coefficients": ArraySpec(np.float32, "R V"),
 }
-"""The arrays of a regression."""

@@ -39,6 +39,8 @@ from lipmotion_faces.appearance.candidates import (
     LARGEST_COEFFICIENT,
     LARGEST_DETAIL,
     Candidates,
+    RefinementOptions,
+    Refiner,
     choose_candidates,
     draw_to_recorded,
     make_candidates,
@@ -67,7 +69,6 @@ from lipmotion_faces.appearance.motion_map import (
     motion_map_arrays,
     motion_map_from_arrays,
 )
-from lipmotion_faces.appearance.refinement import RefinementOptions, Refiner
 
 Array = NDArray[np.float64]
 Values = NDArray[np.floating[Any]]
@@ -83,7 +84,6 @@ JAW_CANDIDATES = 120
 """Recorded lower faces whose detail the jaw has."""
 JAW_OPTIONS = RefinementOptions(steadiness=0.3)
 PICTURES_PER_BLOCK = 256
-"""Pictures that are projected at a time."""
 EDGE_PX = 3
 """The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
 LIP_DISTANCES = ("opening", "width", "outer")
@@ -125,12 +125,7 @@ class FootagePictures:
 
 @dataclass(frozen=True, eq=False)
 class FaceCodes:
-    """What the lower face is like in every frame.
-
-    mouth   : eigenlips [shape=(T, 90)]
-    jaw     : components of the jaw [shape=(T, 3·K)]
-    chin_px : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
-    """
+    """The lower face in every frame: eigenlips, jaw [shape=(T, 3·K)], the chin below the eyes in px [shape=(T,)]."""
 
     mouth: Floats
     jaw: Floats
@@ -250,11 +245,7 @@ class Appearance:
 
 
 def learn_appearance(footage: FootagePictures) -> Appearance:
-    """Return the appearance of a person.
-
-    Raises InputError: no pictures, or motion of another number of frames.
-    Cost: about 10 s for four minutes of footage; 100 kB a frame.
-    """
+    """Return the appearance of a person, in 10 s for four minutes. Raises InputError: no pictures, or other motion."""
     pictures, light, reference = _equalise_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
     training = choose_evenly(TRAINING_PICTURES, len(pictures))
@@ -368,14 +359,10 @@ CRF = 6.0
 PARTS = ("mouth", "jaw", "from_motion", "noise")
 """Prefixes of the names of the arrays of parts."""
 REMEDY = "build the face again"
-"""What to do about a damaged file."""
 
 
 def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
-    """Return the appearance of a person serialised as arrays (``APPEARANCE`` and those of ``PARTS``).
-
-    Pictures are coded (``storage.coded_video``), which changes them by about one grey level.
-    """
+    """Return the appearance of a person serialised as arrays (``APPEARANCE`` and those of ``PARTS``)."""
     parts = {
         "mouth": eigenlips_to_arrays(appearance.mouth),
         "jaw": eigenlips_to_arrays(appearance.jaw),
@@ -399,10 +386,7 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
 
 
 def appearance_from_arrays(arrays: Arrays) -> Appearance:
-    """Deserialise the appearance of a person.
-
-    Raises ModelFormatError: an array is missing, unknown, out of range, or the parts do not fit together.
-    """
+    """Deserialise the appearance of a person. Raises ModelFormatError: arrays are missing, unknown or do not fit."""
     inner = {part: arrays_under(arrays, f"{part}/") for part in PARTS}
     named = {name: array for name, array in arrays.items() if name.partition("/")[0] not in PARTS or "/" not in name}
     with format_errors("the appearance of the person", REMEDY):
@@ -446,7 +430,6 @@ APPEARANCE = {
     "from_mouth": ArraySpec(np.float32, "F J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
     "from_sound": ArraySpec(np.float32, "2 J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
 }
-"""The arrays of an appearance, beside those of its parts."""
 
 
 def _check_size(name: str, space: Eigenlips, size: tuple[int, int]) -> None:

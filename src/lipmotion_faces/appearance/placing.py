@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.errors import InputError
 from lipmotion_faces.kernels import affine
 
@@ -63,8 +64,7 @@ def feather(mask: NDArray[np.bool_], width_px: float) -> Floats:
     if not width_px >= 1:
         raise InputError(f"feather of {width_px} px, required at least 1")
     distance = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
-    share = np.clip(distance / width_px, 0, 1)
-    return (share * share * (3 - 2 * share)).astype(np.float32)
+    return smooth_step(distance / width_px).astype(np.float32)
 
 
 def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: Array) -> None:

@@ -101,10 +101,7 @@ class GridFiller:
         self._scratch = np.empty((2, max((count * prod(shape) * colours for shape in halves), default=0)), np.float32)
 
     def fill(self, values: Floats) -> Floats:
-        """Return the function at all pixels [shape=(t, H, W, C)], valid in the region, until the next call.
-
-        values : at the nodes of up to ``count`` pictures [shape=(t, number of nodes, C)], finest grid first
-        """
+        """Return the function at all pixels [shape=(t, H, W, C)], until the next call, from nodes [shape=(t, K, C)]."""
         count, stop = values.shape[:2]
         for level in reversed(range(len(self._filled))):
             fine = self._filled[level][:count]
@@ -168,7 +165,6 @@ LARGEST_EDGE = 2048
 CHUNK = 1 << 17
 """About the number of pixels that are interpolated at once: what fits into the cache of a processor."""
 BATCH = 64
-"""Number of pictures that are solved at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +189,6 @@ class CloningSystem:
     def correction(self, source: Pictures, background: Pictures) -> NDArray[np.float32]:
         """Return what cloning adds to the source: float32 array [shape=(T, h, w, 3)], grey levels.
 
-        source, background : pictures [shape=(T, h, w, 3)], grey levels, uint8 or float
         In the region this is the membrane; outside it, the background minus the source.
         Raises InputError: as ``clone``.
         """
@@ -299,11 +294,6 @@ def cloning_system(mask: Mask) -> CloningSystem:
             "use a smaller or smoother mask"
         )
     grids = nested_grids(region)
-    return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, _solve_response(grids, edge))
-
-
-def _solve_response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
-    """Return the membrane at the nodes for 1 at each pixel of the edge [shape=(K, B)], by Galerkin's method."""
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import splu
 
@@ -319,7 +309,7 @@ def _solve_response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
     response = np.empty(right.shape, np.float32)
     for start in range(0, len(edge), BATCH):
         response[:, start : start + BATCH] = factors.solve(right[:, start : start + BATCH].toarray())
-    return response
+    return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, response)
 
 
 def _round_levels(pictures: NDArray[np.float32]) -> NDArray[np.uint8]:

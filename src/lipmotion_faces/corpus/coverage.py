@@ -30,14 +30,7 @@ Phones = tuple[str, ...]
 
 @dataclass(frozen=True)
 class MissingUnit:
-    """A sequence of phones that a text needs and a corpus does not have.
-
-    unit     : the phones, with ``-`` between them (``t-r``)
-    count    : how often the text needs it
-    share    : of all sequences of this length in the text, 0 to 1
-    stand_in : the nearest sequence that the corpus has
-    recorded : how often the corpus has that one
-    """
+    """A sequence of phones (``t-r``) that a text needs and a corpus lacks, and the nearest that it has."""
 
     unit: str
     count: int
@@ -50,11 +43,9 @@ class MissingUnit:
 class KindCoverage:
     """The coverage of the sequences of one length.
 
-    kind    : ``phones``, ``diphones`` or ``triphones``
     needed  : how many different ones the text needs
     covered : how many of these the corpus has
     share   : of the text that these cover, 0 to 1: each counts as often as the text needs it
-    missing : the others, the most frequent first
     """
 
     kind: str
@@ -68,10 +59,8 @@ class KindCoverage:
 class Coverage:
     """What a corpus has of the sounds of a text.
 
-    kinds      : phones, diphones and triphones
     sentences  : number of sentences of the text that were used
     left_out   : sentences that cannot be used, with the word that is neither in the dictionary nor in the lexicon
-    utterances : number of utterances of the corpus
     unknown    : number of utterances that were not counted: without labelled phones, and without words that are known
     """
 
@@ -127,10 +116,7 @@ def phone_distances() -> NDArray[np.float64]:
 
 
 def coverage_lines(result: Coverage, lines: int) -> Iterator[str]:
-    """Yield the coverage as text: shares first, then the missing sequences of each kind, the most frequent first.
-
-    lines : largest number of missing sequences of each kind
-    """
+    """Yield the coverage as text: shares, then ``lines`` missing sequences of each kind, the most frequent first."""
     yield f"{result.utterances - result.unknown} of {result.utterances} utterances, {result.sentences} sentences"
     for each in result.kinds:
         yield f"{each.kind:10} {each.covered:5} of {each.needed:5} different, {each.share:6.1%} of all in the sentences"

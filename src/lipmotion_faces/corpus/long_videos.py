@@ -43,11 +43,7 @@ Quietest = Callable[[float, float], float]
 
 @dataclass(frozen=True)
 class SpokenPart:
-    """A part of a recording that is not divided by a pause: between two silences, or a line of a transcript.
-
-    start_s, end_s : seconds
-    words          : what is said in it, or None where it is not known
-    """
+    """A part of a recording without a pause, from start to end in seconds; words: what is said, None if not known."""
 
     start_s: float
     end_s: float
@@ -66,7 +62,6 @@ def utterance_spans(
 
     stretches  : parts with speech, in order; those with words are never divided
     cuts_s     : times at which the camera changes, rising; utterances without words are divided there
-    duration_s : of the recording
     quietest   : finds the best place to divide where there is no pause
     Between neighbours, the pause is shared; of one longer than twice ``MARGIN_S``, the middle belongs to nobody.
     """
@@ -174,7 +169,6 @@ def _add_margins(
 LOG = logging.getLogger("lipmotion")
 
 _STAGE = "dividing long videos"
-"""Name of the stage in reports of progress."""
 DIVIDING_SHARE = 0.2
 """Share of the whole preparation that this takes, for reports of progress."""
 VIDEO = "one video"
@@ -189,9 +183,8 @@ HELD_OUT_SHARE = 0.1
 
 
 def find_transcript(video: Path) -> TimedTranscript | None:
-    """Return the transcript beside a video, one with times if there is any; None if there is none.
-
-    Raises InputError: a file of labels cannot be read.
+    """Return the transcript beside a video, one with times if there is any, or None. Raises InputError: labels cannot
+    be read.
     """
     transcript = find_labels(video).transcript
     if transcript is None or transcript.has_times:
@@ -227,11 +220,7 @@ def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
 
 @dataclass(frozen=True, eq=False)
 class VideoPart:
-    """One utterance of a long video.
-
-    sound  : its sound
-    person : thumbnails of the face that is to be followed; none where nobody else is in the video
-    """
+    """One utterance of a long video: its sound, and thumbnails of the face to follow (none where there is no other)."""
 
     recording: SourceRecording
     sound: Audio
@@ -249,7 +238,6 @@ def divide_long_videos(
     """Return the folder with the parts of long videos in their place, and those parts by name.
 
     place   : the folder itself, where lists of splits may lie
-    tracker : name of the tracker that finds faces
     Of a single video, without lists, the last parts become ``val`` and ``test``; others have the split of the whole.
     """
     videos = [item for item in folder.recordings if folder.kind in DIVIDED_KINDS and _is_long_video(item)]
@@ -297,7 +285,6 @@ def divide_video(
     """Return the utterances of a long video; each is named after its start (``talk-00h01m12.48s``).
 
     reached        : called now and then with the share of the video that was looked at
-    tracker        : name of the tracker that finds faces
     splits_by_time : give the last utterances to ``val`` and ``test``
     Words are those of the lines in time beside the video; without such lines, the utterances have none.
     Memory: the whole sound (230 MB for an hour), but not the pictures. Raises InputError: it cannot be read.
@@ -310,7 +297,15 @@ def divide_video(
         LOG.info("%s: %s", recording.file, separate.note)
         audio = align_sound(separate, audio.duration_s)
     levels = levels_db(audio)
-    parts = _read_lines(recording) or [SpokenPart(*span) for span in spoken_spans(levels)]
+    transcript = find_transcript(recording.file)
+    lines = [] if transcript is None else spoken_lines(transcript)
+    if transcript is not None and not lines:
+        LOG.warning(
+            "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
+            "transcript. Give one with times: subtitles, labels, or what a recogniser writes",
+            recording.file,
+        )
+    parts = lines or [SpokenPart(*span) for span in spoken_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
     parts = [replace(part, end_s=min(part.end_s, end_s)) for part in parts if part.start_s < end_s]
     spans = utterance_spans(parts, scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
@@ -320,19 +315,6 @@ def divide_video(
         held_out = round(HELD_OUT_SHARE * len(spans))
     splits = [recording.split] * (len(spans) - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
     return [_cut_part(span, recording, split, audio, scan) for span, split in zip(spans, splits, strict=True)]
-
-
-def _read_lines(recording: SourceRecording) -> list[SpokenPart]:
-    """Return the lines in time beside a video, with a warning where there are words without times."""
-    transcript = find_transcript(recording.file)
-    lines = [] if transcript is None else spoken_lines(transcript)
-    if transcript is not None and not lines:
-        LOG.warning(
-            "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
-            "transcript. Give one with times: subtitles, labels, or what a recogniser writes",
-            recording.file,
-        )
-    return lines
 
 
 def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:

@@ -47,20 +47,16 @@ RECIPE = "5"
 NAMED_UTTERANCES = 5
 """Utterances that a warning names."""
 _STAGE = "preparing recordings"
-"""Name of the stage in reports of progress."""
 
 
 @dataclass(frozen=True)
 class PrepareReport:
     """Report of a preparation.
 
-    corpus   : folder of the corpus
     kind     : layout in which the recordings were read
-    prepared : names of the utterances that were prepared
     kept     : names of the utterances that were prepared before, from the same source with the same settings
     failed   : reason for every recording that cannot be used, by name
     unseen   : number of frames without a face of every utterance that has any, by name
-    seconds  : duration of the preparation
     notes    : remarks on videos (cuts, damage, a covered mouth), by name
     """
 
@@ -85,11 +81,7 @@ class PrepareReport:
 
 @dataclass(frozen=True)
 class _Job:
-    """One recording, the folder of its utterance, its source and the settings of the preparation.
-
-    tracker : name of the tracker
-    part : the part of a long video that it is; None: it is a whole file
-    """
+    """One recording, its utterance's folder, source and settings; the part of a long video that it is, or None."""
 
     recording: SourceRecording
     folder: Path
@@ -131,7 +123,6 @@ def prepare(
     offset_ms : by how much the sound of every recording is late against its motion; None: it is in step, or a
                 recorder's sound beside it (``take.recorder.wav``) says it. ``offsets.csv`` in the folder goes before
     tracker   : name of the tracker that finds faces in videos (docs/corpora.md)
-    monitor   : called with reports of progress, and with the outcome of every recording
     Recordings that cannot be used are reported and left out. The corpus depends neither on ``workers`` nor on
     interruptions.
     Raises InputError, CorpusError: no recordings, none that can be used, or ``output`` is not a corpus; no tracker of

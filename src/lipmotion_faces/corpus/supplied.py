@@ -56,7 +56,6 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
 def read_supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
     """Return the motion in a file as a track, without mouth pictures.
 
-    duration_s : of the sound that is in step with it; None: there is none, so any length is right
     Of a table of Live Link Face, the curves that speech moves; frames without a face are not seen.
     Raises InputError: not a motion file, or of another length than the sound.
     """
@@ -85,7 +84,6 @@ def read_supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
 def read_supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:
     """Return the labelled phones of a recording, from 0 s to the end of its sound, or None if it has no labels.
 
-    duration_s : of the sound
     Silence has the phone that recognition gives it: short silence between phones is a pause.
     Raises InputError: the labels end after the sound, or are too many for it.
     """
@@ -124,7 +122,6 @@ def read_supplied_phones(recording: SourceRecording, duration_s: float) -> Timel
 
 
 def _contain_speech(spans: Iterable[Span[Unit]]) -> bool:
-    """Return whether any label is not silence."""
     return any(not is_silent(span.label.phone) for span in spans)
 
 
@@ -135,12 +132,7 @@ LEAST_SHARED_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class SeparateSound:
-    """Sound, and by how much it is late against the motion.
-
-    audio  : the whole sound
-    late_s : moment ``late_s`` of the sound is moment 0 of the motion; negative: the sound begins later
-    how    : ``clap``, ``beep``, ``the sound of both``, ``as given``
-    """
+    """Sound that is ``late_s`` against the motion, and how that is known: ``clap``, ``beep``, ``as given`` ..."""
 
     audio: Audio
     late_s: float

@@ -22,7 +22,6 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 REACH_S = 0.4
 """Largest offset that is considered, in seconds, in both directions."""
 OPENING = "opening"
-"""The channel that is compared with the sound."""
 REMOVED_MS = "offset_removed_ms"
 """Key in the source of an utterance: milliseconds by which its sound was moved."""
 LEAST_MOVE_S = 0.005
@@ -31,12 +30,7 @@ LEAST_MOVE_S = 0.005
 
 @dataclass(frozen=True)
 class CorpusOffsets:
-    """Offsets of the sound of a corpus from the motion.
-
-    clips       : offset of every utterance, by name
-    collections : offset of all utterances of a collection and a speaker together (as a rule, of one camera set-up)
-    members     : names of the utterances of every collection
-    """
+    """Offsets of the sound of a corpus from the motion: of utterances, and of collections with their members."""
 
     clips: Mapping[str, Offset]
     collections: Mapping[str, Offset]
@@ -83,12 +77,7 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
 
 
 def offsets(corpus: Corpus) -> CorpusOffsets:
-    """Return the offset of the sound of each utterance and of each collection.
-
-    Utterances without the channel ``opening`` are ignored.
-    Offset zero is that of the GRID corpus, on which the prediction of lip speed was trained.
-    Raises CorpusError: an utterance is damaged.
-    """
+    """Return the offsets of utterances and collections; zero is GRID's. Raises CorpusError: an utterance is damaged."""
     scores: dict[str, NDArray[np.float64]] = {}
     members: dict[str, list[str]] = {}
     for name in corpus.names():

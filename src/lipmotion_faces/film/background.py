@@ -70,8 +70,6 @@ LONGEST_GAP_S = 0.2
 class BackgroundSequence:
     """Footage that can be shown for any length.
 
-    groups        : returns access to its frames, in any order
-    rate_hz       : frames a second
     face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
     chin_px       : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
     usable        : frames in which the face is seen [shape=(T,)]
@@ -236,11 +234,8 @@ def open_stored_background(background: StoredBackground) -> BackgroundSequence:
 
 
 def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
-    """Return a video as a background.
-
-    appearance : of the person who should be in it: somebody else is warned about; None: it may be anybody
-    in_time : as of ``BackgroundSequence``: all of the video is used; False: at most ``MOST_TRACKED_S`` of it
-    Raises InputError: no video, or no face in it.
+    """Return a video as a background; others than ``appearance`` are warned about. Raises InputError: no video, no
+    face.
     """
     footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
     if appearance is not None:

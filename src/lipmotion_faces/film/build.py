@@ -55,9 +55,6 @@ RIGHTS = ("licence", "attribution")
 class Take:
     """One recording of a person.
 
-    name       : of the recording
-    file       : the video
-    span       : the part of it
     collection : the folder that it is in, by its last two names
     speaker    : name of the person; empty where it is not known
     rights     : licence and attribution, where known
@@ -76,8 +73,6 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
 
     source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
                  training list
-    recordings : of a corpus, the folder of the videos that it was prepared from
-    speaker    : whose, where there are several people
     A take that cannot be read may be among them: where it is tracked, the reason is reported.
     Raises InputError: no such file, several people, no such person, no videos, or a corpus without ``recordings``.
     """
@@ -204,12 +199,7 @@ UNUSED_AXIS = "z_"
 
 @dataclass(frozen=True, eq=False)
 class _Filmed:
-    """One take: where the face is, its pictures, and its sound.
-
-    used     : frames that are learned from, rising
-    pictures : of the lower face in these frames [shape=(n, 128, 128, 3)]
-    sound    : None if there is none
-    """
+    """One take: where the face is, pictures of used frames [shape=(n, 128, 128, 3)], and its sound."""
 
     footage: Footage
     used: NDArray[np.intp]
@@ -234,9 +224,6 @@ def build_face(
     recordings : of a corpus, the folder of the videos that it was prepared from
     speaker    : whose face, where there are several people
     name       : of the face; empty: the speaker's, or the file's
-    workers    : number of processes; None: one a core. With more than one, a script must be guarded by
-                 ``if __name__ == "__main__":``
-    monitor    : receives reports of the progress
     Raises InputError: no such footage, several people, or less than ``LEAST_FOOTAGE_S`` with the face.
     Raises MissingDependencyError: OpenCV or MediaPipe is not installed.
     Source: Xie & Liu 2007, §5, §6.

@@ -43,9 +43,8 @@ WHITE = 245
 
 
 def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Return the part of a frame that the inset covers, with its border: left, top, right and bottom, px.
-
-    frame, picture : heights and widths, px
+    """Return left, top, right and bottom, px, of the inset with its border, for heights and widths of frame and
+    picture.
     """
     height, width = frame
     shorter = min(height, width)
@@ -65,7 +64,6 @@ def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Fr
     """Yield frames with a picture in the lower right corner; as many as there are of both.
 
     frames   : uint8 RGB [each shape=(H, W, 3)], of one size; they are not changed
-    pictures : uint8 RGB [each shape=(h, w, 3)], of one size, enlarged or reduced by cubic interpolation
     """
     for frame, picture in zip(frames, pictures, strict=False):
         size = (frame.shape[0], frame.shape[1])
@@ -84,7 +82,6 @@ def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Fr
 
 Frames = Iterator[NDArray[np.uint8]]
 RENDERING = "rendering the video"
-"""Name of the stage in reports of progress."""
 LOG = logging.getLogger("lipmotion")
 FILM = Outputs()
 """How a filmed face is shown where nothing is said."""
@@ -98,7 +95,6 @@ class Film:
 
     frames  : each uint8 RGB [shape=(H, W, 3)], of even sizes
     count   : number of the frames
-    rate_hz : frames a second
     covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px
     """
 
@@ -192,11 +188,7 @@ def face_codes(
     rate_hz: float,
     eigenlips: Eigenlips | None = None,
 ) -> FaceCodes:
-    """Return what the lower face is like in ``count`` frames at the rate of a video.
-
-    units : the phones in time; in every p, b and m the lips touch (``contact.close_lips``)
-    Raises InputError: motion without the channels that the face needs.
-    """
+    """Return the lower face in ``count`` frames at a video's rate. Raises InputError: missing channels."""
     time_s = np.arange(count) / rate_hz
     values, contact = motion.at(time_s), None
     if "opening" in motion.names and np.isfinite(motion.values).all():
@@ -263,7 +255,6 @@ def write_film(
     """Write a video of a filmed face, with sound; whole or not at all.
 
     film, mark : of ``make_film``, which is read to its end; how the video says that it is synthetic
-    monitor    : receives reports of the progress
     Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
     face leaves no corner for a visible mark.
     """
@@ -290,10 +281,7 @@ def refuse_film(options: Outputs) -> None:
 
 
 def check_film(options: Outputs, speech: str | Path | None = None) -> None:
-    """Raise InputError if options do not go with the speech; called before long work begins.
-
-    speech : the recording; None: it is a sound that is in no file
-    """
+    """Raise InputError if options do not go with the speech, a path (None: a sound in no file), before long work."""
     if options.background is not None:
         check_source(Path(options.background), "video")
     if options.overlay is not None and (speech is None or options.background is not None):

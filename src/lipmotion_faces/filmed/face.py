@@ -53,12 +53,7 @@ class StoredBackground:
 
 @dataclass(frozen=True, eq=False)
 class SpokenTake:
-    """Some speech of the person, and the motion of the face in it: what other people's motion is mapped onto.
-
-    sound  : of the person alone
-    motion : tracked, at the rate of the video
-    seen   : frames in which the face was measured [shape=(T,)]
-    """
+    """Speech and motion of the person, at the video's rate, onto which other people's is mapped; seen [shape=(T,)]."""
 
     sound: Audio
     motion: Motion
@@ -191,7 +186,6 @@ BACKGROUND = {
     "chin_px": ArraySpec(np.float64, "T", 0, 1000),
     "cuts": ArraySpec(np.intp, "c", 1, LARGEST_NUMBER, optional=True),
 }
-"""The arrays of a background, beside those of its video."""
 TAKE = {
     "sound": ArraySpec(np.int16, "S", -FULL_SCALE - 1, FULL_SCALE),
     "sound_rate_hz": ArraySpec(np.intp, "", 8000, 48_000),
@@ -199,7 +193,6 @@ TAKE = {
     "rate_hz": ArraySpec(np.float64, "", POSITIVE, 1000),
     "seen": ArraySpec(np.bool_, "T"),
 }
-"""The arrays of some speech with motion."""
 
 
 def _background(arrays: Arrays) -> StoredBackground:

@@ -12,6 +12,15 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion_faces.appearance.camera_noise import NoiseSource
+from lipmotion_faces.appearance.candidates import (
+    PAPER,
+    SHARPENING,
+    STEADY,
+    RefinementOptions,
+    Refiner,
+    moving_average,
+    sharpen,
+)
 from lipmotion_faces.appearance.lower_face import (
     HEIGHT,
     WIDTH,
@@ -27,15 +36,6 @@ from lipmotion_faces.appearance.lower_face import (
 from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
 from lipmotion_faces.appearance.placing import cut, feather, place
 from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
-from lipmotion_faces.appearance.refinement import (
-    PAPER,
-    SHARPENING,
-    STEADY,
-    RefinementOptions,
-    Refiner,
-    moving_average,
-    sharpen,
-)
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -55,7 +55,6 @@ LARGEST_DIFFERENCE = 20.0
 class Background:
     """One frame of footage.
 
-    frame         : uint8 array [shape=(H, W, 3)], RGB
     face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
     chin_px       : how far the tip of the chin is below the eyes, px of the face
     has_face      : whether the person is seen; False: the frame stays as it is
@@ -77,7 +76,6 @@ class StitchingOptions:
     average   : number of pictures over which the mouth is averaged before, odd; 1: none
     jaw_detail : how the detail of the jaw is chosen
     noise     : whether the noise of the camera is added
-    seed      : of the noise
     """
 
     jaw: bool = True
@@ -98,22 +96,13 @@ Eqs. 14–16.
 
 @dataclass(frozen=True, eq=False)
 class Stitcher:
-    """Stitches the mouth and the jaw of a person into frames of footage.
-
-    appearance : of the person
-    options    : how
-    """
+    """Stitches the mouth and the jaw of a person into frames of footage."""
 
     appearance: Appearance
     options: StitchingOptions = STITCHING
 
     def stitch(self, codes: FaceCodes, backgrounds: Iterable[Background]) -> Iterator[Picture]:
-        """Yield frames, one for each frame of motion.
-
-        codes       : what the lower face is like, one row a frame of the video
-        backgrounds : at least as many; taken a few at a time, so memory does not grow with the length
-        Raises InputError: too few backgrounds.
-        """
+        """Yield a frame for each of motion, a few at a time. Raises InputError: too few backgrounds."""
         codes = self._average(codes)
         mouth_chosen = self._mouths.choose(codes.mouth)
         jaw_chosen = self._jaws.choose(codes.jaw)

@@ -2,7 +2,7 @@
 
 The spoken mouth and what moves beside it (``articulation``) become poses (``pose``); a pose moves the surfaces
 (``skin`` with ``lips``, ``inside``, ``eyes``), which ``figure`` puts together, lights and gives to the rasteriser. The
-forms are made once: ``forms`` (skin), ``hair``.
+forms are made once.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ __all__ = ["Head"]
 SIZE = (1280, 720)
 """Width and height of pictures whose size is not given."""
 FRAMES_AHEAD = 2
-"""Pictures that are drawn before they are asked for."""
 
 
 @final

@@ -10,8 +10,17 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter
 
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.forms import EYE, EYEBALL_RADIUS, head, seen_from_front
-from lipmotion_faces.head.part import Part, grid_triangles, join_parts, part, tube
+from lipmotion_faces.head.part import (
+    EYE,
+    EYEBALL_RADIUS,
+    Part,
+    grid_triangles,
+    head,
+    join_parts,
+    part,
+    seen_from_front,
+    tube,
+)
 from lipmotion_faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]
@@ -154,9 +163,8 @@ def lash_triangles() -> NDArray[np.int32]:
 
 
 def lashes(edge: Real, shut: float) -> Real:
-    """Return the places of the left eye's lashes, a dark wedge along the upper lid [shape=(3 * LASHES, 3)].
-
-    edge : of the upper lid from the inner corner to the outer one [shape=(LASHES, 3)]
+    """Return the places of the left lashes [shape=(3 * LASHES, 3)], a wedge along the upper lid's edge [shape=(LASHES,
+    3)].
     """
     share = np.linspace(0, 1, LASHES)
     thick = 0.004 + 0.018 * np.sin(np.pi * (0.12 + 0.8 * share)) ** 0.7 * share**0.4

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.forms import MOUTH_Y
 from lipmotion_faces.head.lips import ARCH, TEETH_EDGE, TEETH_Z
-from lipmotion_faces.head.part import Part, grid_triangles, join_parts, part
+from lipmotion_faces.head.part import MOUTH_Y, Part, grid_triangles, join_parts, part
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import move_jaw
 
@@ -78,10 +77,7 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
 
 
 def lower_drop(pose: CharacterPose) -> float:
-    """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones.
-
-    Round and oval lips hide the lower teeth, which drop further there than the chin shows.
-    """
+    """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones."""
     return pose.jaw + PARTED_TEETH * (1 - pose.bite) * (1 + max(pose.roundness, 1.4 * pose.oval))
 
 

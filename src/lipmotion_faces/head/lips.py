@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from lipmotion.articulation.contact import LEAST_GAP
-from lipmotion_faces.head.forms import MOUTH_Y
+from lipmotion_faces.head.part import MOUTH_Y
 from lipmotion_faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]

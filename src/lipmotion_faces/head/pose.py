@@ -78,12 +78,7 @@ class CharacterPose(NamedTuple):
 def head_poses(
     motion: Motion, units: Timeline[Unit], fps: float, staging: Staging | None = None, prosody: Prosody | None = None
 ) -> list[CharacterPose]:
-    """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
-
-    staging : seed, and what moves on its own; None: everything moves
-    prosody : of the speech, for accents of brows and head; None: they follow the opening
-    Raises InputError: as ``spoken_mouth``.
-    """
+    """Return the pose at ``n / fps`` seconds, to the end of the motion. Raises InputError: as ``spoken_mouth``."""
     mouth = spoken_mouth(motion, units, fps)
     return pose_head(mouth, stage_liveliness(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
 

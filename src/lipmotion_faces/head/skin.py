@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
-from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion_faces.head.lips import (
     ACROSS,
     COLUMNS,
@@ -22,6 +22,7 @@ from lipmotion_faces.head.lips import (
     lip_surface,
     section_points,
 )
+from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.rendering.lighting import unit
 
@@ -79,9 +80,8 @@ class Binding:
         return Binding(places, columns, jaw, bound, self.shares[of[rows][bound]], cheeks, nose)
 
     def move(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
-        """Return the places in a pose [shape=(..., N, 3)].
-
-        contour : places of the outer contour of the lips [shape=(..., COLUMNS, 3)]; columns : its binding
+        """Return the places in a pose [shape=(..., N, 3)], bound to columns of the lips' contour [shape=(..., COLUMNS,
+        3)].
         """
         places = self._by_jaw(pose)
         places[..., self.bound, :] += self.shares @ (contour - columns._by_jaw(pose))
@@ -176,7 +176,7 @@ class Skin:
         up = np.sin(angle) ** 2
         reach = np.where(angle > 0, 0.18, 0.36) * up + 0.44 * (1 - up)
         near = np.clip(1 - nearest / reach, 0, 1) * (face[:, 2] > -0.65)
-        self.lip_weight = near * near * (3 - 2 * near)
+        self.lip_weight = smooth_step(near)
         bound = np.flatnonzero(self.lip_weight)
         length = np.linalg.norm(np.roll(contour, -1, axis=0) - np.roll(contour, 1, axis=0), axis=1)
         width = (0.016 + 0.55 * nearest[bound])[:, None]
@@ -189,7 +189,7 @@ class Skin:
         cheeks[len(face) - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
         out = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
         nose[:, 1] = np.exp(-out) * (face[:, 2] > -0.5)
-        jaw = _step((-0.47 - face[:, 1]) / 0.40) * _step((face[:, 2] + 0.98) / 0.45)
+        jaw = smooth_step((-0.47 - face[:, 1]) / 0.40) * smooth_step((face[:, 2] + 0.98) / 0.45)
         return Binding(face, np.arange(COLUMNS), jaw, bound, shares, cheeks, nose)
 
     def places(self, pose: CharacterPose) -> Real:
@@ -209,18 +209,10 @@ class Skin:
 
 
 def move_jaw(places: Real, drop: Any) -> Real:
-    """Return places turned with the jaw about its hinge, so that the chin drops by a length [shape=(..., N, 3)].
-
-    drop : a number, or several [shape=(T, 1)]
-    """
+    """Return places turned with the jaw about its hinge; the chin drops by a length, or several [shape=(T, 1)]."""
     angle, (y, z) = drop / 0.72, (places - HINGE)[:, 1:].T
     down, forward = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
     return np.stack([np.broadcast_to(places[:, 0], down.shape), HINGE[1] + down, HINGE[2] + forward], axis=-1)
-
-
-def _step(share: Real) -> Real:
-    clipped = np.clip(share, 0, 1)
-    return np.asarray(clipped * clipped * (3 - 2 * clipped))
 
 
 def _fill(contour: Real, edges: Real) -> Real:
@@ -271,7 +263,6 @@ def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
 
 
 def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:
-    """Return which points lie in a closed polygon [shape=(N,)]."""
     following = np.roll(polygon, -1, axis=0)
     inside = np.zeros(len(points), bool)
     for (xa, ya), (xb, yb) in zip(polygon.tolist(), following.tolist(), strict=True):

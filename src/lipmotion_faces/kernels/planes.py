@@ -78,11 +78,7 @@ class EyeLayers(NamedTuple):
 
 @compiled
 def pack(plane: Bytes, y0: int, x0: int, y1: int, x1: int, mean: bool, packed: Packed) -> None:
-    """Fill in a window of a packed plane.
-
-    plane, packed : [shape=(H, W)]
-    mean : pack the mean of each pixel and its three neighbours, as is needed where every second pixel is taken
-    """
+    """Fill in a window of a packed plane [shape=(H, W)], or the mean of each pixel and its three neighbours."""
     width, last_x, last_y = x1 - x0, plane.shape[1] - 1, plane.shape[0] - 1
     above, below = np.zeros(width + 1, np.uint32), np.zeros(width + 1, np.uint32)
     inside = min(x1 + 1, last_x if mean else last_x + 1) - x0
@@ -250,10 +246,7 @@ def lay_eyes(
     under: Singles, opening: Singles, over: Singles, iris: Singles, x: np.float32, y: np.float32, y0: int, x0: int,
     target: Bytes,
 ) -> None:  # fmt: skip
-    """Lay ``EyeLayers`` on a window of planes that begins at y0, x0.
-
-    x, y : from each pixel to the one of the irises that is seen there
-    """
+    """Lay ``EyeLayers`` on a window of planes at y0, x0; x, y: from each pixel to that of the irises seen there."""
     height, width = opening.shape
     last_x, last_y, none, whole = np.float32(width - 1), np.float32(height - 1), np.float32(0), np.float32(1)
     eye = np.empty(4, np.float32)

@@ -118,7 +118,6 @@ def write_drawn_face(  # noqa: PLR0913
     """Write generated motion as a drawn face, in the format of the suffix; brows and head move with the sound.
 
     prosody : loudness and pitch in the time of the motion; None: those of the sound, which begins with the motion
-    monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
     staged, drawn = stage_face(face, staging, prosody or measure_prosody(sound)), None
@@ -136,8 +135,7 @@ def frame_count(generation: Generation, fps: float) -> int:
 
 def write_frames(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, sound: Audio) -> None:
     """Write pictures with their sound in the format of the suffix. Raises ExportError: the file cannot be written."""
-    from lipmotion_faces.video.mp4 import write_mp4
-    from lipmotion_faces.video.transparent import write_pictures, write_with_alpha
+    from lipmotion_faces.video.mp4 import write_mp4, write_pictures, write_with_alpha
 
     if is_picture_sequence(path):
         write_pictures(path, frames)

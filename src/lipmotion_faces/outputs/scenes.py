@@ -20,10 +20,8 @@ from lipmotion.meshes.files.usd_writer import asset, write_usda
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
-from lipmotion.meshes.model.bones import head_quaternions
-from lipmotion.meshes.model.keys import Thinning
-from lipmotion.meshes.model.mesh import Blendshape
-from lipmotion.meshes.model.scene import HeadTurn, Scene
+from lipmotion.meshes.model.mesh import Blendshape, head_quaternions
+from lipmotion.meshes.model.scene import HeadTurn, Scene, Thinning
 from lipmotion.pipeline.outputs.curve_sets import edit_weights, known_names
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
@@ -85,7 +83,6 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     """Write a character with its animation as ``.glb`` or ``.usda``, by the suffix.
 
     A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
-    sound : the file that is referred to, by its path from the folder of the output; None: none
     Raises ExportError: the file cannot be written.
     """
     with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))
@@ -117,8 +114,7 @@ def head_scene(
     """
     from lipmotion_faces.head.figure import PIVOT
     from lipmotion_faces.head.pose import pose_head
-    from lipmotion_faces.head.shape_fit import mouth_weights
-    from lipmotion_faces.head.stage import figure, mesh_of_figure
+    from lipmotion_faces.head.stage import figure, mesh_of_figure, mouth_weights
 
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)

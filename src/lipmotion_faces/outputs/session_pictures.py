@@ -21,8 +21,6 @@ from lipmotion_faces.registry import stage_face
 class SessionPictures:
     """Pictures of drawn faces with the motion of a session; what of a face does not move is painted once.
 
-    session : whose motion is shown
-
     >>> import lipmotion
     >>> pictures = lipmotion.SessionPictures(lipmotion.Session("examples/welcome.flac"))
     >>> pictures.picture(1.2, lipmotion.Edits().then("set size 64")).shape
@@ -68,5 +66,4 @@ class SessionPictures:
 
     @cached_property
     def _prosody(self) -> Prosody:
-        """Loudness and pitch of the sound of videos."""
         return measure_prosody(read_sound(self._session.request.recording))

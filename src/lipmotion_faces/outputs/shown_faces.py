@@ -195,10 +195,8 @@ class ShownPerson(_WithHead):
 
 
 def shown_face(face: AnyFace | ShownFace) -> ShownFace:
-    """Return a face as outputs show it: of its name, of the path of a ``.face`` file or of a folder of drawings, or of
-    a value.
-
-    Raises InputError: no such face or file. Raises ModelFormatError: the file is damaged, or of another version.
+    """Return a face as outputs show it, of a name, a path or a value. Raises InputError: none. Raises ModelFormatError:
+    damaged.
     """
     if isinstance(face, ShownFace):
         return face
@@ -225,7 +223,6 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
 
 
 def _seen(performance: Performance) -> Generation:
-    """Return the motion as videos show it."""
     settings = performance.settings
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
     if performance.generation.curve_edits:

@@ -41,10 +41,7 @@ def open_curve(path: Path) -> Points:
 
 
 def mirror_curve(path: Path) -> Points:
-    """Return the smooth closed curve through a path down the right side and its mirror image.
-
-    The path begins and ends on the axis x = 0.
-    """
+    """Return the smooth closed curve through a path down the right side, from x = 0 to x = 0, and its mirror image."""
     right = path_points(path)
     return closed_curve([(x, y) for x, y in np.vstack([right, both_sides(right)[1][-2:0:-1]]).tolist()])
 
@@ -138,7 +135,6 @@ class LipDesign:
 
     line_y       : height of the line where the closed lips meet
     half_width   : half the distance of the corners at rest
-    upper, lower : thickness of the lips
     seam         : half the thickness of the line between the closed lips
     smile        : how far the corners lie below the middle; negative: above. Round, oval and tucked lips have none
     outline      : thickness of a line around lips and mouth; 0: none
@@ -157,7 +153,6 @@ class LipDesign:
 class EyeDesign:
     """Eyes and brows.
 
-    x, y         : centre of the right iris at rest
     iris         : its radius
     upper, lower : lids of the right eye, from the inner to the outer corner, one x for both
     lashes       : thickness of the upper lashes, relative to the woman's; over 0.5 with a wing
@@ -177,12 +172,7 @@ class EyeDesign:
 
 @dataclass(frozen=True, eq=False)
 class Lock:
-    """A part of the hair in front of the forehead.
-
-    outline : of the part
-    light   : (x, y, radius x, radius y) of its light; None: none
-    strands : lines in it
-    """
+    """A part of the hair before the forehead: outline, (x, y, radius x, radius y) of its light or None, lines in it."""
 
     outline: Points
     light: tuple[float, float, float, float] | None = None

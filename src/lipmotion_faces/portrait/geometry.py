@@ -68,11 +68,7 @@ class MouthPose(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LipOutlines:
-    """Heights of the lips' outlines over columns [shape=(C, ...)], top to bottom; all meet at the corners and beyond.
-
-    seam : half the thickness of the line where the lips meet
-    inner_half_width : half the width of the opening
-    """
+    """Heights of the lips' outlines over columns [shape=(C, ...)], and half widths of seam and opening."""
 
     half_width: float
     inner_half_width: float
@@ -154,10 +150,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
 
 
 def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOutlines) -> MouthInterior:
-    """Return teeth and tongue of a pose between the lips, over the columns ``x`` [shape=(C, ...)].
-
-    outlines : of the lips of this pose
-    """
+    """Return teeth and tongue of a pose between the lips' outlines, over the columns ``x`` [shape=(C, ...)]."""
     edge = lips.line_y + TEETH_EDGE
     upper_edge = edge - 0.06 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
     upper = upper_edge - 0.35 * x * x
@@ -186,7 +179,6 @@ def drawn_half_width(lips: LipDesign, pose: MouthPose) -> float:
 
 
 def _round_hole(pose: MouthPose) -> float:
-    """Return half the width of the hole of protruded lips."""
     return ROUND_HOLE[0] + ROUND_HOLE[1] * pose.gap
 
 

@@ -20,10 +20,7 @@ Pixels = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class View:
-    """A square picture of ``size`` pixels with the coordinates of the drawing.
-
-    Coordinates are in eye distances: origin between the eyes, x to the right, y downwards.
-    """
+    """A square picture of ``size`` pixels with the coordinates of the drawing."""
 
     size: int
 
@@ -119,11 +116,7 @@ class Layer:
         blur: float = 0.0,
         within: Points | None = None,
     ) -> None:
-        """Paint the inside of an outline.
-
-        blur   : softness of the edge, eye distances
-        within : another outline; nothing is painted outside it
-        """
+        """Paint the inside of an outline, and of ``within`` where that is given."""
         softest = max([blur, *(shade.radius for shade in shades if isinstance(shade, Rim))])
         window = self.window.around(outline, 3 * softest)
         pixels = self.pixels[window.area_in(self.window)]

@@ -196,7 +196,6 @@ class LayeredFace(Face):
 def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:
     """Return the mouth to show in every frame: near the poses, and changing no more often than pays.
 
-    mouths : names of ``MOUTHS`` that there are
     The cheapest sequence is found by dynamic programming; a closed mouth is shown whenever the lips are closed, if it
     is closed for a frame alone.
     """

@@ -43,10 +43,7 @@ LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.1, 0.13)
 
 
 class MouthPainter:
-    """Paints mouths of one character into the pixels of one window.
-
-    textures : of the mouth, in the colours of the layers that it is painted on; None: the design's own
-    """
+    """Paints mouths of a character into the pixels of one window, with textures in its layers' colours, or its own."""
 
     def __init__(self, design: Design, window: Window, textures: MouthTextures | None = None) -> None:
         self._lips, self._textures = design.lips, textures or mouth_textures(design)
@@ -208,7 +205,6 @@ def _flat_textures(colours: Palette) -> MouthTextures:
 
 
 def _shaded_textures(colours: Palette) -> MouthTextures:
-    """Return textures with light and shade."""
     depth, x = _grid(9, 33)
     seam = np.sin(np.pi * depth) ** 0.5 * (1 - 0.6 * np.abs(x) ** 3)
     depth, x = _grid(12, 17)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion_faces.portrait.design import LipDesign
 from lipmotion_faces.portrait.geometry import MouthPose
@@ -58,8 +59,7 @@ class SkinField:
         x, y = grid(window)
         self._scale = window.view.scale
         low = y - lips.line_y
-        share = np.clip((low - JAW_TOP) / (CHIN - JAW_TOP), 0, 1)
-        self._jaw = share * share * (3 - 2 * share)
+        self._jaw = smooth_step((low - JAW_TOP) / (CHIN - JAW_TOP))
         side = np.abs(x)
         self._cheek = -np.sign(x) * np.exp(-(((side - 1.25 * lips.half_width) / 0.2) ** 2) - (low / 0.24) ** 2)
         self._narrow = -x * np.clip((low - 0.1) / 0.3, 0, 1) * (1 - 0.5 * np.clip(side / 0.7, 0, 1))
@@ -80,11 +80,7 @@ class SkinField:
 
 
 class BrowPose(NamedTuple):
-    """The brows in whole steps, so that pictures of them can be kept.
-
-    raised : both of them, ``BROW_STEPS`` a pixel
-    inner, outer, lowered : of a mood, ``MOOD_STEPS`` each
-    """
+    """The brows in whole steps: raised by ``BROW_STEPS`` a pixel, and by a mood in ``MOOD_STEPS``."""
 
     raised: int
     inner: int = 0
@@ -128,8 +124,7 @@ class HeadField:
     def __init__(self, window: Window) -> None:
         x, y = grid(window)
         self._scale, self._x, self._y = window.view.scale, x, y
-        share = np.clip((NECK_END - y) / (NECK_END - NECK_TOP), 0, 1)
-        self._with_head = share * share * (3 - 2 * share)
+        self._with_head = smooth_step((NECK_END - y) / (NECK_END - NECK_TOP))
         self._features = np.exp(-((x / 0.62) ** 2) - (((y - 0.35) / 0.85) ** 2)) * self._with_head
 
     def shifts(self, pose: HeadPlacement) -> tuple[Floats, Floats]:

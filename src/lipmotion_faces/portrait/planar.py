@@ -27,12 +27,11 @@ from lipmotion_faces.kernels.planes import (
     warp_planes,
 )
 from lipmotion_faces.portrait.design import Colour, Design
-from lipmotion_faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter, LidPose, lid_pose
 from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter, MouthTextures, mouth_textures
 from lipmotion_faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
+from lipmotion_faces.portrait.parts import GAZE_STEPS, LID_POSITIONS, EyePainter, LidPose, lid_pose, paint_still_layers
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, moving_parts
-from lipmotion_faces.portrait.still_parts import paint_still_layers
 
 Bytes = NDArray[np.uint8]
 Packed = NDArray[np.uint32]
@@ -49,7 +48,6 @@ class PlanarCanvas:
 
     planes : the picture before the head is moved [shape=(3, size, size)]
     packed : the same, packed for its warp
-    mouth  : a layer for the mouth [shape=(h, w, 4)]
     upper  : what the upper half shows: lids, gaze, brows
     """
 
@@ -61,10 +59,7 @@ class PlanarCanvas:
 
 
 class PlanarRasteriser:
-    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own.
-
-    background : ``scene`` (the character's own), or a colour
-    """
+    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own."""
 
     def __init__(self, design: Design, size: int, background: Colour | str = SCENE) -> None:
         view = View(size)
@@ -98,10 +93,7 @@ class PlanarRasteriser:
         return PlanarCanvas(self._still.copy(), self._parts.mouth)
 
     def picture(self, pose: FacePose, canvas: PlanarCanvas) -> Bytes:
-        """Return one frame: brightness, and below it the two colours [shape=(size · 3 / 2, size)].
-
-        canvas : from ``canvas``; changed
-        """
+        """Return one frame [shape=(size · 3 / 2, size)], brightness above the two colours; the canvas is changed."""
         jaw, mouth = self._parts.jaw, self._parts.mouth
         skin, still = self._jaw_layers
         lay_skin(skin, *self._skin_field.shifts(pose.mouth, pose.mood), *still, jaw.y0, jaw.x0, canvas.planes)
@@ -144,9 +136,8 @@ class PlanarRasteriser:
 
 
 def planes_of(frame: Bytes) -> tuple[Bytes, Bytes, Bytes]:
-    """Return the brightness [shape=(H, W)] and the two colours [shape=(H / 2, W / 2)] of a frame, which they share.
-
-    frame : brightness, and below it the two colours [shape=(H · 3 / 2, W)], contiguous
+    """Return brightness and both colours [shape=(H / 2, W / 2)] of a frame [shape=(H · 3 / 2, W)], which share its
+    memory.
     """
     height, width = len(frame) * 2 // 3, frame.shape[1]
     colours = frame[height:].reshape(2, height // 2, width // 2)

@@ -16,12 +16,11 @@ from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, Picture, Staging, stage_liveliness
 from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
 from lipmotion_faces.portrait.design import Colour, Design
-from lipmotion_faces.portrait.eyes import EyePainter
 from lipmotion_faces.portrait.geometry import MouthPose
 from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter
 from lipmotion_faces.portrait.movement import STEP, BrowField, BrowPose, HeadField, HeadPlacement, SkinField, brow_pose
-from lipmotion_faces.portrait.still_parts import paint_still_layers
+from lipmotion_faces.portrait.parts import EyePainter, paint_still_layers
 
 CanvasT = TypeVar("CanvasT")
 Pixels = NDArray[np.float32]
@@ -38,13 +37,7 @@ LARGEST_TURN = np.array([0.35, 0.35, 0.13])
 
 
 class FacePose(NamedTuple):
-    """Everything that moves, in one frame.
-
-    lids           : how far the eyes are closed, 0..1
-    gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
-    brows          : how far the brows are raised, in eye distances
-    mood           : what a mood does beside the mouth
-    """
+    """Everything that moves in a frame; lengths in eye distances, gaze to the right and down, lids closed 0..1."""
 
     mouth: MouthPose
     lids: float = 0.0
@@ -96,10 +89,7 @@ def make_painter(drawing: Draws[CanvasT]) -> Callable[[FacePose], Picture]:
 
 
 class Rasteriser:
-    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own.
-
-    background : ``scene`` (the character's own), a colour, or None (transparent)
-    """
+    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own."""
 
     def __init__(self, design: Design, size: int, background: Colour | str | None = SCENE) -> None:
         view = View(size)
@@ -120,10 +110,7 @@ class Rasteriser:
         return self._still.copy()
 
     def picture(self, pose: FacePose, canvas: Canvas) -> Bytes:
-        """Return one frame [shape=(size, size, 3)], or where the background is transparent [shape=(size, size, 4)].
-
-        canvas : from ``canvas``; changed
-        """
+        """Return one frame [shape=(size, size, 3), or 4 channels where transparent]; the canvas is changed."""
         skin = self._move_skin(self._jaw, self._skin_field.shifts(pose.mouth, pose.mood))
         self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])

@@ -26,10 +26,7 @@ Picture = NDArray[np.uint8]
 
 
 class TexturedCanvas:
-    """A picture on which triangles with textures are drawn, four samples a pixel.
-
-    background : light in every pixel, as parts of ``WHITE`` [shape=(H, W, 3)]; None: a soft grey gradient
-    """
+    """A picture on which triangles with textures are drawn, four samples a pixel."""
 
     def __init__(self, camera: Camera, surface: TexturedTriangles, background: Colours | None = None) -> None:
         self.camera, self.surface = camera, surface
@@ -99,11 +96,7 @@ class DrawnSurface:
 
 
 def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) -> DrawnSurface:
-    """Return what is drawn of a mesh.
-
-    shown : which triangles may be drawn [shape=(F,)]; those of clear materials without texture are not
-    pixels_per_unit : of the picture, for the unit of the mesh; textures are reduced so far
-    """
+    """Return what is drawn of a mesh, with textures reduced to its size, in pixels for the mesh's unit."""
     materials = [part.material for part in mesh.parts]
     part_of = np.repeat(np.arange(len(mesh.parts)), [part.stop - part.first for part in mesh.parts])
     hidden = np.array([m.texture is None and m.opacity < LEAST_OPACITY for m in materials])

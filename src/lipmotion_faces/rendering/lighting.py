@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.meshes.model.textures import encode_srgb
 from lipmotion_faces.kernels.shading import shade
 
 Real = NDArray[np.float64]
@@ -53,10 +54,7 @@ class Finish:
 
 
 class Lighting:
-    """The lamps, and some finishes under them.
-
-    finishes : the finish of a vertex is given by its number among these
-    """
+    """The lamps, and some finishes under them, by whose numbers a vertex has its finish."""
 
     def __init__(self, finishes: Sequence[Finish]) -> None:
         rows = [[*f.wrap, f.gloss, f.focus, f.edge, f.strands] for f in finishes]
@@ -94,17 +92,12 @@ class Lighting:
 
 
 def tone_table() -> NDArray[np.uint8]:
-    """Return the grey level, 0 to 255, of light in even steps from 0 to ``WHITE`` [shape=(LEVELS,)].
-
-    The brightest light is compressed, as film does; the rest has the curve of sRGB.
-    """
+    """Return the grey level, 0 to 255, of light in even steps from 0 to ``WHITE`` [shape=(LEVELS,)]."""
     light = np.linspace(0, WHITE, LEVELS)
     knee = 0.7
     room = 1 - knee
     light = np.minimum(light, knee) + room * (1 - np.exp(-np.maximum(light - knee, 0) / room))
-    light = light / light[-1]
-    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.rint(255 * encoded).astype(np.uint8)
+    return np.rint(255 * encode_srgb(light / light[-1])).astype(np.uint8)
 
 
 def unit(vectors: Real) -> Real:

@@ -54,10 +54,7 @@ class Camera:
         return np.array([*self.centre, self.distance])
 
     def box(self, screen: Real) -> tuple[int, int, int, int] | None:
-        """Return first column and row, and the column and row behind the last ones, around what ``on_screen`` returned.
-
-        None: it is outside the picture.
-        """
+        """Return first column and row, and those behind the last, around what ``on_screen`` returned; None: outside."""
         size = self.width, self.height
         left, top = (max(0, int(edge - 2)) for edge in screen[:, :2].min(axis=0))
         right, bottom = (
@@ -67,10 +64,7 @@ class Camera:
 
 
 class Canvas:
-    """A picture on which triangles are drawn, four samples a pixel.
-
-    background : light in every pixel, as parts of ``WHITE`` [shape=(H, W, 3)]; None: a soft grey gradient
-    """
+    """A picture on which triangles are drawn, four samples a pixel."""
 
     def __init__(self, camera: Camera, background: Colours | None = None) -> None:
         self.camera = camera
@@ -105,10 +99,7 @@ class Canvas:
         return picture
 
     def cut_out(self, places: Real, colours: Colours, triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
-        """Return triangles without background: red, green, blue and straight alpha [shape=(H, W, 4)].
-
-        Arguments as of ``picture``; the background of the canvas must be black.
-        """
+        """Return triangles without background: red, green, blue and straight alpha [shape=(H, W, 4)]."""
         picture = self.picture(places, colours, triangles)
         alpha = self._coverage(places, np.ones(len(places), bool), triangles)
         return add_alpha(picture, alpha, self._tone)
@@ -132,10 +123,7 @@ class Canvas:
 
 
 def add_alpha(picture: NDArray[np.uint8], alpha: NDArray[np.uint8], tone: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a picture before black [shape=(H, W, 3)] with its cover as straight alpha; the picture is changed.
-
-    tone : of ``tone_table``
-    """
+    """Return a picture before black [shape=(H, W, 3)] with its cover as straight alpha; the picture is changed."""
     partly = (alpha > 0) & (alpha < LARGEST_GREY)
     level = np.searchsorted(tone, picture[partly]) / (alpha[partly, None] / LARGEST_GREY)
     picture[partly] = tone[np.minimum(level, LEVELS - 1).astype(int)]
@@ -153,10 +141,7 @@ def gradient(
     middle: tuple[float, float, float] = (0.86, 0.89, 0.9),
     edge: tuple[float, float, float] = (0.56, 0.65, 0.7),
 ) -> Colours:
-    """Return a background that is brighter in the middle, as parts of ``WHITE`` [shape=(H, W, 3)].
-
-    middle, edge : colours in sRGB, 0 to 1
-    """
+    """Return a background [shape=(H, W, 3)] brighter in the middle, as parts of ``WHITE``; colours in sRGB, 0 to 1."""
     columns = (np.arange(camera.width) + 0.5 - camera.width / 2) / (0.75 * camera.height)
     rows = (np.arange(camera.height) + 0.5 - 0.42 * camera.height) / (0.75 * camera.height)
     near = np.exp(-(columns[None] ** 2) - rows[:, None] ** 2)[..., None]

@@ -67,12 +67,7 @@ class FaceWindow:
 
 
 class WindowedMesh:
-    """Follows one face with the mesh of a tracker in a window that goes along with it.
-
-    It is a ``PointFinder``. As the window moves with the face, the mesh sees a face that hardly moves.
-    box : of the face in the first picture
-    Use it as a context manager.
-    """
+    """Follows one face with the mesh of a tracker in a window that goes along with it."""
 
     def __init__(self, box: FaceBox, tracker: LandmarkTracker) -> None:
         self._window = FaceWindow.around(box.x, box.y, REACH * box.side)
@@ -124,8 +119,6 @@ class FaceFollower:
     The mesh finds a face that takes a fifth of the picture or more; smaller ones are found by the full-range detector
     and followed in a window.
     person  : thumbnails of the person who is to be followed; without any, it is the one with the most frames
-    tracker : name of the tracker that finds faces and points
-    Use it as a context manager.
     Raises InputError: no tracker of that name.
     """
 

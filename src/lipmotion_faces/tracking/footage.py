@@ -110,8 +110,6 @@ def footage_groups(footage: Footage, most_bytes: int = MAX_DECODED_BYTES) -> Fra
 
 
 class _SequentialReader:
-    """Reads groups of frames; a group that follows the one before is read on, without seeking."""
-
     def __init__(self, footage: Footage) -> None:
         self._footage = footage
         self._frames: Iterator[NDArray[np.uint8]] = iter(())

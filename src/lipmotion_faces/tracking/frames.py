@@ -19,11 +19,7 @@ from lipmotion_faces.tracking.packages import import_opencv
 
 @dataclass(frozen=True, eq=False)
 class VideoFrame:
-    """One picture.
-
-    time_s : its time since the start of the container, or of the span, s
-    image  : uint8 array [shape=(H, W, 3)], RGB, upright, square pixels
-    """
+    """A picture, RGB, upright, square pixels [shape=(H, W, 3)], and its time since the container's or span's start."""
 
     time_s: float
     image: NDArray[np.uint8]
@@ -33,7 +29,6 @@ class VideoFrame:
 class OpenVideo:
     """An open video.
 
-    frames          : the pictures; each is decoded when the iterator reaches it
     stated_rates_hz : the frame rates that the container states, the most reliable first
     stated_s        : the duration that the container states, 0 if none
     damage          : a reason for every packet or picture that was left out so far
@@ -105,11 +100,7 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
 
 
 def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float) -> list[str]:
-    """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end.
-
-    times_s : times of the pictures that were decoded
-    rate_hz : nominal frame rate
-    """
+    """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end."""
     notes = []
     end_s = float(times_s[-1]) + 1 / rate_hz
     if video.damage:
@@ -219,11 +210,7 @@ LOWEST_HZ, HIGHEST_HZ = 1.0, 1000.0
 
 
 def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
-    """Return the constant frame rate of the time stamps, even if frames were dropped.
-
-    times_s         : times of the decoded frames, rising
-    stated_rates_hz : of the container; the first that fits the median interval of the times is returned
-    """
+    """Return the constant rate of time stamps, though frames were dropped: the stated one that fits, or the median."""
     if len(times_s) < 2:
         return stated_rates_hz[0] if stated_rates_hz else RATE_WHEN_UNKNOWN_HZ
     measured = 1.0 / float(np.median(np.diff(times_s)))

@@ -64,7 +64,6 @@ def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
     points : array [shape=(T, N, 3)], any unit, x to the speaker's left, y up, z out of the face
     layout : the face-mesh index of each of the N points; holds all of RIGID_POINTS
     Source: Umeyama 1991 (one frame), Gower 1975 (the mean face).
-    Cost: O(T·N), T singular value decompositions of 3 × 3.
     """
     column = {index: n for n, index in enumerate(layout)}
     rigid = points[:, [column[index] for index in RIGID_POINTS]]

@@ -47,10 +47,7 @@ def is_cut(before: Array | None, after: Array) -> bool:
 
 
 def face_thumbnail(image: Image, eyes: Array) -> Array:
-    """Return a thumbnail of the upper face, upright [shape=(24, 36, 3)].
-
-    eyes : x and y of the right and left outer eye corner, px [shape=(2, 2)]
-    """
+    """Return a thumbnail of the upper face, upright [shape=(24, 36, 3)]."""
     cv2 = import_opencv()
     across = eyes[1] - eyes[0]
     down, middle, (width, height) = np.array([-across[1], across[0]]), eyes.mean(axis=0), FACE_SIZE
@@ -82,11 +79,7 @@ def image_correlation(first: Array, other: Array) -> Array:
 
 
 def find_occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Return in which frames something covers the mouth: its region is unlike the median region of the clip.
-
-    mouths : array [shape=(T, 14, 18, 3)] of ``mouth_thumbnail``
-    Returns bool array [shape=(T,)]; all False where the median picture has no texture.
-    """
+    """Return in which frames the mouth [shape=(T, 14, 18, 3)] is covered: unlike its median; none without texture."""
     median = np.median(mouths, axis=0)
     if np.square(median - median.mean(axis=(0, 1))).mean() < FLAT_LEVELS**2:
         return np.zeros(len(mouths), bool)

@@ -54,10 +54,8 @@ class _Graph:
 
 
 class FaceMesh(_Graph):
-    """Finds the faces in the frames of one clip, in order; it follows them from frame to frame.
-
-    most : the largest number of faces to find; with 1, the most probable one is kept
-    Raises MissingDependencyError: MediaPipe is not installed.
+    """Finds the faces in a clip's frames, up to ``most``, and follows them. Raises MissingDependencyError: no
+    MediaPipe.
     """
 
     def __init__(self, most: int = 1) -> None:
@@ -74,10 +72,7 @@ class FaceMesh(_Graph):
 
 
 class FaceFinder(_Graph):
-    """Finds the faces in single pictures, in any order; it keeps nothing from one picture to the next.
-
-    Raises MissingDependencyError when it is first used: MediaPipe is not installed.
-    """
+    """Finds the faces in single pictures. Raises MissingDependencyError when first used: no MediaPipe."""
 
     def __init__(self) -> None:
         settings = {"min_detection_confidence": LEAST_SCORE, "model_selection": FULL_RANGE_MODEL}

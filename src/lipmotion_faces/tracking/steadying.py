@@ -58,7 +58,6 @@ def steady_maps(maps: Array, rate_hz: float, cuts: Sequence[int] = (), *, noise_
     """Return maps of a face, smoothed over time [shape=(T, 2, 3)].
 
     maps    : of ``Footage.face_to_image`` or ``register_maps`` [shape=(T, 2, 3)]
-    rate_hz : frame rate
     cuts    : frames before which the camera changes; nothing is smoothed over them
     noise_px : ``TRACKED_NOISE_PX``, or ``REGISTERED_NOISE_PX`` for maps of ``register_maps``
     The turn and size of the face, and the position of the mouth, are smoothed by Gaussians. What they take away is

@@ -61,7 +61,6 @@ def track(
 
     path    : a video that shows one face, more or less from the front
     crops   : whether mouth pictures are wanted
-    span    : the part of the video that is tracked
     person  : thumbnails of the face that is wanted, of ``VideoScan``; without any, the one with the most frames
     tracker : name of the tracker that finds the face and its points (``trackers``)
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the start of the container, or
@@ -94,10 +93,7 @@ def make_track(path: Path, span: VideoSpan, frames: TrackedFrames, *, crops: boo
 
 
 def measure_motion(points: Array) -> Array:
-    """Return the values of ``CHANNELS`` in tracked frames [shape=(T, len(CHANNELS))].
-
-    points : array [shape=(T, len(TRACKED_POINTS), 3)], px, x to the right, y down, z away from the camera
-    """
+    """Return ``CHANNELS`` [shape=(T, len(CHANNELS))] of points in px, y down, z away [shape=(T, N, 3)]."""
     unit = distance_px(points, EYE_CORNERS)
     distances = np.stack([distance_px(points, pair) / unit for pair in DISTANCES.values()], axis=1)
     head = remove_head_motion(points * (1, -1, -1), TRACKED_POINTS)
@@ -140,8 +136,6 @@ class TrackedFrames:
 
 @dataclass(eq=False)
 class _Pictures:
-    """The frames so far: times, and whether each shows the face; points and mouth thumbnails of those that do."""
-
     times_s: list[float] = field(default_factory=list)
     seen: list[bool] = field(default_factory=list)
     points: list[Array] = field(default_factory=list)
@@ -167,11 +161,7 @@ class _Pictures:
 
 
 def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: str = MEDIAPIPE) -> TrackedFrames:
-    """Return the pictures of a video and where one person's face is in them; the video is decoded once.
-
-    path, span, person, tracker, and errors : as of ``track``
-    Memory: the points of every frame; no picture is kept.
-    """
+    """Return the pictures of a video, decoded once, and where one person's face is in them; no picture is kept."""
     pictures = _Pictures()
     with open_video(path, span) as video, FaceFollower(person, tracker) as follower:
         for frame in video.frames:
@@ -200,10 +190,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
 
 
 def distance_px(points: Array, pair: tuple[int, int]) -> Array:
-    """Return the distance in the image between two face-mesh points in every frame, px [shape=(T,)].
-
-    points : array [shape=(T, len(TRACKED_POINTS), 3)], px
-    """
+    """Return the distance in the image between two face-mesh points in every frame, px [shape=(T,)]."""
     between = points[:, COLUMN[pair[0]], :2] - points[:, COLUMN[pair[1]], :2]
     return np.linalg.norm(between, axis=1)
 

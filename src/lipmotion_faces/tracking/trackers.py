@@ -91,11 +91,7 @@ class BoxFinder(AbstractContextManager["BoxFinder"], Protocol):
     """Finds faces in single pictures, in any order, small ones too."""
 
     def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
-        """Return the faces in a picture, those with the highest score first.
-
-        image    : uint8 array [shape=(H, W, 3)], RGB
-        thorough : whether more time may be spent where none is found at first
-        """
+        """Return the faces in a picture [shape=(H, W, 3)], best score first; ``thorough``: search longer for any."""
 
 
 class LandmarkTracker(ABC):
@@ -107,16 +103,14 @@ class LandmarkTracker(ABC):
 
     @abstractmethod
     def versions(self) -> dict[str, str]:
-        """Return the versions of the packages that the results depend on; one has the name of the tracker.
-
-        Raises MissingDependencyError: one is not installed.
+        """Return the versions of packages that results depend on, with the tracker's. Raises MissingDependencyError:
+        one is missing.
         """
 
     @abstractmethod
     def points(self, most: int = 1) -> PointFinder:
-        """Return what finds the points of at most so many faces in a clip; with 1, those of the most probable one.
-
-        Raises MissingDependencyError: a package is not installed.
+        """Return what finds the points of at most so many faces in a clip. Raises MissingDependencyError: a package is
+        missing.
         """
 
     @abstractmethod

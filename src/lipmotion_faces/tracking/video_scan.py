@@ -29,7 +29,6 @@ class VideoScan:
 
     times_s : their times, rising, s
     cuts_s  : the times of those before which the camera changes, s
-    rate_hz : nominal frame rate
     person  : thumbnails of the face that is seen most, where other people are seen too; else none
     damage  : remarks on pictures that cannot be decoded, or are missing at the end
     """
@@ -49,8 +48,6 @@ class VideoScan:
 def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tracker: str = MEDIAPIPE) -> VideoScan:
     """Return the times and cuts of a video, and the person in it; every picture is decoded once, at a small size.
 
-    reached : called now and then with the share of the stated duration that is done
-    tracker : name of the tracker that finds faces
     Raises InputError: as ``open_video``, an impossible frame rate, or no tracker of that name.
     Raises MissingDependencyError: OpenCV or MediaPipe is not installed.
     """

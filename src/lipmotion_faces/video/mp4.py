@@ -1,4 +1,4 @@
-"""``.mp4``: frames and sound as a video of H.264 and AAC with the index first, which all players can play."""
+"""Video files: ``.mp4`` (H.264, AAC), which all players play; ``.webm``, ``.mov`` and pictures, also transparent."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from heapq import merge
 from itertools import chain
 from operator import itemgetter
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,10 +125,7 @@ def frame_rate(fps: float) -> Fraction:
 def check_frames(
     frames: Iterable[Frame], path: Path, kind: str, is_even: Callable[[tuple[int, ...]], bool]
 ) -> Iterator[Frame]:
-    """Yield the frames. Raises ExportError: there are none, or one has another type or size than required.
-
-    kind    : of colours, for the message;  is_even : whether a shape is of that kind and of even sizes
-    """
+    """Yield the frames. Raises ExportError: none, or one of another type or size than ``is_even`` asks."""
     shape: tuple[int, ...] | None = None
     for n, frame in enumerate(frames):
         shape = shape or frame.shape
@@ -211,3 +208,83 @@ def sound_parts(audio: Audio) -> Iterator[Any]:
         part = AudioFrame.from_ndarray(samples, format="fltp", layout="mono")
         part.rate, part.pts, part.time_base = audio.rate_hz, start, Fraction(1, audio.rate_hz)
         yield part
+
+
+class _Codecs(NamedTuple):
+    """How a container is encoded; pixel formats of opaque and of transparent pictures."""
+
+    container: str
+    video: str
+    opaque: str
+    transparent: str
+    video_options: dict[str, str]
+    sound: str
+    sound_format: str
+
+
+_WEBM = {"crf": "24", "b": "0", "deadline": "realtime", "cpu-used": "6", "row-mt": "1", "auto-alt-ref": "0"}
+_CONTAINERS = {
+    ".webm": _Codecs("webm", "libvpx-vp9", "yuv420p", "yuva420p", _WEBM, "libopus", "flt"),
+    ".mov": _Codecs("mov", "prores_ks", "yuv444p10le", "yuva444p10le", {"profile": "4444"}, "pcm_s16le", "s16"),
+}
+"""VP9 with its transparency as a second stream, as browsers and OBS play it; ProRes 4444, as editors take it."""
+
+
+def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: Audio) -> None:
+    """Write a ``.webm`` (VP9, Opus) or ``.mov`` (ProRes 4444, PCM); frame n is shown at ``n / fps`` seconds.
+
+    frames : RGB or RGBA with straight alpha [shape=(H, W, 3 or 4)], even sizes, at least one; taken one at a time
+    After a failure there is no partial file.
+    Raises ExportError: another suffix, no frames, unsuitable frames, no sound, fps not positive, or the file cannot be
+    written.
+    """
+    if path.suffix.lower() not in _CONTAINERS:
+        raise ExportError(f"{path}: required one of: {' '.join(_CONTAINERS)}")
+    if not 0 < fps < np.inf:
+        raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
+    if not len(audio.samples):
+        raise ExportError(f"{path}: the sound has no samples")
+    with atomic_file(path) as temporary:
+        _encode_alpha(temporary, path, check_frames(frames, path, "RGB or RGBA", _is_even), frame_rate(fps), audio)
+
+
+def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
+    """Write frames as numbered pictures; a name like ``frame%05d.png`` says where the number, from 0 on, is put.
+
+    frames : RGB or RGBA with straight alpha [shape=(H, W, 3 or 4)], at least one; taken one at a time
+    Each file is whole or not there. Raises ExportError: no frames, unsuitable frames, or a file cannot be written.
+    """
+    from PIL import Image
+
+    for number, frame in enumerate(check_frames(frames, path, "RGB or RGBA", _is_even)):
+        with atomic_file(path.with_name(path.name % number)) as temporary:
+            Image.fromarray(frame).save(temporary, compress_level=4)
+
+
+def _is_even(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 3 and shape[2] in (3, 4) and not (shape[0] % 2 or shape[1] % 2)
+
+
+def _encode_alpha(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction, audio: Audio) -> None:
+    from av import AudioResampler, VideoFrame
+
+    codecs, first = _CONTAINERS[path.suffix.lower()], next(frames)
+    has_alpha = first.shape[2] == 4
+    pixels = codecs.transparent if has_alpha else codecs.opaque
+    with open_output(temporary, path, format=codecs.container) as container:
+        video = container.add_stream(codecs.video, rate=rate, options=codecs.video_options)
+        video.height, video.width = first.shape[:2]
+        video.pix_fmt = pixels
+        context = video.codec_context
+        context.time_base, context.thread_count = 1 / rate, os.cpu_count() or 1
+        context.colorspace = context.color_primaries = context.color_trc = _BT709
+        context.color_range = _LIMITED_RANGE
+        sound = container.add_stream(codecs.sound, rate=SOUND_HZ, layout="mono")
+        resampler = AudioResampler(format=codecs.sound_format, layout="mono", rate=SOUND_HZ)
+
+        def convert(frame: Frame) -> Any:
+            picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if has_alpha else "rgb24")
+            return picture.reformat(format=pixels, dst_colorspace="itu709")
+
+        parts = (part for sound_part in chain(sound_parts(audio), [None]) for part in resampler.resample(sound_part))
+        mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, parts)

@@ -1,9 +1,9 @@
-"""Evaluation: ``evaluate(model, corpus) → figures``, the figures of docs/measures.md."""
+"""Evaluation: ``evaluate(model, corpus) → figures``, those of docs/measures.md, and comparisons of systems."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.measures.closures import closure_figures, phone_closures
-from lipmotion.measures.curves import bootstrap_interval
+from lipmotion.measures.closures import clip_closure_counts, closure_figures, phone_closures
+from lipmotion.measures.curves import Clips, bootstrap_interval
 from lipmotion.motion.rest import is_away_from_speech
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.stats.curves import varies
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Monitor, Utterance, silent_monitor
 from lipmotion.units import VISEMES, Lexicon
@@ -25,6 +26,7 @@ from lipmotion_lab.evaluation.held_out import (
     TEST_LIST,
     WITH_TRANSCRIPT,
     ComparedClip,
+    HeldOutRecordings,
     generate_compared,
     load_held_out,
     make_speech,
@@ -54,8 +56,6 @@ class Compared(Protocol):
 def figures_of(clips: Sequence[ComparedClip], recordings: Compared, seed: int) -> dict[str, Any]:
     """Return the figures of one condition, by name; figures that cannot be computed are NaN.
 
-    recordings : of the clips
-    seed       : of the bootstrap interval
     Eigenlips have figures of their own, ``eigenlips``; without other channels, these are also the overall figures.
     """
     compared, threshold = recordings.channels, recordings.closed_under
@@ -156,10 +156,7 @@ def evaluate(
     """Return the figures of docs/measures.md, by name: from audio only and, if all have transcripts, with them.
 
     selection  : the utterances to compare; by default those of the list ``test``
-    lexicon    : pronunciations of words, ahead of those of the dictionary
     recogniser : ``own``, ``general`` or ``auto``, as in ``Request``
-    seed       : of the bootstrap interval
-    monitor    : called with reports of progress
 
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; in addition
     or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
@@ -233,3 +230,85 @@ def _was_trained_on(model: Model, utterances: Sequence[Utterance], folder: str) 
         and (not speakers or utterance.speaker in speakers)
         for utterance in utterances
     )
+
+
+Array = NDArray[np.float64]
+LEAST_DIFFERENCE = 1e-6
+"""A smaller difference of correlations, or of lengths in eye distances, is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClipStatistic:
+    """A function ``from_total`` of the sum of each clip's contribution, so that bootstrap samples are cheap."""
+
+    sums: Sequence[Array]
+    from_total: Callable[[Array], float]
+
+    @property
+    def value(self) -> float:
+        """The statistic over all clips."""
+        return self._value(self.sums)
+
+    def interval(self, seed: int) -> tuple[float, float]:
+        """Return the 95 % bootstrap interval over clips."""
+        return bootstrap_interval(lambda own, _: self._value(own), self.sums, self.sums, seed)
+
+    def gain(self, other: ClipStatistic, seed: int) -> tuple[float, float]:
+        """Return the paired 95 % bootstrap interval of this statistic minus that of another system."""
+        return bootstrap_interval(
+            lambda own, others: self._value(own) - other._value(others), self.sums, other.sums, seed
+        )
+
+    def _value(self, sums: Sequence[Array]) -> float:
+        return self.from_total(np.sum(sums, axis=0))
+
+
+def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
+    """Return the mean over channels of ``curves.pooled_correlation`` of clips [each shape=(T_i, P)]."""
+    middle, everything = np.concatenate(original).mean(axis=0), np.concatenate(generated)
+    still = ~varies(everything)
+
+    def moments(g: Array, o: Array) -> Array:
+        a, b = np.where(still, 0, g - middle), o - middle
+        return np.stack([np.full(a.shape[1], float(len(a))), *(x.sum(axis=0) for x in (a, b, a * a, b * b, a * b))])
+
+    def mean_correlation(total: Array) -> float:
+        count, a, b, aa, bb, ab = total
+        squares = np.maximum(aa - a * a / count, 0) * np.maximum(bb - b * b / count, 0)
+        correlations = (ab - a * b / count) / np.where(squares > 0, np.sqrt(squares), np.inf)
+        return float(correlations.mean())
+
+    return ClipStatistic([moments(g, o) for g, o in zip(generated, original, strict=True)], mean_correlation)
+
+
+def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
+    """Return ``curves.mean_distance`` of clips [each shape=(T_i, P)]."""
+    errors = [np.linalg.norm(g - o, axis=1) for g, o in zip(generated, original, strict=True)]
+    sums = [np.array([error.sum(), len(error)]) for error in errors]
+    return ClipStatistic(sums, lambda total: float(total[0] / total[1]))
+
+
+def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
+    """Return the share, in %, of original closings found in generated openings; NaN where there are none."""
+    hits, count = clip_closure_counts(generated, original, threshold)
+    sums = [np.concatenate(pair) for pair in zip(hits, count, strict=True)]
+    return ClipStatistic(sums, lambda total: float(100 * total[0] / total[1]) if total[1] else float("nan"))
+
+
+def opening_curves(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> tuple[list[Array], list[Array]]:
+    """Return the generated and the original opening of every clip [each shape=(T, 1)]."""
+    column = slice(recordings.channels.index(OPENING), recordings.channels.index(OPENING) + 1)
+    return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
+
+
+def sign_of_difference(interval: Sequence[float | None]) -> int:
+    """Return 1 or -1 for a difference whose interval leaves out 0, by ``LEAST_DIFFERENCE`` for rounding, else 0."""
+    low, high = interval
+    if low is None or high is None:
+        return 0
+    return int(low > LEAST_DIFFERENCE) - int(high < -LEAST_DIFFERENCE)
+
+
+def significance_mark(gain: Sequence[float | None]) -> str:
+    """Return ``*`` if the interval of a difference does not contain 0, else an empty text."""
+    return "*" if sign_of_difference(gain) else ""

@@ -1,9 +1,10 @@
-"""Held-out recordings, the conditions under which they are animated, and pairs of recorded and generated motion."""
+"""Held-out recordings, also in noise, and pairs of recorded and generated motion."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Animator
-from lipmotion.errors import AlignmentError, CorpusError
+from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.eigenlips import Eigenlips
@@ -22,10 +23,15 @@ from lipmotion.pipeline.generation import generate_for
 from lipmotion.pipeline.model import GEOMETRY, Model, with_prior
 from lipmotion.pipeline.training.channels import with_visual_channels
 from lipmotion.pipeline.training.train import label_phones
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.speech.sound.noise import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
+from lipmotion.storage.files import check_listable
 from lipmotion.types import (
     GREY,
+    Audio,
     Monitor,
     Speech,
     Timeline,
@@ -49,14 +55,11 @@ DISTANCES = (OPENING, "width", "outer")
 class HeldOutRecordings:
     """Recordings with which generated motion is compared, and their phones in time.
 
-    utterances   : the recordings
     channels     : names of the channels that are compared
     still        : names of the channels that are left out because they do not move
     closed_under : the opening under which the mouth counts as closed, in eye distances (None: no channel ``opening``)
     reference    : phones in time of every utterance: labelled, or aligned, or recognised
     conditions   : phones in time that the engine is given, by condition: ``audio only``, ``with transcript``
-    phones       : the recogniser of these phones
-    recognitions : what it recognised in every utterance
     eigenlips    : principal components of mouth pictures (None: their coefficients are not compared)
     prior        : the model on which the evaluated one stands (None: it stands on none)
     speakers     : maps of the people whom the evaluated model knows (None: it tells no people apart)
@@ -129,12 +132,8 @@ def load_held_out(  # noqa: PLR0913
 ) -> HeldOutRecordings:
     """Return held-out recordings with aligned and recognised phones. Raises as ``evaluate``.
 
-    phones    : the recogniser
-    selection : the utterances; by default those of the list ``test``
     channels  : the channels to compare, whether they move or not; None: from ``choose_channels``
     visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
-    prior     : the model on which the evaluated one stands, or None
-    speakers  : maps of the people whom the evaluated model knows, or None
     """
     lexicon = lexicon or Lexicon()
     utterances = [
@@ -191,11 +190,7 @@ def choose_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], t
 def generate_clips(
     recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
-    """Return recorded and generated motion of all utterances under a condition.
-
-    learned : the engine's model of motion
-    Raises CorpusError: the model has other channels.
-    """
+    """Return recorded and generated motion of all utterances. Raises CorpusError: the model has other channels."""
     speech = make_speech(recordings, condition, engine, learned)
     return generate_compared(recordings, speech, engine, learned)
 
@@ -225,12 +220,7 @@ def make_speech(
 def generate_compared(
     recordings: HeldOutRecordings, speech: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
-    """Return recorded and generated motion of all utterances.
-
-    speech  : from ``make_speech``, one for each utterance
-    learned : the engine's model of motion
-    Raises CorpusError: the model has other channels.
-    """
+    """Return recorded and generated motion of all utterances for their speech. Raises CorpusError: other channels."""
     clips, channels = [], recordings.channels
     for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True):
         generated = generate_for(recordings.person(utterance), engine, learned, spoken).motion
@@ -250,3 +240,59 @@ def generate_compared(
         )
         clips.append(clip)
     return clips
+
+
+LONGEST_S = 30
+"""Seconds that are read of each talker."""
+BABBLE = "babble"
+
+
+@dataclass(frozen=True)
+class NoiseConditions:
+    """Noise that is added to the held-out recordings."""
+
+    kinds: tuple[str, ...] = ()
+    ratios_db: tuple[float, ...] = (20.0, 10.0, 5.0, 0.0)
+    talkers: tuple[Audio, ...] = ()
+
+    def __post_init__(self) -> None:
+        unknown = [kind for kind in self.kinds if kind not in NOISE_KINDS]
+        if unknown:
+            raise InputError(f"unknown noise {unknown[0]!r}; required some of: {', '.join(NOISE_KINDS)}")
+        if BABBLE in self.kinds and len(self.talkers) < FEWEST_TALKERS:
+            raise InputError(f"a babble of {len(self.talkers)} talkers; required at least {FEWEST_TALKERS}: --talkers")
+
+
+def add_noise(
+    recordings: HeldOutRecordings,
+    kind: str,
+    snr_db: float,
+    talkers: Sequence[Audio] = (),
+    seed: int = 0,
+    monitor: Monitor = silent_monitor,
+) -> HeldOutRecordings:
+    """Return recordings with noise, each its own, ``audio only``; arguments and errors as of ``noisy_audio``."""
+    utterances, recognitions = [], []
+    for number, utterance in enumerate(with_progress(recordings.utterances, "adding noise", monitor)):
+        audio = noisy_audio(utterance.audio, kind, snr_db, talkers, seed + number)
+        utterances.append(replace(utterance, audio=audio, features=analysed(audio).mfcc()))
+        recognitions.append(recordings.phones.recognition(audio, utterances[-1].features))
+    phones = [found.units for found in recognitions]
+    return replace(recordings, utterances=utterances, conditions={AUDIO_ONLY: phones}, recognitions=recognitions)
+
+
+def read_talkers(folder: Path) -> list[Audio]:
+    """Return the first half minute of every recording in a folder. Raises InputError: no such folder, or none in it."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; give one with recordings of other people, for the babble")
+    check_listable(folder)
+    talkers = []
+    for path in sorted(folder.iterdir()):
+        try:
+            audio = read_audio(path)
+        except InputError:  # a list or a transcript
+            continue
+        talkers.append(Audio(audio.samples[: LONGEST_S * SPEECH_RATE_HZ], audio.rate_hz))
+    if not talkers:
+        raise InputError(f"{folder}: no recording in it; give a folder with recordings of other people, for the babble")
+    return talkers

@@ -20,10 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Dot:
-    """A figure with its interval, and the paper's own.
-
-    value, interval, paper : None: there is none
-    """
+    """A figure with its interval, and the paper's own; None: there is none."""
 
     name: str
     value: float | None
@@ -33,8 +30,6 @@ class Dot:
 
 @dataclass(frozen=True)
 class _Scale:
-    """Where values stand on an axis: ``low`` at ``start``, ``high`` at ``stop``."""
-
     low: float
     high: float
     start: float
@@ -60,10 +55,7 @@ class _Scale:
 
 
 def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
-    """Return a chart with a line for each row: the figure, its interval, and the paper's own as a diamond.
-
-    unit : below the axis
-    """
+    """Return a chart with a line for each row: the figure, its interval, and the paper's own as a diamond."""
     values = [v for row in rows for v in (row.value, row.paper, *(row.interval or ())) if v is not None]
     scale, height = _Scale.of(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
     parts, bottom = [], height - AXIS - 2
@@ -93,11 +85,7 @@ def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
 def draw_curve(
     title: str, time_s: Array, recorded: Array, generated: Array, marked: Sequence[tuple[float, float, str]]
 ) -> Html:
-    """Return recorded (dashed) and generated motion over time, of one clip.
-
-    recorded, generated : of one channel [each shape=(N,)]
-    marked              : start and end in seconds, and name, of what is shaded
-    """
+    """Return recorded (dashed) and generated motion [each shape=(N,)] over time; ``marked``: (start, end, name)."""
     bottom = CURVE_HEIGHT - 18
     across = _Scale(float(time_s[0]), float(time_s[-1]), CURVE_LEFT, WIDTH - 4)
     up = _Scale.of([*recorded, *generated], bottom, CURVE_TOP)
@@ -119,10 +107,7 @@ def draw_curve(
 
 
 def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:
-    """Return figures with intervals over a number, on a logarithmic axis: a line for each name.
-
-    lines : numbers, and their figures
-    """
+    """Return figures with intervals over a number, on a logarithmic axis: a line for each name."""
     height, bottom = 220, 186
     points = [point for line in lines.values() for point in line if point[1].value is not None]
     up = _Scale.of([v for _, dot in points for v in (dot.value, *(dot.interval or ())) if v is not None], bottom, 10)

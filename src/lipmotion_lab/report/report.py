@@ -36,7 +36,7 @@ from lipmotion_lab.engine_comparison import engines
 from lipmotion_lab.folds import FOLDS, folds
 from lipmotion_lab.learning_curve import learning_curve
 from lipmotion_lab.minnis2000 import minnis2000
-from lipmotion_lab.report.page import FinishedPart, report_html
+from lipmotion_lab.report.page import ClipKeeper, FinishedPart, report_html, write_videos
 from lipmotion_lab.report.section import Section
 from lipmotion_lab.report.sections import (
     engines_section,
@@ -46,9 +46,7 @@ from lipmotion_lab.report.sections import (
     minnis_section,
     xie_liu_section,
 )
-from lipmotion_lab.report.shown_clip import ClipKeeper, write_videos
-from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, check_opening, take_quick_part
-from lipmotion_lab.stamp import Stamp
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_CAPTIONS
 from lipmotion_lab.xie_liu2007.systems import COMPARED_SYSTEMS, select_systems
@@ -59,12 +57,7 @@ QUICK_FOLDS = 2
 
 @dataclass(frozen=True)
 class PartRun:
-    """What an experiment is run with.
-
-    work   : an existing folder for finished parts of it
-    models : a folder of engines' models, which several experiments share
-    plots  : a folder for pictures; None: none are drawn
-    """
+    """What an experiment is run with; ``models`` are shared by several."""
 
     corpus: Corpus
     quick: bool
@@ -76,14 +69,7 @@ class PartRun:
 
 @dataclass(frozen=True)
 class ReportPart:
-    """An experiment of a report.
-
-    lists    : that the corpus must have
-    share    : of the time that all take, roughly
-    run      : returns its figures
-    section  : returns what they say
-    draws    : whether it writes pictures, for which it needs matplotlib
-    """
+    """An experiment of a report, and its rough share of the time."""
 
     lists: tuple[str, ...]
     share: float
@@ -147,7 +133,6 @@ PARTS: dict[str, ReportPart] = {
 PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
 """The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
 KEY_DIGITS = 8
-"""Digits of a key in the name of a folder."""
 NOT_YET = "not finished; the same command goes on with it"
 FAILED, AGAIN = "failed: ", "mend that, then give the same command: it goes on with it"
 NOT_CHOSEN = "not chosen"
@@ -157,7 +142,6 @@ NOT_CHOSEN = "not chosen"
 class WrittenReport:
     """A report that was written.
 
-    page     : its path
     verdicts : what was found, one sentence by experiment
     left_out : why experiments are not in it, by name
     failed   : errors of experiments that failed, by name; the same command tries them again
@@ -182,9 +166,6 @@ def experiment_report(
     """Run experiments on a corpus, and write a page of what they found, with its tables, pictures and videos.
 
     folder   : of the report, made if need be. What is finished in it is not computed again; a call after a stop goes on
-    only     : names of ``parts.PARTS``; None: all that the corpus has recordings for
-    quick    : few recordings and small models, to see that it runs
-    settings : of all experiments
     The page is written anew when an experiment is finished; where nothing is left to do, nothing is written. Every
     experiment has a folder of its own beside the page. Where the corpus lacks a list, the page says what is left out.
     An experiment that fails does not stop the others: the page says with what error it failed.
@@ -251,13 +232,6 @@ def _check_folder(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class _Writer:
-    """Runs experiments and writes their folders and the page.
-
-    lacking : why experiments are left out, by name
-    digest  : of all that the figures of every experiment depend on
-    failed  : errors of experiments that failed, by name
-    """
-
     corpus: Corpus
     folder: Path
     quick: bool
@@ -309,11 +283,7 @@ class _Writer:
                 unfinished.write_text(text, encoding="utf-8")
 
     def run(self, name: str, settings: ExperimentSettings) -> None:
-        """Run an experiment, and write its folder; where it fails, keep the error.
-
-        settings : with the monitor of this experiment
-        Raises ExportError: something cannot be written.
-        """
+        """Run an experiment with its settings, and write its folder, or keep its error. Raises ExportError."""
         try:
             self._run(name, settings)
         except ExportError:

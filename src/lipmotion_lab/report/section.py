@@ -11,7 +11,7 @@ from typing import Any
 from lipmotion.formats.web_page import Html, element, joined
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.text_table import as_field
-from lipmotion_lab.comparison import sign_of_difference, significance_mark
+from lipmotion_lab.evaluation.evaluate import sign_of_difference, significance_mark
 
 INTERVAL, DIFFERENCE = "_95", "_gain_95"
 """Endings of the keys under which a row has the interval of a figure, and that of its difference from a reference."""
@@ -23,7 +23,6 @@ class Column:
     """A figure of every row.
 
     key   : of the figure in a row; its interval and difference, where there are any, are beside it
-    title : above the column
     form  : how numbers are written; empty: a text
     note  : what the figure is, in words; empty: the title says it
     """
@@ -50,10 +49,7 @@ OPENING = (ACC, NRMSE, SCORE, PRECISION, RECALL, VARIANCE)
 class Table:
     """A table of a report.
 
-    name      : of its files
-    caption   : above it
     columns   : after the names of the rows
-    rows      : by name
     reference : the row that differences are from; empty: there are no differences
     head      : what the rows are
     """
@@ -96,10 +92,7 @@ class Table:
         return about | {"rows": self.records()}
 
     def as_html(self, folder: str) -> Html:
-        """Return the table on the page; where it is wider than the screen, it scrolls by itself.
-
-        folder : beside the page, that has the folder ``tables`` with its files
-        """
+        """Return the table on the page; where it is wider than the screen, it scrolls by itself."""
         heads = [
             element("th", self.head, scope="col"),
             *(element("th", each.title, scope="col", class_="number" if each.form else None) for each in self.columns),
@@ -109,10 +102,7 @@ class Table:
             for name, row in self.rows.items()
         ]
         table = element(
-            "table",
-            element("caption", self.caption),
-            element("thead", element("tr", *heads)),
-            element("tbody", *lines),
+            "table", element("caption", self.caption), element("thead", element("tr", *heads)), element("tbody", *lines)
         )
         # the star, the files, and what the columns are
         files = [element("a", kind.upper(), href=f"{folder}/tables/{self.name}.{kind}") for kind in ("csv", "json")]
@@ -149,13 +139,11 @@ FEW_CLIPS = 10
 class Section:
     """The words, charts and tables of one experiment.
 
-    title    : the paper, or what is compared
     about    : what was trained and compared, in sentences
     verdict  : what was found, in one sentence
     words    : what held and what did not, in sentences, by what they are of
     charts   : drawings
     table    : the most important one
-    more     : tables that are folded, each with the sentence above it
     shown    : systems whose motion is shown, by the names that ``ExperimentSettings.receive`` gets
     """
 
@@ -197,11 +185,7 @@ CHANCE = 0.05
 
 @dataclass(frozen=True)
 class PaperPair:
-    """Two systems, of which the paper has the first as the better one.
-
-    difference : here, in the figure's unit, positive as in the paper; None: not defined
-    interval   : its 95 % interval on the same recordings
-    """
+    """Two systems, the first better in print, and their difference here, positive as in print (None: undefined)."""
 
     better: str
     worse: str
@@ -218,9 +202,6 @@ class PaperPair:
 class PaperOrder:
     """The order of some systems by a figure, in a paper and here.
 
-    figure   : its name, in words
-    paper    : the paper's values
-    here     : the values here; None: not defined
     pairs    : every two systems
     form     : how a difference is written
     is_error : whether the smallest value is the best
@@ -288,7 +269,6 @@ class PaperOrder:
         return ", ".join(f"{name} {value:{form}}" for name, value in known)
 
     def _best(self, values: Mapping[str, float | None]) -> list[str]:
-        """Return the names of the best value; none where none is defined."""
         known = {name: value for name, value in values.items() if value is not None}
         best = (min if self.is_error else max)(known.values(), default=None)
         return [name for name, value in known.items() if value == best]

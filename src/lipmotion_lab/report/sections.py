@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from lipmotion.measures.evaluation_table import figure_text
-from lipmotion_lab.comparison import sign_of_difference
+from lipmotion_lab.evaluation.evaluate import sign_of_difference
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
 from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS

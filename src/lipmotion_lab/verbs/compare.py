@@ -24,7 +24,5 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion_lab.compare import compare
 
     report_figures(
-        options,
-        lambda _, monitor: compare(options.reference, *options.others, monitor=monitor),
-        comparison_table,
+        options, lambda _, monitor: compare(options.reference, *options.others, monitor=monitor), comparison_table
     )

@@ -40,10 +40,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = "") -> None:
-    """Add the corpus, ``--workers``, and the options of ``add_figures_arguments``.
-
-    quick : what is small with ``--quick``, beside the recordings; without it there is no such option
-    """
+    """Add the corpus, ``--workers``, the figures, and, if it is said what is small then, ``--quick``."""
     add_input(parser, "corpus", what="corpus")
     if quick:
         help_text = f"see that it runs: 20 recordings to train on, at most 6 to compare, {quick}"
@@ -66,8 +63,7 @@ def run_experiment(
     """
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.files import unfinished_work
-    from lipmotion_lab.runner import ExperimentSettings, take_quick_part
-    from lipmotion_lab.stamp import Stamp
+    from lipmotion_lab.runner import ExperimentSettings, Stamp, take_quick_part
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
         stamp = Stamp()
@@ -174,7 +170,7 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its table."""
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
-    from lipmotion_lab.noise import NoiseConditions, read_talkers
+    from lipmotion_lab.evaluation.held_out import NoiseConditions, read_talkers
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, table, xieliu2007
 
     if options.quick and options.order:

@@ -20,13 +20,11 @@ from lipmotion_lab.xie_liu2007.systems import TrainedSystem
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
 """Recordings that are shown in one picture."""
 PLOT_FILES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
-"""File names of the pictures like Figs. 7, 10 and 11."""
 PLOT_CAPTIONS = {
     PLOT_FILES["start"]: "As Fig. 7: conversion by ph-vi-CHMM of one recording, from means along the best path by EM",
     PLOT_FILES["steps"]: "As Fig. 10: convergence of the conversion, by steps of EM",
     PLOT_FILES["clips"]: "As Fig. 11: predicted beside recorded motion, ph-vi-CHMM",
 }
-"""What the pictures show, by their file names."""
 
 
 def import_figure() -> Any:
@@ -41,10 +39,7 @@ def import_figure() -> Any:
 
 
 def check_plot_folder(folder: Path) -> None:
-    """Check before the long work that pictures can be picture and written; the folder need not exist yet.
-
-    Raises MissingDependencyError: no matplotlib. Raises ExportError: the folder cannot be made.
-    """
+    """Check, before long work, that pictures can be written. Raises MissingDependencyError, ExportError."""
     import_figure()
     if not folder.parent.is_dir():
         raise ExportError(f"{folder}: the folder {folder.parent} does not exist; create it first")
@@ -53,11 +48,7 @@ def check_plot_folder(folder: Path) -> None:
 
 
 def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
-    """Write pictures of the conversion by coupled chains with EM, of the first recordings, audio only.
-
-    folder : made if it does not exist
-    Raises MissingDependencyError: no matplotlib. Raises ExportError: a picture cannot be written.
-    """
+    """Write pictures of the conversion by EM of the first recordings. Raises MissingDependencyError, ExportError."""
     figure = import_figure()
     some = recordings.first(CONVERGENCE_RECORDINGS)
     by_em = generate_clips(some, AUDIO_ONLY, chains.engine, chains.model)

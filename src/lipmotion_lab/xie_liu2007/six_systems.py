@@ -31,24 +31,25 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Example, Monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
-from lipmotion_lab.comparison import (
+from lipmotion_lab.evaluation.evaluate import (
     ClipStatistic,
     correlation_statistic,
     distance_statistic,
+    figures_of,
     opening_curves,
     significance_mark,
 )
-from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
     ComparedClip,
     HeldOutRecordings,
+    NoiseConditions,
+    add_noise,
     generate_clips,
     load_held_out,
 )
 from lipmotion_lab.learning_curve import check_training_names, choose_sizes
-from lipmotion_lab.noise import NoiseConditions, add_noise
 from lipmotion_lab.runner import (
     DEFAULT_SETTINGS,
     QUICK_CLIPS,
@@ -88,7 +89,6 @@ TRIALS = "trials"
 class ComparisonOptions:
     """Which systems are compared, and in which conditions.
 
-    systems     : names of ``systems.COMPARED_SYSTEMS``; None: all whose packages are installed
     tuning      : how the settings of tuned systems are chosen, on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
@@ -127,9 +127,6 @@ def xieliu2007(  # noqa: PLR0913
     """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
     order, sizes : train on the first N names of a list, as in ``learning_curve``; by default on all of ``train``
-    plots        : a folder for pictures like Figs. 7, 10 and 11 of the paper, of the largest size
-    work         : a folder for what is finished, from which the same call goes on after a stop; None: nothing is kept
-    settings     : its workers share the forced alignment
     The phones in time are computed once for each size and are the same for all systems. The settings of tuned systems
     are chosen on the list ``val``, with systems trained on the first recordings of the list; then their number of
     Gaussians, and whether they are better than those printed, with systems of the size itself.
@@ -184,11 +181,6 @@ def xieliu2007(  # noqa: PLR0913
 
 @dataclass(frozen=True, eq=False)
 class _TrainedSystems:
-    """Systems trained on some utterances, and the held-out recordings.
-
-    used : names of the utterances that they were trained on
-    """
-
     used: tuple[str, ...]
     recordings: HeldOutRecordings
     systems: Mapping[str, TrainedSystem]
@@ -196,11 +188,7 @@ class _TrainedSystems:
 
 @dataclass(frozen=True, eq=False)
 class _TrainingSetup:
-    """What the trainings on all sizes have in common.
-
-    held_out, validation : names of utterances
-    work                 : folder for finished parts, or None
-    """
+    """What the trainings on all sizes have in common."""
 
     corpus: Corpus
     held_out: Sequence[str]
@@ -249,10 +237,7 @@ class _TrainingSetup:
     def _prepared(
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
     ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
-        """Return the examples of some utterances, and recordings with the phones of models trained on these.
-
-        The recordings are those of the list ``val`` and those ``held out``, by these names, where there are some.
-        """
+        """Return the examples of some utterances, and recordings with the phones of models trained on these."""
         lexicon, config = self.settings.lexicon or Lexicon(), self.settings.recogniser or HmmConfig()
         visual = self.options.visual
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
@@ -310,7 +295,6 @@ def _generate(
     systems: Mapping[str, TrainedSystem],
     kept: Checkpoint = NO_CHECKPOINT,
 ) -> dict[str, list[ComparedClip]]:
-    """Return what all systems generate in one condition."""
     made = {}
     for name, system in systems.items():
         stage = f"{condition}-{name}"
@@ -325,10 +309,7 @@ def _generate(
 def _paper_pairs(
     recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int
 ) -> list[dict[str, Any]]:
-    """Return how much better each system of the paper is than each that is worse in print, on the same clips.
-
-    Printed systems are compared with printed ones, and tuned ones with tuned ones; ``acc`` and ``amse``: difference.
-    """
+    """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
     by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
     rows = []
     for ending in ("", TUNED):
@@ -379,7 +360,6 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
 
 WIDTH = 34
 NAMED_CHANNELS = 8
-"""Most channels that are named one by one."""
 HEAD = (
     f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
     "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
@@ -439,7 +419,6 @@ def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any], amse_f
 
 
 def _pair_lines(pairs: Sequence[Mapping[str, Any]], amse_form: str) -> list[str]:
-    """Return the lines of the paper's order, pair by pair."""
     if not pairs:
         return []
     lines = ["", f"  {'in the paper better than':{2 * WIDTH}}{'ACC (95 %)':27}AMSE (95 %)"]

@@ -22,7 +22,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
 from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, LoudnessRegression, MeanPose, import_torch
-from lipmotion_lab.comparison import correlation_statistic, distance_statistic
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
 
 Options = Mapping[str, Any]
@@ -38,7 +38,6 @@ class TuningOptions:
 
     clips           : number of recordings to train on while settings are tried
     judges          : number of recordings of the list ``val`` by which they are judged
-    weights         : exponents of the density of speech
     mixtures        : most Gaussians a state, of speech; 1, 2, 4, … are tried
     visual_mixtures : Gaussians a state of lips, then
     pair_mixtures   : most Gaussians of factorial chains, whose densities are those of pairs of states
@@ -59,12 +58,7 @@ TUNING = TuningOptions()
 
 @dataclass(frozen=True)
 class Trial:
-    """One setting that was tried.
-
-    options    : of the coupled engine
-    acc, amse  : of the validation recordings, audio only
-    parameters : numbers that its chains have learned
-    """
+    """One setting that was tried, with its ACC and AMSE on validation recordings."""
 
     options: Options
     acc: float
@@ -74,13 +68,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrainedSystem:
-    """A system after training.
-
-    engine  : an ``Animator``
-    model   : its trained model
-    seconds : processor time of training
-    tried   : the settings among which its own was chosen on validation recordings
-    """
+    """A system after training, the processor time that took, and the settings its own was chosen from."""
 
     engine: Any
     model: Any
@@ -103,11 +91,7 @@ def list_alternatives(options: Options, tuning: TuningOptions) -> list[list[dict
 def search_settings(
     options: Options, kinds: Sequence[Sequence[Options]], attempt: Callable[[Options], Sequence[Trial]]
 ) -> list[Trial]:
-    """Return all trials of a search that takes one kind of setting after another; the best is ``best_trial`` of them.
-
-    options : the start
-    attempt : trains with some options, and returns the trials on the way
-    """
+    """Return all trials of a search from some options that takes one kind of setting after another."""
     tried: list[Trial] = []
     for kind in kinds:
         start = best_trial(tried).options if tried else options
@@ -124,10 +108,7 @@ def best_trial(trials: Sequence[Trial]) -> Trial:
 def train_stages(
     options: Options, examples: Sequence[Example], monitor: Monitor = silent_monitor
 ) -> Iterator[TrainedSystem]:
-    """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options.
-
-    Those of fewer Gaussians are stages of the training of more. Source: Xie & Liu 2007, §7.1.
-    """
+    """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options."""
     config, count, begin_s = CoupledConfig(**options), 1, process_time()
     for make_model in growing_models(examples, config, monitor):
         own = replace(config, mixtures=min(count, config.mixtures), visual_mixtures=min(count, config.visual_mixtures))
@@ -139,10 +120,7 @@ def train_stages(
 def judge_systems(
     systems: Iterable[TrainedSystem], validation: HeldOutRecordings, conversions: Sequence[Options] = ({},)
 ) -> Iterator[tuple[Trial, TrainedSystem]]:
-    """Yield every system with its figures on validation recordings.
-
-    conversions : options of the conversion, one after another, in place of the system's own
-    """
+    """Yield every system with its figures on validation recordings."""
     for system in systems:
         for conversion in conversions:
             engine = CoupledEngine(replace(system.engine.config, **conversion))
@@ -155,10 +133,7 @@ def judge_systems(
 
 
 def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
-    """Return the system of which something is highest, as the ACC of its trial; with all trials.
-
-    found : from ``judge_systems``
-    """
+    """Return the system of which something is highest, as the ACC of its trial; with all trials."""
     pairs = list(found)
     _, best = max(pairs, key=lambda pair: of(pair[0]))
     return replace(best, tried=tuple(trial for trial, _ in pairs))
@@ -179,7 +154,6 @@ def list_changed_options(config: CoupledConfig) -> dict[str, Any]:
 
 
 REFERENCE_SYSTEM = "ph-vi-CHMM"
-"""The system that every other one is compared with."""
 PAPER_FIGURES: dict[str, tuple[float, float]] = {
     "ph-HMM": (8.043, 0.581),
     "ph-MSHMM": (8.050, 0.576),
@@ -193,7 +167,6 @@ BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
 TUNED = ", tuned"
 ABOUT = "about"
-"""Name of the array with settings and figures of a stored system."""
 MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
 
 
@@ -202,7 +175,6 @@ class ComparedSystem:
     """How one system of the table is made.
 
     make          : returns its engine; None: it is the coupled engine with ``options``
-    options       : of the coupled engine
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
     tunes         : the system of the paper whose settings are chosen on validation recordings
     when_named    : it is compared only if it is asked for
@@ -249,11 +221,7 @@ The paper's six are those of ``train --preset``; ``tuned``: with the settings th
 
 
 def select_systems(names: Sequence[str] | None) -> list[str]:
-    """Return the names of the systems to compare, in the table's order; always with ``REFERENCE_SYSTEM``.
-
-    names : None: all but those that are compared only ``when_named``
-    Raises InputError: no such system. Raises MissingDependencyError: a named system needs a package that is missing.
-    """
+    """Return the systems to compare, in order. Raises InputError: no such system. Raises MissingDependencyError."""
     if names is None:
         return [name for name, system in COMPARED_SYSTEMS.items() if not system.when_named]
     unknown = [name for name in names if name not in COMPARED_SYSTEMS]
@@ -270,10 +238,7 @@ def select_systems(names: Sequence[str] | None) -> list[str]:
 def tune_options(
     name: str, examples: Sequence[Example], validation: HeldOutRecordings, tuning: TuningOptions, monitor: Monitor
 ) -> list[Trial]:
-    """Return all settings that were tried for a system of the paper.
-
-    validation : recordings by which they are judged; the first ``tuning.judges`` of them
-    """
+    """Return all settings that were tried for a system of the paper, judged by recordings for validation."""
     judges = validation.first(tuning.judges)
 
     def attempt(options: Mapping[str, Any]) -> list[Trial]:
@@ -305,8 +270,6 @@ def train_system(
 
     validation : recordings that decide between the settings of a tuned system with 1, 2, 4, … Gaussians, and those of
                  the system as printed; None: no system is tuned
-    trials     : what was tried on fewer recordings, for each system of the paper that is tuned
-    trained    : the systems before it
     """
     system = COMPARED_SYSTEMS[name]
     if system.same_model_as:

@@ -67,7 +67,6 @@ POSSIBLE = {
     MOS: f"a whole number from 1 to {HIGHEST_MOS}",
     RANKING: f"a whole number from 0 to {HIGHEST_RANK}",
 }
-"""The values of each kind, in words."""
 
 
 def is_possible(kind: str, value: str) -> bool:
@@ -81,28 +80,20 @@ def is_possible(kind: str, value: str) -> bool:
 COLUMNS = tuple(field.name for field in fields(Answer))
 
 
-def answers_text(answers: Iterable[Answer]) -> str:
-    """Return a table of answers in CSV (RFC 4180), with a line of column names; no spreadsheet executes a field."""
-    file = io.StringIO()
-    table = csv.DictWriter(file, COLUMNS)
-    table.writeheader()
-    for answer in answers:
-        row = asdict(answer) | {"practice": int(answer.practice)}
-        table.writerow({name: as_field(value) if isinstance(value, str) else value for name, value in row.items()})
-    return file.getvalue()
-
-
 def write_answers(path: Path, answers: Iterable[Answer]) -> None:
     """Write a table of answers. Raises ExportError: it cannot be written."""
     with atomic_file(path) as temporary:
-        temporary.write_text(answers_text(answers), encoding="utf-8", newline="")
+        file = io.StringIO()
+        table = csv.DictWriter(file, COLUMNS)
+        table.writeheader()
+        for answer in answers:
+            row = asdict(answer) | {"practice": int(answer.practice)}
+            table.writerow({name: as_field(value) if isinstance(value, str) else value for name, value in row.items()})
+        temporary.write_text(file.getvalue(), encoding="utf-8", newline="")
 
 
 def read_answers(path: Path) -> list[Answer]:
-    """Return the answers of a table.
-
-    Raises InputError: the file cannot be read, lacks a column, or has a value that no answer can have.
-    """
+    """Return the answers of a table. Raises InputError: it cannot be read, lacks a column, or has a wrong value."""
     table, answers = csv.DictReader(io.StringIO(read_text_file(path, "answers")), restval=""), []
     try:
         missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]

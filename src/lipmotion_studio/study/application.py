@@ -23,19 +23,15 @@ from lipmotion.errors import InputError
 from lipmotion.formats.web_page import colour_code
 from lipmotion.types.values import items, members, number, text, whole
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
-from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial
+from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_questions, order_trials
 from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name
-from lipmotion_studio.study.trials import list_questions, order_trials
 from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, foreign_refusal, json_reply, read_json
 
 
 class RateLimit:
     """Allows so many requests a second for each asker, and some more at once.
 
-    rate_hz : requests a second in the long run
-    burst   : requests at once after a pause
-    clock   : returns the time in seconds
     Of askers whose allowance is full again nothing is kept: the memory is bounded by ``burst / rate_hz`` seconds of
     requests, and askers are few.
     """
@@ -114,7 +110,6 @@ def study_application(
 ) -> Starlette:
     """Return the application.
 
-    videos : paths of the videos by their names, of ``check_videos``
     names  : by which raters reach the server, besides addresses of numbers and the names of this machine
     Requests by other names, and of other sites' pages, are refused. Addresses of numbers are not: no other site can let
     a browser state one.

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import Answer, write_answers
-from lipmotion_studio.study.manifest import Study, check_videos, read_study
+from lipmotion_studio.study.manifest import Study, check_videos, list_questions, order_trials, read_study
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name, rater_number
-from lipmotion_studio.study.trials import list_questions, order_trials
 from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 PORT = 8000
@@ -44,10 +43,7 @@ def serve_study(
 
 
 def collect_answers(folder: Path) -> list[Answer]:
-    """Return the answers of a study, in the order of raters and trials.
-
-    Raises InputError: no study, or nobody has answered yet.
-    """
+    """Return the answers of a study by rater and trial. Raises InputError: no study, or nobody has answered."""
     study = read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
         return list(list_answers(study, store.sheets()))
@@ -71,11 +67,8 @@ def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
 
 
 def forget_rater(folder: Path, name: str) -> int:
-    """Delete a rater and all of the rater's answers; return how many there were.
-
-    name : as in the exported answers, and as the page shows it to the rater
-    Files that were exported before are not changed.
-    Raises InputError: no study, or no such rater.
+    """Delete a rater and all answers, not of exported files; return how many. Raises InputError: no study, no such
+    rater.
     """
     read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:

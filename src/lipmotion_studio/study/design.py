@@ -1,36 +1,217 @@
-"""Design of a study: from conditions and sentences to a folder that raters can be shown."""
+"""Design of a study: from conditions and sentences, with their sources, to a folder that raters can be shown."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import installed_version
-from lipmotion.pipeline.job import Job
+from lipmotion.formats.base import readable_suffixes
+from lipmotion.pipeline.analysis.recordings import list_recordings
+from lipmotion.pipeline.job import Job, run
+from lipmotion.pipeline.model import Model, load_model, shipped_path
+from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.request import Outputs, Request
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import atomic_folder, read_text_file, sha256_of
-from lipmotion.types import Monitor, silent_monitor
+from lipmotion.storage.media import has_video, open_media
+from lipmotion.types import Audio, Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
+from lipmotion_faces.tracking.footage import read_video_frames
+from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
+from lipmotion_faces.video.synthetic_mark import LABEL, SOURCE_TYPE, mark_metadata
 from lipmotion_studio.study.answers import ANCHOR, KINDS, MOS, PAIRED, RANKING, RECORDING
-from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo, write_manifest
-from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, StudySettings
-from lipmotion_studio.study.sources import (
-    MadeVideo,
-    StudySentence,
-    encode_video,
-    make_condition,
-    parse_conditions,
-    read_sentences,
-)
-from lipmotion_studio.study.trials import (
+from lipmotion_studio.study.manifest import (
+    VIDEOS,
+    Study,
+    StudyVideo,
     anchor_trials,
     attention_trials,
     main_trials,
     practice_trials,
     shuffled,
+    write_manifest,
 )
+from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, Region, StudySettings
+
+MODEL_SUFFIX, JOB_SUFFIX = ".lipmotion", ".toml"
+SHIPPED = "shipped"
+
+
+@dataclass(frozen=True)
+class StudySentence:
+    """A sentence: its name, and its recording, which is the sound of all videos that are drawn."""
+
+    name: str
+    recording: Path
+
+
+@dataclass(frozen=True)
+class MadeVideo:
+    """A video that is ready to be shown: its file, and how it was made, in texts by name."""
+
+    file: Path
+    made: dict[str, str] = field(default_factory=dict)
+
+
+Condition = Callable[[StudySentence, Path], MadeVideo]
+"""Gives the video of a sentence; where it has to be made, as the file of the path."""
+
+
+def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
+    """Return the sentences of files and folders by name. Raises InputError: none, or two of one name."""
+    found = [StudySentence(path.stem, path) for path in list_recordings(given)]
+    if not found:
+        raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
+    names = [sentence.name for sentence in found]
+    for sentence in found:
+        if names.count(sentence.name) > 1:
+            raise InputError(f"{sentence.recording}: two sentences are called {sentence.name!r}; rename one file")
+        if not sentence.recording.is_file():
+            raise InputError(f"{sentence.recording}: no such file; give the recording of a sentence")
+    return found
+
+
+def parse_conditions(given: Sequence[str]) -> dict[str, str]:
+    """Return the sources of conditions by name. Raises InputError: another form, a name that is taken, or under two."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, source = text.partition("=")
+        name, source = name.strip(), source.strip()
+        if text.strip() == RECORDING:
+            source = RECORDING
+        elif not (name and equals and source):
+            raise InputError(f"the condition {text!r}, required NAME=SOURCE, or {RECORDING}")
+        elif name in (ANCHOR, RECORDING) or source == RECORDING:
+            raise InputError(f"the condition {text!r}: the recordings themselves are called {RECORDING!r}, no other")
+        if name in found:
+            raise InputError(f"two conditions are called {name!r}; give them different names")
+        found[name] = source
+    if len(found) < 2:
+        raise InputError(f"{len(found)} condition, required at least 2: --condition NAME=SOURCE, or {RECORDING}")
+    return found
+
+
+def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+    """Return what gives the videos of a condition.
+
+    source : ``recording``; a model, ``shipped`` or a file; a job file; or a folder with a video or a motion file of
+             each sentence, of its name
+    Raises InputError: no such source, or it lacks a sentence.
+    """
+    path = Path(source)
+    if source == RECORDING:
+        for sentence in sentences:
+            if not has_video(sentence.recording):
+                raise InputError(
+                    f"{sentence.recording}: has no pictures, so the recording cannot be shown; give videos as "
+                    f"sentences, or leave the condition {RECORDING} out"
+                )
+        return lambda sentence, target: MadeVideo(sentence.recording, {"made": "recording"})  # noqa: ARG005
+    if path.is_dir():
+        return _finished(path, sentences, drawn)
+    if source != SHIPPED and not path.is_file():
+        raise InputError(f"{source}: no such model, job file or folder; give one, or {SHIPPED!r}: the model that ships")
+    if path.suffix.lower() == JOB_SUFFIX:
+        job = Job.from_file(path)
+        return _animated(job, {"job": str(path), "job_sha256": sha256_of(path)})
+    if source != SHIPPED and path.suffix.lower() != MODEL_SUFFIX:
+        raise InputError(f"{source}: required a model ({MODEL_SUFFIX}), a job file ({JOB_SUFFIX}) or a folder")
+    model = None if source == SHIPPED else path
+    return _animated(replace(drawn, request=replace(drawn.request, model=model)), {})
+
+
+def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+    """Return a condition of finished videos or of motion to draw. Raises InputError: none or several of a sentence."""
+    files: dict[str, Path] = {}
+    for name in (sentence.name for sentence in sentences):
+        there = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stem == name]
+        for suffixes in (VIDEO_SUFFIXES, readable_suffixes()):
+            fitting = [path for path in there if path.suffix.lower() in suffixes]
+            if len(fitting) > 1:
+                raise InputError(f"{fitting[0]} and {fitting[1]}: both are of the sentence {name!r}; move one away")
+            if fitting:
+                files[name] = fitting[0]
+                break
+        else:
+            way_out = f"add {name}.mp4 or {name}.json"
+            raise InputError(f"{folder}: has no video and no motion of the sentence {name!r}; {way_out}")
+
+    def condition(sentence: StudySentence, target: Path) -> MadeVideo:
+        path, outputs = files[sentence.name], drawn.outputs
+        made = {"file": path.name, "file_sha256": sha256_of(path)}
+        if path.suffix.lower() in VIDEO_SUFFIXES:
+            return MadeVideo(path, made | {"made": "finished"})
+        generation = match_duration(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
+        write(generation, target, speech=sentence.recording, face=outputs.face, fps=outputs.fps)
+        return MadeVideo(target, made | {"made": "drawn", "face": outputs.face})
+
+    return condition
+
+
+def _animated(job: Job, made: dict[str, str]) -> Condition:
+    """Return a condition whose videos are animated from the sound of the sentences."""
+    model_path = job.request.model or shipped_path()
+    made = made | {"made": "animated", "model": model_path.name, "model_sha256": sha256_of(model_path)}
+    made |= {"face": job.outputs.face}
+
+    @cache
+    def load() -> Model:
+        return load_model(job.request.model)
+
+    def condition(sentence: StudySentence, target: Path) -> MadeVideo:
+        run(job.of(sentence.recording, (str(target),)), model=load(), words_beside=True)
+        return MadeVideo(target, made)
+
+    return condition
+
+
+Pictures = NDArray[np.uint8]
+
+
+def encode_video(source: Path, target: Path, sound: Path, region: Region, late_ms: float = 0.0) -> float:
+    """Write a video as raters see it (H.264, AAC), and return how long it lasts, in seconds.
+
+    sound   : the recording whose sound a video without sound gets
+    late_ms : how much later than it was the sound comes; the video keeps its length
+    The mark of a synthetic video stays: raters do not see it, whoever gets the file can.
+    Raises InputError: it cannot be read, or the region is too small. Raises ExportError: it cannot be written.
+    """
+    frames, rate_hz = read_video_frames(source)
+    with open_media(source) as container:
+        has_sound, texts = bool(container.streams.audio), list(container.metadata.values())
+    played = read_audio(source if has_sound else sound, SOUND_HZ, warn=False)
+    shift, count = round(late_ms / 1000 * played.rate_hz), len(played.samples)
+    if not 0 <= shift < count:
+        raise InputError(f"the sound of {played.duration_s:.2f} s cannot be {late_ms:g} ms late; give longer sentences")
+    late = Audio(np.concatenate([np.zeros(shift, np.float32), played.samples[: count - shift]]), played.rate_hz)
+    is_marked = any(SOURCE_TYPE in text or text.startswith(LABEL) for text in texts)
+    mark = mark_metadata() if is_marked else None
+    marked: dict[str, Any] = {"tags": mark.tags, "xmp": mark.xmp} if mark else {}
+    counted = _Counted(region.cut(frame) for frame in frames)
+    write_mp4(target, counted, fps=rate_hz, audio=late, **marked)
+    return max(counted.count / rate_hz, played.duration_s)
+
+
+class _Counted:
+    def __init__(self, pictures: Iterable[Pictures]) -> None:
+        self._pictures = pictures
+        self.count = 0
+
+    def __iter__(self) -> Iterator[Pictures]:
+        for picture in self._pictures:
+            self.count += 1
+            yield picture
+
 
 MAX_TEXT_BYTES = 1 << 16
 DEFAULTS = StudySettings()

@@ -1,18 +1,21 @@
-"""Studies as folders: ``study.json``, which says what is shown and how it was made, and ``videos/``."""
+"""Studies as folders: ``study.json``, which says what is shown and how it was made, its trials, and ``videos/``."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from hashlib import sha256
+from itertools import permutations
 from pathlib import Path
+from typing import TypeVar
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import read_text_file, sha256_of
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import any_members, as_tuple, items, number, text, truth, value_of, whole
-from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, is_possible
-from lipmotion_studio.study.settings import SCALES
+from lipmotion_studio.study.answers import ANCHOR, FIRST, HIGHEST_RANK, KINDS, MOS, PAIRED, SECOND, is_possible
+from lipmotion_studio.study.settings import MATCH, PREFERENCE, SCALES
 
 FORMAT, VERSION = "lipmotion_studio.study", 1
 MANIFEST, VIDEOS = "study.json", "videos"
@@ -26,9 +29,6 @@ class StudyVideo:
     """A video that raters watch.
 
     file      : its name in the folder of videos
-    sentence  : name of the sentence that is said
-    condition : name of what made the motion
-    seconds   : how long it lasts
     sha256    : digest of its content
     made      : how it was made: texts by name, among them digests of what it was made from
     """
@@ -46,7 +46,6 @@ class StudyTrial:
     """What a rater sees on one page.
 
     videos   : numbers of videos in the study, in the order in which they are shown
-    practice : whether it is for practice, and does not count
     expected : the value that an attentive rater gives to every question; empty: there is none
     note     : what the page asks for besides, where the answer is told; otherwise empty
     """
@@ -62,7 +61,6 @@ class Study:
     """A study: what is shown, and what is asked.
 
     kind         : ``paired``, ``mos`` or ``ranking``
-    title        : shown to raters
     consent      : what raters agree to before they begin
     instructions : what raters are asked to do
     scales       : names of the scales of ``mos``
@@ -133,10 +131,7 @@ def read_study(folder: Path) -> Study:
 
 
 def check_videos(study: Study, folder: Path) -> dict[str, Path]:
-    """Return the paths of the videos of a study by their names.
-
-    Raises InputError: one is missing, or is not what it was when the study was designed.
-    """
+    """Return a study's videos by name. Raises InputError: one is missing, or not as when the study was designed."""
     paths = {video.file: folder / VIDEOS / video.file for video in study.videos}
     for video in study.videos:
         if not paths[video.file].is_file():
@@ -159,3 +154,101 @@ _MEMBERS = {
     "trials": as_tuple(items(value_of(StudyTrial, _TRIAL, ("videos",)))),
 }
 _STUDY = value_of(Study, _MEMBERS, _MEMBERS)
+
+
+PlaceT = TypeVar("PlaceT")
+VideoNumbers = Mapping[tuple[str, str], int]
+"""The number of the video of a sentence and a condition."""
+
+
+def shuffled(items: Iterable[PlaceT], *key: object) -> list[PlaceT]:
+    """Return items in an order that depends on a key, every order being equally likely.
+
+    >>> shuffled("abcd", 1), shuffled("abcd", 2)
+    (['d', 'a', 'b', 'c'], ['b', 'd', 'c', 'a'])
+    """
+
+    def place(pair: tuple[int, PlaceT]) -> bytes:
+        return sha256("/".join(map(str, (*key, pair[0]))).encode()).digest()
+
+    return [item for _, item in sorted(enumerate(items), key=place)]
+
+
+def main_trials(
+    kind: str, conditions: Sequence[str], sentences: Sequence[str], videos: VideoNumbers
+) -> list[StudyTrial]:
+    """Return the trials that count.
+
+    conditions : names, without the anchor; a ranking shows it where ``videos`` has one for the sentence
+    Paired comparison: every pair of conditions in both orders, for every sentence, so that each rater judges each pair
+    twice: 3 conditions and 6 sentences make 36 trials. Mean opinion scores: every video once. Ranking: every sentence
+    once, with all conditions on a page.
+    Source: Hofer 2008, section 7; Xie & Liu 2007, section 7.3; ITU-R BS.1534 (the page of sliders).
+    """
+    trials = []
+    for sentence in sentences:
+        shown = {name: videos[sentence, name] for name in (*conditions, ANCHOR) if (sentence, name) in videos}
+        if kind == PAIRED:
+            trials += [StudyTrial((shown[a], shown[b])) for a, b in permutations(conditions, 2)]
+        elif kind == MOS:
+            trials += [StudyTrial((number,)) for number in shown.values()]
+        else:
+            trials.append(StudyTrial(tuple(shown.values())))
+    return trials
+
+
+def anchor_trials(base: str, sentences: Sequence[str], videos: VideoNumbers) -> list[StudyTrial]:
+    """Return pairs of a condition and the same out of step, for each sentence, second and first in turns."""
+    trials = []
+    for n, sentence in enumerate(sentences):
+        pair = (videos[sentence, base], videos[sentence, ANCHOR])
+        trials.append(StudyTrial(pair[:: -1 if n % 2 else 1], expected=SECOND if n % 2 else FIRST))
+    return trials
+
+
+_TOLD = {
+    PAIRED: ((SECOND, "the second video"), (FIRST, "the first video")),
+    MOS: (("2", "2 on every scale"), ("4", "4 on every scale")),
+}
+
+
+def attention_trials(kind: str, trials: Sequence[StudyTrial], count: int, seed: int) -> list[StudyTrial]:
+    """Return trials whose page tells what to answer, made of some of the trials that count."""
+    checks = []
+    for n, trial in enumerate(shuffled(trials, "check", seed)[:count]):
+        told = _TOLD.get(kind, (("0", "0 for every video"), (str(HIGHEST_RANK), f"{HIGHEST_RANK} for every video")))
+        value, words = told[n % 2]
+        note = f"This page checks that you read it: after the videos, please answer {words}, whatever you saw."
+        checks.append(replace(trial, expected=value, note=note))
+    return checks
+
+
+def practice_trials(trials: Sequence[StudyTrial], count: int, seed: int) -> list[StudyTrial]:
+    """Return trials for practice, made of some of those that count."""
+    return [replace(trial, practice=True, expected="") for trial in shuffled(trials, "practice", seed)[:count]]
+
+
+def order_trials(study: Study, rater: int) -> list[StudyTrial]:
+    """Return the trials as a rater sees them: practice first, then all others in an order of the rater's own.
+
+    rater : number of the rater in the study
+    On a page of several videos for a ranking, they too have an order of the rater's own.
+    """
+    practice = [trial for trial in study.trials if trial.practice]
+    counted = [trial for trial in study.trials if not trial.practice]
+    ordered = practice + shuffled(counted, study.seed, rater)
+    if study.kind in (PAIRED, MOS):
+        return ordered
+    return [
+        replace(trial, videos=tuple(shuffled(trial.videos, study.seed, rater, n))) for n, trial in enumerate(ordered)
+    ]
+
+
+def list_questions(study: Study, trial: StudyTrial) -> list[tuple[str, str, str]]:
+    """Return what a trial asks, in the order of its answers: question, condition and other condition of each."""
+    conditions = [video.condition for video in study.shown(trial)]
+    if study.kind == PAIRED:
+        return [(PREFERENCE, conditions[0], conditions[1])]
+    if study.kind == MOS:
+        return [(scale, conditions[0], "") for scale in study.scales]
+    return [(MATCH, condition, "") for condition in conditions]

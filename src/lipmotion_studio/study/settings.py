@@ -23,11 +23,7 @@ PREFERENCE, MATCH = "preference", "match"
 
 @dataclass(frozen=True)
 class OpinionScale:
-    """A five-point scale.
-
-    title : its name, as raters read it
-    asks  : the question
-    """
+    """A five-point scale: its name, as raters read it, and the question."""
 
     title: str
     asks: str
@@ -48,7 +44,6 @@ ASKED = {
     MOS: "How good is the mouth in this video?",
     RANKING: "How well do the lips match the sound? 0 is not at all, 100 is perfectly.",
 }
-"""The question of a page, for each kind."""
 CONSENT = """You will watch short videos of a person or a drawn face speaking, and judge how the mouth moves. Some of the videos are recordings of people; in others a program makes the mouth move.
 Taking part is voluntary. You may stop at any time by closing the page, without a reason.
 Stored are your judgements, how often you played each video, and how long each judgement took; under a number, without your name, address or anything about your device.
@@ -66,9 +61,7 @@ MIN_REGION_PX = 16
 
 @dataclass(frozen=True)
 class Region:
-    """A part of pictures, as shares of their width and height, from the upper left corner.
-
-    Raises InputError: it is not inside.
+    """A part of pictures, as shares from the upper left. Raises InputError: not inside.
 
     >>> Region.parsed("0.25,0.5,0.5,0.4")
     Region(left=0.25, top=0.5, width=0.5, height=0.4)
@@ -91,9 +84,8 @@ class Region:
 
     @classmethod
     def parsed(cls, text: str) -> Region:
-        """Return the region of a text ``LEFT,TOP,WIDTH,HEIGHT``; of an empty one, the whole picture.
-
-        Raises InputError: not four numbers, or not inside.
+        """Return the region of ``LEFT,TOP,WIDTH,HEIGHT``, or the whole picture. Raises InputError: not four numbers
+        inside.
         """
         if not text:
             return cls()

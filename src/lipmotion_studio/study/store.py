@@ -47,10 +47,8 @@ WHERE EXISTS (SELECT 1 FROM raters WHERE number = :rater) ON CONFLICT DO NOTHING
 class AnswerSheet:
     """The answers of a rater to all questions of one trial.
 
-    rater   : number of the rater
     trial   : number of the trial in the rater's order, from 0
     values  : one for each question
-    seconds : from the start of the trial to the answer
     plays   : how often its videos were played to their ends, all together
     """
 
@@ -99,10 +97,7 @@ class StudyStore:
         self._reader.close()
 
     def add_rater(self) -> Future[tuple[int, str]]:
-        """Add a rater; the result is the rater's number and token, which cannot be guessed.
-
-        The result raises InputError: there are ``MAX_RATERS``.
-        """
+        """Add a rater; the result is number and secret token, or raises InputError: there are ``MAX_RATERS``."""
         token = token_urlsafe(24)
 
         def work(database: sqlite3.Connection) -> tuple[int, str] | InputError:
@@ -125,9 +120,8 @@ class StudyStore:
         return 0 if last is None else int(last) + 1
 
     def record(self, sheet: AnswerSheet) -> Future[bool]:
-        """Store the answers to a trial; the first ones stand, however often, and whatever, is sent later.
-
-        The result is whether they are in the database: not if the rater has been forgotten.
+        """Store the answers to a trial, the first ones only; the result: whether they are there (not of a forgotten
+        rater).
         """
         rows = [
             {"rater": sheet.rater, "trial": sheet.trial, "item": item, "value": value}
@@ -153,10 +147,7 @@ class StudyStore:
         ]
 
     def forget(self, rater: int) -> int:
-        """Delete a rater and all answers, and overwrite them on the disk; return how many answers there were.
-
-        Raises InputError: no such rater.
-        """
+        """Delete a rater and all answers, on the disk too; return how many. Raises InputError: no such rater."""
 
         def work(database: sqlite3.Connection) -> int | None:
             (count,) = database.execute("SELECT count(*) FROM answers WHERE rater = ?", [rater]).fetchone()

@@ -113,8 +113,7 @@ def run_export(options: argparse.Namespace) -> None:
 
 def run_analyse(options: argparse.Namespace) -> None:
     """Call ``analyse_study`` and print its tables."""
-    from lipmotion_studio.study.analysis.analyse import analyse_study
-    from lipmotion_studio.study.analysis.analysis_table import analysis_table
+    from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
 
     report_figures(
         options,

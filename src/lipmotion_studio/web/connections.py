@@ -102,9 +102,8 @@ class PunctualConnection(H11Protocol):
             self.transport.abort()
 
     def _make_room(self) -> None:
-        """Close a connection, where there are too many: what waits longest, of those that never had a request first.
-
-        Those that are so new that their requests may not have been read stay.
+        """Close a connection, where there are too many: the one idle longest, of those without a request first; not new
+        ones.
         """
         self.was_read = True
         everybody: set[Any] = {*self.connections}

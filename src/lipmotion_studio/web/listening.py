@@ -29,11 +29,7 @@ def check_installed(purpose: str, extra: str) -> None:
 def serve(
     application: ASGIApp, place: socket.socket, *, host: str = HOST, started: Callable[[str], object] | None = None
 ) -> None:
-    """Serve an application until the process is stopped; no client can keep it from serving the others.
-
-    place   : where connections come to, of ``open_socket``, at ``host``
-    started : called with the address of the page once it can be opened
-    """
+    """Serve an application until the process is stopped, fairly to all clients; ``started`` gets the page's address."""
     import uvicorn
 
     from lipmotion_studio.web.connections import IDLE_S, PunctualConnection

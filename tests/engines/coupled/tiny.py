@@ -6,9 +6,8 @@ import numpy as np
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Grammar, reachable
+from lipmotion.engines.coupled.chains.product import Grammar, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, HMM, Structure
-from lipmotion.engines.coupled.chains.transitions import initial_transitions
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
 from lipmotion.units.unit_sets import CLOSED_UNIT

@@ -12,10 +12,9 @@ from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
 from lipmotion.engines.selection.costs import Target
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.lip_reading import TABLE_1
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.windows import phone_windows
+from lipmotion.engines.selection.windows import TABLE_1, phone_windows
 from lipmotion.testing.examples import examples, speech
 from lipmotion.testing.examples import timeline as spoken
 from lipmotion.types import silent_monitor

@@ -7,10 +7,10 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
+from lipmotion_faces.appearance.candidates import STEADY
 from lipmotion_faces.appearance.lower_face import mouth_ellipse, mouth_part, moved_part, region_map, relight
 from lipmotion_faces.appearance.person import Appearance, FaceCodes
 from lipmotion_faces.appearance.placing import cut
-from lipmotion_faces.appearance.refinement import STEADY
 from lipmotion_faces.filmed import renderer
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions

@@ -3,12 +3,11 @@ import pytest
 
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.base import rotate_head
-from lipmotion_faces.head.forms import MOUTH_Y, head
 from lipmotion_faces.head.lips import VISIBLE_RINGS
+from lipmotion_faces.head.part import MOUTH_Y, head
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.shape_fit import mouth_weights
 from lipmotion_faces.head.skin import REST
-from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh
+from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh, mouth_weights
 from meshes.heads import shaped
 
 VIEWER = camera_for(640, 360).place

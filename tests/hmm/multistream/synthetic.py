@@ -5,15 +5,21 @@ from itertools import product
 import numpy as np
 
 from lipmotion.hmm.multistream.densities import GaussianStatistics, StreamScale, TiedDensities
-from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest
-from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
+from lipmotion.hmm.multistream.model import (
+    JointConfig,
+    JointHmm,
+    StreamModel,
+    TreeCosts,
+    context_questions,
+    grow_forest,
+)
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance
 from lipmotion.hmm.multistream.streams import (
     F0_STREAMS,
     MOTION,
     SPEECH,
     STREAMS,
-    Stream,
+    ObservedStream,
     StreamObservations,
     stream_observations,
 )
@@ -42,7 +48,7 @@ def observed(draw: np.random.Generator, frames: int, streams=STREAMS) -> StreamO
     found = {}
     for name in streams:
         known = draw.random(frames) < (1.0 if name == SPEECH else 0.7)
-        found[name] = Stream(draw.normal(0, 1.5, (frames, DIMENSIONS[name])) * known[:, None], known)
+        found[name] = ObservedStream(draw.normal(0, 1.5, (frames, DIMENSIONS[name])) * known[:, None], known)
     return StreamObservations(found)
 
 

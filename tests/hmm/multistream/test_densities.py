@@ -14,7 +14,13 @@ from lipmotion.hmm.multistream.densities import (
 from lipmotion.hmm.multistream.generate import select_densities, solve_trajectory
 from lipmotion.hmm.multistream.model import joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import STREAMS, Stream, StreamObservations, StreamWeights, stream_observations
+from lipmotion.hmm.multistream.streams import (
+    STREAMS,
+    ObservedStream,
+    StreamObservations,
+    StreamWeights,
+    stream_observations,
+)
 from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
 
@@ -36,7 +42,7 @@ def test_voiced_and_unvoiced_together_are_everything():
     leaves = np.arange(model.forest.size)
 
     def density(values, known):
-        rows = model.scale.standardise(Stream(values[:, None], np.full(len(values), known)))
+        rows = model.scale.standardise(ObservedStream(values[:, None], np.full(len(values), known)))
         return np.exp(model.tied.log_density(rows, leaves, model.scale.log_determinant).astype(float))
 
     voiced = density(grid, True).sum(axis=0) * (grid[1] - grid[0])
@@ -88,12 +94,14 @@ def test_only_gaussians_with_data_are_split():
 
 def test_the_scale_is_that_of_known_frames():
     values = np.array([[1.0, 7.0], [3.0, 7.0], [100.0, 100.0]])
-    scale, share = fit_scale([Stream(values, np.array([True, True, False]))])
+    scale, share = fit_scale([ObservedStream(values, np.array([True, True, False]))])
     assert scale.mean.tolist() == [2, 7]
     assert scale.deviation[0] == 1
     assert 0 < scale.deviation[1] < 1e-3
     assert share == pytest.approx(2 / 3)
-    assert np.isfinite(StreamScale(scale.mean, scale.deviation).standardise(Stream(values, np.ones(3, bool)))).all()
+    assert np.isfinite(
+        StreamScale(scale.mean, scale.deviation).standardise(ObservedStream(values, np.ones(3, bool)))
+    ).all()
 
 
 NAN = float("nan")
@@ -129,7 +137,7 @@ def test_what_does_not_fit_is_refused():
         with pytest.raises(InputError):
             stream_observations(np.zeros((5, 3)), **given)
     with pytest.raises(InputError, match="required speech"):
-        StreamObservations({"motion": Stream(np.zeros((3, 3)), np.ones(3, bool))})
+        StreamObservations({"motion": ObservedStream(np.zeros((3, 3)), np.ones(3, bool))})
     for weight in (-0.1, NAN, float("inf")):
         with pytest.raises(InputError, match="f0_slope"):
             StreamWeights(f0_slope=weight)

@@ -10,15 +10,17 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream import densities
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.model import MOTION_ONLY
-from lipmotion.hmm.multistream.multistream_baum_welch import (
+from lipmotion.hmm.multistream.multistream_training import (
+    TrainingUtterance,
     accumulate_statistics,
     iterate_posteriors,
+    mean_log_likelihood,
     prepare_utterances,
     reestimate_hmm,
+    train_joint,
 )
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, mean_log_likelihood, train_joint
 from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, Stream, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.types import Progress
 from oracles import joint as slow
 from oracles import paths
@@ -120,7 +122,9 @@ def test_a_stream_counts_as_much_as_its_weight(usual):
         for utterance, other in pairwise(HELD_OUT):
             frames = min(utterance.observed.frames, other.observed.frames)
             mixed = only(other.observed, "speech", *F0_STREAMS).streams | only(utterance.observed, "speech").streams
-            cut = {name: Stream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()}
+            cut = {
+                name: ObservedStream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()
+            }
             said = [s.unit for s in recogniser.recognise(StreamObservations(cut))]
             count += sum(a == b for a, b in zip(said, utterance.units, strict=False))
         right.append(count)

@@ -7,11 +7,11 @@ from hmm.multistream.synthetic import observed, random_joint, utterances
 from kernels.networks import network_posteriors
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import build_unit_loop, decode_units
-from lipmotion.hmm.log_likelihoods import compute_log_likelihoods
 from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm
 from lipmotion.hmm.multistream.recognise import JointRecogniser, build_context_loop
-from lipmotion.hmm.multistream.streams import SPEECH, Stream, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.streams import SPEECH, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import expand_triphones
+from lipmotion.hmm.network import compute_log_likelihoods
 from oracles import joint as slow
 from oracles.sequences import sequences
 
@@ -151,6 +151,6 @@ def test_what_cannot_be_recognised():
     for attempt in (JointRecogniser(hmm).recognise, lambda given: JointRecogniser(hmm).draw_paths(given, 1, 0)):
         with pytest.raises(AlignmentError):
             attempt(short)
-    wide = StreamObservations({SPEECH: Stream(np.zeros((9, 4)), np.ones(9, bool))})
+    wide = StreamObservations({SPEECH: ObservedStream(np.zeros((9, 4)), np.ones(9, bool))})
     with pytest.raises(InputError, match="has 4 dimensions"):
         JointRecogniser(hmm).recognise(wide)

@@ -11,8 +11,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json, nan_as_null
-from lipmotion_studio.study.analysis.analyse import analyse_study
-from lipmotion_studio.study.analysis.analysis_table import analysis_table
+from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
 from lipmotion_studio.study.answers import Answer, write_answers
 from study.analysis.simulated import Effects, comparisons, pair_answer, paired_answers, rated_answers, rating, ratings
 

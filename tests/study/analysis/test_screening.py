@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion_studio.study.analysis.screening import RULES, counts, screen
+from lipmotion_studio.study.analysis.analyse import RULES, counts, screen
 from lipmotion_studio.study.answers import Answer
 from study.analysis.simulated import Effects, comparisons, paired_answers, rated_answers, rating, ratings
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Grammar, reachable
+from lipmotion.engines.coupled.chains.product import Grammar, Transitions, reachable
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
-from lipmotion.engines.coupled.chains.transitions import Transitions
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
@@ -103,7 +102,11 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
     """Deserialise a model. Raises ModelFormatError: an array is missing, not declared, misshapen or out of range."""
     try:
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
-        structure = _structure(arrays, config)
+        sets = []
+        for place, unit_set in enumerate(config.chains.split()):
+            pairs = check_arrays(arrays_under(arrays, f"chain_{place}/"), UNITS)["units"]
+            sets.append(UnitSet(unit_set, dict(pairs.tolist())))
+        structure = config.structure_with(tuple(sets))
         poses = check_arrays(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
         _check_names(arrays, structure, len(streams))
@@ -184,14 +187,6 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
         group,
         (f"around/{key}" for key in REGRESSION_INPUTS),
     )
-
-
-def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
-    sets = []
-    for number, name in enumerate(config.chains.split()):
-        pairs = check_arrays(arrays_under(arrays, f"chain_{number}/"), UNITS)["units"]
-        sets.append(UnitSet(name, dict(pairs.tolist())))
-    return config.structure_with(tuple(sets))
 
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:

@@ -160,7 +160,6 @@ class CoupledEngine(Engine[CoupledModel]):
 
 
 def _with_units(model: CoupledModel, units: Timeline[Unit]) -> Timeline[Unit]:
-    """Return the phones with the names of the units that model them, one for each chain, joined by ``/``."""
     chains = model.chains.structure.chains
     return Timeline(
         tuple(replace(s, label=replace(s.label, unit="/".join(c.unit(s.label.phone) for c in chains))) for s in units)

@@ -78,7 +78,6 @@ Array = NDArray[np.float64]
 MOST_STATES = 3
 """Greatest number of states of a chain that an explanation names."""
 REST = "rest"
-"""Name of what the mean comes from in silence away from speech."""
 MIN_PROBABILITY = 0.005
 """States and regressions with less probability are not named."""
 
@@ -86,11 +85,7 @@ MIN_PROBABILITY = 0.005
 def explain_frames(
     frames: Sequence[Explanation], model: CoupledModel, inference: Inference, rows: Sequence[int]
 ) -> list[Explanation]:
-    """Return explanations of frames, completed with the chains, the Gaussians and the regressions behind them.
-
-    rows : the number of each of these frames among the frames of ``inference``
-    If no path leads through the chains, the explanations are returned unchanged.
-    """
+    """Return explanations with chains, Gaussians and regressions; unchanged where no path leads through the chains."""
     if not np.isfinite(inference.posteriors.log_likelihood):
         return list(frames)
     streams = range(len(model.chains.streams))
@@ -133,10 +128,7 @@ def joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> Name
 
 
 def leads(chains: Chains, chain: int) -> tuple[int, ...]:
-    """Return the possible leads of a chain: by how many states it may be ahead of the first chain.
-
-    Empty for the first chain, and without a limit of asynchrony.
-    """
+    """Return by how many states a chain may be ahead of the first; empty: it is the first, or there is no limit."""
     limit = chains.structure.limit
     return () if limit is None or chain == 0 else tuple(range(-limit, limit + 1))
 
@@ -178,7 +170,6 @@ def concatenated(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
 
 
 def _most_probable(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
-    """Return the most probable of some named states or regressions, the most probable first."""
     best = np.argsort(-probability, kind="stable")[:MOST_STATES]
     named = [NamedProbability(names[i], float(probability[i])) for i in best]
     return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
@@ -200,9 +191,12 @@ def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stre
         visual = model.visual[stream - 1]
         means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
         channels = _channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
+    states = chains.transitions.product.chain_states[:, group.tie == density]
     return DominantGaussian(
         chains.streams[stream],
-        _density_name(chains, group.tie, density),
+        " | ".join(
+            chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
+        ),
         int(component) + 1,
         len(weight),
         float(weight[component, position]),
@@ -212,11 +206,7 @@ def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stre
 
 
 def _distance(inference: Inference, stream: int, row: int, mean: Array, variance: Array) -> float | None:
-    """Return how far an observation is from a Gaussian, in standard deviations (root mean square over dimensions).
-
-    mean, variance : of the Gaussian [shape=(D_s,)]
-    None: the stream was not observed in this frame.
-    """
+    """Return how far an observation is from a Gaussian, in standard deviations (RMS); None: it was not observed."""
     observed = inference.observations.observed[stream]
     if observed is not None and not observed[row]:
         return None
@@ -224,19 +214,8 @@ def _distance(inference: Inference, stream: int, row: int, mean: Array, variance
     return float(np.sqrt(np.mean(error * error / variance)))
 
 
-def _density_name(chains: Chains, tie: NDArray[np.intp], density: int) -> str:
-    """Return the name of a density: the states of the chains that all joint states with this density share."""
-    states = chains.transitions.product.chain_states[:, tie == density]
-    return " | ".join(
-        chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
-    )
-
-
 def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
-    """Return, for each frame, the expected means of the visual streams and the regressions that they come from.
-
-    Empty where visual streams have no dynamics, as nothing is regressed then.
-    """
+    """Return, for each frame, expected means of visual streams and their regressions; empty without dynamics."""
     if not all(stream.dynamic for stream in model.visual):
         return [() for _ in rows]
     means, precisions = model.motion_statistics(inference)
@@ -275,9 +254,8 @@ def _regression_name(structure: Structure, chain: int, regression_of_state: NDAr
 def _channel_values(
     model: CoupledModel, stream: VisualStream, means: Array, variances: Array
 ) -> Mapping[str, ChannelValue]:
-    """Return the values and standard deviations of the channels of a visual stream, by channel name.
-
-    means, variances : in the dimensions of the stream [shapes=(q,)]
+    """Return the values and standard deviations of the channels of a stream, by name, from its means and variances
+    [shape=(q,)].
     """
     space = model.space
     values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)

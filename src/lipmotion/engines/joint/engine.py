@@ -1,9 +1,9 @@
-"""The joint engine: one hidden Markov model of five streams, of speech, F0 and motion, after Hofer 2008."""
+"""The joint engine and its options: one hidden Markov model of five streams of speech, F0 and motion."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, final
@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
-from lipmotion.engines.joint.config import JointEngineConfig
-from lipmotion.errors import AlignmentError, CorpusError
+from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.align import StatePath, align
 from lipmotion.hmm.multistream.generate import average_path_densities, merge_gaussians, select_densities
-from lipmotion.hmm.multistream.model import JointHmm, joint_from_arrays, joint_to_arrays
+from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint, with_durations
 from lipmotion.hmm.multistream.recognise import joint_recogniser
-from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, stream_observations
+from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.arrays import (
@@ -37,6 +36,7 @@ from lipmotion.motion.generation import LearnedMotion, Statistics
 from lipmotion.motion.limits import MotionLimits, check_poses, measure_limits
 from lipmotion.motion.modulation_filter import (
     MODULATION,
+    STRENGTH,
     ModulationFilter,
     filter_from_arrays,
     filter_to_arrays,
@@ -54,24 +54,123 @@ from lipmotion.types import (
     Example,
     Generation,
     Monitor,
+    Rule,
     Speech,
     StateTrace,
     Timeline,
     Unit,
+    option,
 )
 from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, load_unit_set
 
+COUNT = Rule(least=1)
+WEIGHT = Rule(least=0)
+HOFER_2008: Mapping[str, Any] = {
+    "units": "eVis",
+    "states": 5,
+    "mixtures": 8,
+    "recognise_units": True,
+    "own_alignment": True,
+    "both_neighbours": True,
+    "closures": False,
+    "articulation": False,
+}
+"""The system of Hofer 2008, as printed; docs/papers/hofer2008.md says what the print leaves open."""
+
+
+@dataclass(frozen=True)
+class JointEngineConfig(Configuration):
+    """Options of the joint engine.
+
+    units      : name of a unit set, or path of a table of units (docs/unit-sets.md)
+    states     : states per unit, left to right, without skips
+    mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
+    components : principal components that all point channels are reduced to
+    f0         : model the three streams of F0 (False: their weights are 0 everywhere)
+    motion_in_training : the motion stream takes part when states are aligned in training (False: its weight is 0)
+    speech_weight, f0_weight, motion_weight : of the streams when states are aligned in training
+    recognition_speech_weight, recognition_f0_weight : of the streams in recognition and in alignment
+    bigram_weight, insertion : scale of the log bigram, and log insertion penalty of every unit, in recognition
+    both_neighbours : trees of speech and F0 ask about both neighbours in every state (False: states before a unit's
+                 middle about the left one, those after it about the right one, and the middle about none)
+    flat_start : training starts from states of equal length (False: from the phones in time)
+    recognise_units : where neither words nor units are given, recognise the units of the model by its own bigram
+                 (False: use the phones of the shared recogniser)
+    own_alignment : the model itself times the phones of given words (False: they have the times of the shared
+                 aligner). Times that are given with the units stay as they are
+    paths      : number of state sequences, sampled from their posterior, from which motion is generated where units are
+                 recognised; 1: the best sequence. More than 1 needs ``recognise_units``
+    seed       : of the sampling
+    closures   : make the lips meet in every p, b and m, and in every recognised unit that has no other phones
+    articulation : lean on the table of English articulation in contexts that training saw little of
+    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
+                 trajectory engine; movements are then scaled to the recorded variance, too (docs/results/jerk.md)
+    """
+
+    units: str = "phone"
+    states: int = option(3, COUNT)
+    mixtures: int = option(4, COUNT)
+    motion_mixtures: int = option(1, COUNT)
+    components: int = option(16, COUNT)
+    f0: bool = True
+    motion_in_training: bool = True
+    recognise_units: bool = False
+    own_alignment: bool = option(False, omit_default=True)
+    paths: int = option(1, COUNT)
+    seed: int = option(0, Rule(least=0))
+    closures: bool = True
+    articulation: bool = True
+    speech_weight: float = option(1.0, WEIGHT, omit_default=True)
+    f0_weight: float = option(1.0, WEIGHT, omit_default=True)
+    motion_weight: float = option(1.0, WEIGHT, omit_default=True)
+    recognition_speech_weight: float = option(1.0, WEIGHT, omit_default=True)
+    recognition_f0_weight: float = option(1.0, WEIGHT, omit_default=True)
+    bigram_weight: float = option(4.0, WEIGHT, omit_default=True)
+    insertion: float = option(-4.0, omit_default=True)
+    both_neighbours: bool = option(False, omit_default=True)
+    flat_start: bool = option(False, omit_default=True)
+    modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
+
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
+    aliases: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.paths > 1 and not self.recognise_units:
+            raise InputError(
+                f"paths is {self.paths}: several are sampled only where units are recognised (recognise_units)"
+            )
+
+        if not self.hmm.recognition.active:
+            raise InputError("no stream takes part in recognition; give speech or F0 a weight")
+
+    def check_files(self) -> None:  # noqa: D102
+        load_unit_set(self.units)
+
+    @property
+    def hmm(self) -> JointConfig:
+        """Configuration of the joint model: its states and mixtures, and the stream weights."""
+        training, recognition = (weight if self.f0 else 0.0 for weight in (self.f0_weight, self.recognition_f0_weight))
+        motion = self.motion_weight if self.motion_in_training else 0.0
+        return JointConfig(
+            states=self.states,
+            mixtures=self.mixtures,
+            motion_mixtures=self.motion_mixtures,
+            both_neighbours=self.both_neighbours,
+            bigram_weight=self.bigram_weight,
+            insertion=self.insertion,
+            training=StreamWeights(self.speech_weight, training, training, training, motion),
+            recognition=StreamWeights(self.recognition_speech_weight, recognition, recognition, recognition, 0.0),
+        )
+
+
 PREFIX = "joint_"
-"""Prefix of the names of the arrays of the joint model."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointModel:
     """A joint model with the space of its motion.
 
-    units   : the unit of every phone
-    space   : the Q dimensions in which motion is modelled
-    hmm     : the joint model
     closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
     prior   : the table of articulation in the speaker's range (None: there is none)
     scaling : variance scaling about the rest pose (None: movements are not scaled)
@@ -156,9 +255,8 @@ class JointEngine(Engine[JointModel]):
         return Fit(self._with_filter(model, examples), {"frames": frames, **figures})
 
     def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
-        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``.
-
-        Raises as ``fit``.
+        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``. Raises
+        as that.
         """
         learning = self._learning(examples)
         classes = learning.units.classes()
@@ -286,11 +384,7 @@ class JointEngine(Engine[JointModel]):
 def _own_times(
     model: JointModel, observations: StreamObservations, units: Timeline[Unit], duration_s: float
 ) -> Timeline[Unit]:
-    """Return given units at the times that the model gives them by forced alignment.
-
-    Pauses that are shorter than the states of silence are left out. Units that do not fit into the recording keep the
-    times that they have.
-    """
+    """Return given units at the times that the model gives them by forced alignment."""
     least_s = model.hmm.inventory.states / FRAME_RATE_HZ
     spoken = [span for span in units if span.duration_s >= least_s or not is_silent(span.label.phone)]
     names = [model.units.unit_of(span.label) for span in spoken]
@@ -304,13 +398,11 @@ def _own_times(
 
 
 def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
-    """Return the best state sequence within the times of given units."""
     sequence, bounds = units_to_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
     return align(model.hmm, observations, sequence, bounds)
 
 
 def _density_names(hmm: JointHmm, path: StatePath) -> tuple[str, ...]:
-    """Return, for every state of a path, its name and the name of its density of motion."""
     forest = hmm.models[MOTION].forest
     return tuple(
         f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"

@@ -15,9 +15,13 @@ from scipy.interpolate import PchipInterpolator
 
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BEFORE, NO_JOIN, Costs, Target
 from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
-from lipmotion.engines.selection.lip_reading import PROTECTED_PHONES
-from lipmotion.types import FRAME_RATE_HZ
-from lipmotion.units import PHONES, is_silent
+from lipmotion.engines.selection.model import SelectionModel
+from lipmotion.engines.selection.windows import PROTECTED_PHONES
+from lipmotion.motion.generation import Statistics
+from lipmotion.motion.rest import find_digital_silence, find_runs, is_away_from_speech, list_speech_intervals
+from lipmotion.stats.curves import with_dynamics
+from lipmotion.types import FRAME_RATE_HZ, Constraints, Motion, ReducedVariance, Speech, Timeline, Unit
+from lipmotion.units import PHONES, SILENCE, is_silent
 
 Array = NDArray[np.float64]
 SMOOTHED_SHARE = 0.05
@@ -35,7 +39,6 @@ class Piece:
     """Units that were recorded in succession, and where they are used.
 
     first, stop : the phones of the target
-    unit        : the unit of the first phone; the others follow it in the inventory
     join        : kind of the join with the piece before: ``ABUTTING_JOIN``, ``JOIN_BEFORE`` or ``JOIN_AFTER``
     start_s     : time of that join in the target; the piece counts for half there
     overlap_s   : the pieces overlap from so much before this time to so much after it; 0 for a hard join
@@ -50,10 +53,8 @@ class Piece:
 
 
 def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
-    """Return the pieces that a selection consists of, in order.
-
-    units : one for each phone of the target
-    In one phone there is one overlap at most: where the search has two, the second join is of the next best kind.
+    """Return the pieces of a selection, in order; of two overlaps in one phone, the second gives way to the next best
+    join.
     """
     kinds = [ABUTTING_JOIN]
     for number in range(1, len(units)):
@@ -131,10 +132,7 @@ class TimeMap:
 
     @classmethod
     def of(cls, inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> TimeMap:
-        """Return the map of a piece.
-
-        following : the piece after it (None: it is the last)
-        """
+        """Return the map of a piece."""
         first = piece.first - (piece.join == JOIN_BEFORE)
         stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
         shift = piece.unit - piece.first
@@ -186,7 +184,7 @@ def _smooth(
     recording = inventory.windows.recording
     left, right = (inventory.at(recording[[piece.unit]], clock(np.array([join_s])))[0] for piece, clock in sides)
     jump = right - left
-    kept = [is_protected(target, number) for number in (after.first - 1, after.first)]
+    kept = [PHONES[target.windows.phones[number]] in PROTECTED_PHONES for number in (after.first - 1, after.first)]
     shares = (0.0, 1.0) if kept[0] and not kept[1] else (1.0, 0.0) if kept[1] and not kept[0] else (0.5, 0.5)
     spans_s = (
         SMOOTHED_SHARE * (join_s - times_s[before.first, 0]),
@@ -200,6 +198,73 @@ def _smooth(
         motion[near] += (share if side == 0 else -share) * bend[:, None] * jump
 
 
-def is_protected(target: Target, number: int) -> bool:
-    """Return whether the lip shape of a phone of the target must be preserved."""
-    return PHONES[target.windows.phones[number]] in PROTECTED_PHONES
+SETTLED_S = 0.06
+"""Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """The unit of each phone of a target [shape=(U,)], and the pieces that they make."""
+
+    target: Target
+    units: UnitNumbers
+    pieces: list[Piece]
+
+
+def motion_of_units(
+    model: SelectionModel,
+    costs: Costs,
+    chosen: Chosen,
+    speech: Speech,
+    constraints: Constraints | None = None,
+    *,
+    close: bool = False,
+) -> tuple[Motion, ReducedVariance]:
+    """Return the motion of chosen units, lips closed if wanted, and its variance, as ``LearnedMotion.generate``."""
+    frames = len(speech.features.values)
+    track = concatenated(costs.inventory, chosen.target, chosen.pieces, frames)
+    always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
+    resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
+    means = with_dynamics(track + resting * (model.rest - track))
+    precisions = np.broadcast_to(1 / model.variances, means.shape)
+
+    def statistics(block: slice) -> Statistics:
+        return means[block].copy(), precisions[block].copy()
+
+    learned = model.motion.for_voice(speech.voice)
+    reliability = _substituted(costs, chosen.target, chosen.units, frames)
+    return learned.generate(statistics, frames, speech.units, constraints, close=close, reliability=reliability)
+
+
+def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: bool) -> Array:
+    """Return the weight of the rest pose in every frame, 0 to 1 [shape=(T,)].
+
+    It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
+    silence there is no breath, as there may be in the silence that was recorded with the unit.
+    always   : whether it is 1 in every silence, for no silence was recorded
+    """
+    silent = np.ones(len(features), bool) if always else find_digital_silence(features, units)
+    if not silent.any():
+        return np.zeros(len(features))
+    away = is_away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, list_speech_intervals(units), SETTLED_S)
+    resting = np.zeros(len(features))
+    for first, stop in find_runs(away):
+        resting[first:stop] = float(silent[first:stop].any())
+    width = round(SETTLED_S * FRAME_RATE_HZ)
+    window = np.hanning(2 * width + 1)
+    padded = np.pad(resting, width, mode="edge")
+    return np.convolve(padded, window / window.sum(), "valid")
+
+
+def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
+    """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)].
+
+    There the table of articulation says more than the unit; elsewhere the unit is a recording of what is wanted.
+    """
+    middle = costs.config.window // 2
+    around = slice(middle - 1, middle + 2)
+    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1) & (not target.by_sound)
+    result = np.zeros(frames)
+    for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
+        result[int(start_s * FRAME_RATE_HZ) : int(np.ceil(end_s * FRAME_RATE_HZ))] = float(other)
+    return result

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lipmotion.engines.selection.lip_reading import OVERLAPS, parsed_invisible
+from lipmotion.engines.selection.windows import OVERLAPS, parsed_invisible
 from lipmotion.errors import InputError
 from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor

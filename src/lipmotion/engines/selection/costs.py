@@ -17,8 +17,16 @@ from lipmotion.engines.selection.inventory import (
     standing_in,
     unit_index,
 )
-from lipmotion.engines.selection.lip_reading import INVISIBLE, OVERLAPS, PROTECTED_PHONES, lip_reading_class
-from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, SILENT, VISEME_NUMBER, PhoneWindows
+from lipmotion.engines.selection.windows import (
+    INVISIBLE,
+    INVISIBLE_SYMBOL,
+    OVERLAPS,
+    PROTECTED_PHONES,
+    SILENT,
+    VISEME_NUMBER,
+    PhoneWindows,
+    lip_reading_class,
+)
 from lipmotion.units import PHONES
 from lipmotion.units.phones import CLASSES
 
@@ -62,10 +70,7 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Costs:
-    """Costs of the units of one inventory.
-
-    scale : factors of the dimensions of motion in all comparisons [shape=(Q,)]
-    """
+    """Costs of the units of one inventory."""
 
     inventory: RecordedUnits
     config: SelectionConfig
@@ -88,11 +93,7 @@ class Costs:
     def target(
         self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
-        """Return phones in a form that can be compared with units.
-
-        by_sound : as of ``Target``
-        guided, predicted : predicted motion at ``POINTS`` of each phone [each shape=(U, POINTS, Q)]
-        """
+        """Return phones to compare with units, and motion predicted at ``POINTS`` [each shape=(U, POINTS, Q)]."""
         known = replaced(windows, self.stand_ins)
         contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
         if guided is None or predicted is None:
@@ -100,10 +101,7 @@ class Costs:
         return Target(known, contexts, guided * self.scale, predicted * self.scale, by_sound)
 
     def candidates(self, target: Target, number: int, excluded: NDArray[np.bool_] | None = None) -> UnitNumbers:
-        """Return the units for one phone: of each bias those of the longest agreement, and of these the cheapest.
-
-        excluded : units that are not wanted [shape=(U,)]
-        """
+        """Return the units for one phone: of each bias those of the longest agreement, and of these the cheapest."""
         cost = partial(self._phonological_costs, target, number)
         return self.index.candidates(target.contexts[number], self.config.candidates, excluded, cost)
 
@@ -138,9 +136,8 @@ class Costs:
         return costs
 
     def join_costs(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> Array:
-        """Return the costs of joining units of one phone with units of the next [shape=(len(left), len(right))].
-
-        number : of the phone of ``right``
+        """Return the costs of joining units of one phone with those of phone ``number`` [shape=(len(left),
+        len(right))].
         """
         costs = np.minimum.reduce(self._joins(target, number, left, right))
         np.minimum(costs, self.config.most, out=costs)
@@ -148,9 +145,8 @@ class Costs:
         return costs
 
     def join_kind(self, target: Target, number: int, left: int, right: int, *, may_be_before: bool = True) -> int:
-        """Return how a unit is joined with that of the next phone, which has this number.
-
-        may_be_before : whether they may overlap in the phone before
+        """Return how a unit is joined with that of phone ``number``; ``may_be_before``: they may overlap in the phone
+        before.
         """
         pair = np.array([left]), np.array([right])
         if self._succeed(*pair)[0, 0]:

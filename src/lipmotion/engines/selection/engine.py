@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
-from lipmotion.engines.selection.concatenation import Piece, TimeMap, pieces_of, shown_units
+from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, motion_of_units, pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, Target
 from lipmotion.engines.selection.inventory import RecordedUnits, inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
-from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import fit_selection, target_of
 from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows
@@ -26,17 +25,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import (
-    Configuration,
-    Constraints,
-    Example,
-    Generation,
-    Monitor,
-    Speech,
-    StateTrace,
-    Timeline,
-    Unit,
-)
+from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
 
 Array = NDArray[np.float64]
 SOUND: dict[str, Any] = {
@@ -59,10 +48,7 @@ ROUNDING_S = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class AcousticUnits(RecordedUnits):
-    """Units of which the sound is compared, not the motion.
-
-    acoustic : acoustic features of all recordings, one after the other [shape=(F, D)]
-    """
+    """Units of which the sound is compared, not the motion: features of all recordings in turn [shape=(F, D)]."""
 
     acoustic: Array
 
@@ -100,10 +86,7 @@ def typical_duration_s(inventory: RecordedUnits, phone: str) -> float:
 
 
 def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
-    """Return the timeline with the source of the unit of every phone as the name of its unit.
-
-    starts_s : start of every phone of the target
-    """
+    """Return the timeline with the source of the unit of every phone as the name of its unit."""
     return Timeline(
         tuple(
             replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))
@@ -227,10 +210,7 @@ class SelectionEngine(Engine[SelectionModel]):
 
 
 def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:
-    """Return the units that edited labels name, by the number of their phone in the target.
-
-    A label names a unit where both have one symbol: an edited phone is selected again.
-    """
+    """Return the units that edited labels name, by phone; those of another symbol than their phone are ignored."""
     if target.by_sound:
         return {}
     named = units_by_source(costs.inventory, (span.label.unit for span in units if span.label.unit))

@@ -17,7 +17,6 @@ from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, find_similar_lips
 
 LINE = 110
-"""Width of a line of text, in characters."""
 
 
 def source_of(inventory: RecordedUnits, unit: int) -> str:
@@ -68,7 +67,6 @@ UnitNumbers = NDArray[np.intp]
 class RecordedUnits:
     """Recorded phones, called units, and their motion.
 
-    names     : of the recordings
     windows   : the units, recording by recording; times are seconds in their recording
     usable    : whether the motion of each unit was measured throughout [shape=(U,)]
     first     : the row of ``values`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
@@ -87,10 +85,7 @@ class RecordedUnits:
 
     @cached_property
     def values(self) -> Array:
-        """The motion of all recordings [shape=(F, Q)].
-
-        Where silence is not stored, it is a line between its edges in the recording.
-        """
+        """The motion of all recordings [shape=(F, Q)]; silence that is not stored is a line."""
         stored = np.concatenate([np.arange(first, stop) for first, stop in self.kept.tolist()])
         rows, frames = self.motion.astype(float), np.arange(self.first[-1])
         if len(rows) == len(frames):
@@ -112,10 +107,7 @@ class RecordedUnits:
         return replace(self, windows=windows, usable=self.usable[kept], predicted=predicted)
 
     def poses(self, units: UnitNumbers, fraction: float) -> Array:
-        """Return the motion at a fraction of the duration of some units [shape=(N, Q)].
-
-        fraction : 0 (start) to 1 (end)
-        """
+        """Return the motion of some units at a fraction of their duration, 0 to 1 [shape=(N, Q)]."""
         start_s, end_s = self.windows.times_s[units].T
         return self.at(self.windows.recording[units], start_s + fraction * (end_s - start_s))
 
@@ -177,11 +169,7 @@ class UnitIndex:
 
 
 def unit_index(inventory: RecordedUnits, invisible: Collection[str], window: int) -> UnitIndex:
-    """Return the index of an inventory.
-
-    invisible : phones that are one symbol
-    window    : phones of a window, N, an odd number
-    """
+    """Return the index of an inventory."""
     contexts = inventory.windows.contexts(invisible, window // 2)
     usable = np.flatnonzero(inventory.usable)
     orders, keys = [], []

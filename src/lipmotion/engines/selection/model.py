@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import POINTS, Costs
-from lipmotion.engines.selection.guide import Guide
+from lipmotion.engines.selection.costs import FRACTIONS, POINTS, Costs
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.windows import PhoneWindows
 from lipmotion.hmm.multistream.phone_recogniser import (
@@ -22,17 +22,48 @@ from lipmotion.hmm.multistream.phone_recogniser import (
 )
 from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_from_arrays, learned_motion_to_arrays
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.predictors import list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
-from lipmotion.storage.schema import (
-    POSITIVE,
-    Arrays,
-    ArraySpec,
-    check_arrays,
-    format_errors,
-    refuse_undeclared,
-)
-from lipmotion.types import FRAME_RATE_HZ
+from lipmotion.motion.predictors import Predictor, list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
+from lipmotion.types import FRAME_RATE_HZ, Example, Speech
+from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import PHONES
+
+LEAST_EXPANSION, MOST_EXPANSION = 1.0, 1.6
+NEW_SPEECH_EXPANSION = 1.05
+"""Predictions for new recordings are so much narrower again than those for recordings of the training."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guide:
+    """A predictor of motion; mean of the motion [shape=(Q,)], and its deviation by that of predictions [shape=(Q,)]."""
+
+    predictor: Predictor
+    centre: Array
+    expansion: Array
+
+    def predict(self, speech: Speech) -> tuple[Array, Array]:
+        """Return the predicted motion [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)]."""
+        return self.predictor.predict(speech)
+
+    def expanded(self, predicted: Array) -> Array:
+        """Return predicted motion [shape=(..., Q)] as wide as recorded motion."""
+        return self.centre + (predicted - self.centre) * self.expansion
+
+
+def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequence[Array]) -> Guide:
+    """Return a guide."""
+    recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+    predicted = np.concatenate([predictor.predict(e.speech)[0][e.valid] for e in examples])
+    ratio = NEW_SPEECH_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
+    return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, LEAST_EXPANSION, MOST_EXPANSION))
+
+
+def at_points(motion: Array, times_s: Array) -> Array:
+    """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)]."""
+    start_s, end_s = times_s.T[:, :, None]
+    points_s = start_s + FRACTIONS * (end_s - start_s)
+    return interpolate_rows(motion, FRAME_RATE_HZ, points_s.ravel()).reshape(*points_s.shape, -1)
+
 
 Array = NDArray[np.float64]
 LONGEST_SILENCE_FRAMES = 100
@@ -47,10 +78,7 @@ OLD_PREFIX = "store_"
 class SelectionModel:
     """Recorded phones with their motion, and what chooses among them.
 
-    motion    : turns motion in the motion space into that of all channels, with closures and limits
-    inventory : the recorded phones
     scale     : factors of the dimensions of motion in comparisons [shape=(Q,)]
-    rest      : the rest pose [shape=(Q,)]
     variances : of the error of static value, Δ and Δ² on recordings that were left out [shape=(3, Q)]
     guide     : predicts motion from the sound (None: the phones alone choose)
     phone_recogniser : recognises the phones of speakers that it was trained on (None: there was too little speech)
@@ -108,10 +136,8 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
 
 
 def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
-    """Deserialise a model.
-
-    filtered : there must be a modulation filter
-    Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
+    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: an array is missing or
+    wrong.
     """
     with format_errors("the model of recorded units"):
         if any(name.startswith(OLD_PREFIX) for name in arrays):
@@ -177,7 +203,6 @@ GUIDE = {
 
 
 def _check(inventory: RecordedUnits) -> None:
-    """Raise ValueError if the parts of an inventory contradict one another."""
     windows, first, rows = inventory.windows, inventory.first, inventory.kept.ravel()
     if len(first) != len(inventory.names) + 1 or first[0] != 0 or (np.diff(first) < 1).any():
         raise ValueError("recording_first is not rising from 0, with one number for each recording and one more")

@@ -79,10 +79,7 @@ def select(
 def _candidates(
     costs: Costs, target: Target, number: int, excluded: NDArray[np.bool_] | None, given: int | None, prune: bool
 ) -> tuple[UnitNumbers, Array]:
-    """Return the candidates for one phone, and their target costs.
-
-    Where all units of the phone are excluded, they are allowed.
-    """
+    """Return the candidates for one phone, and their target costs. Where all units are excluded, they are allowed."""
     if given is not None:
         units = np.array([given], np.intp)
         return units, costs.target_costs(target, number, units)

@@ -9,13 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.concatenation import Chosen, concatenated, motion_of_units, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
-from lipmotion.engines.selection.guide import Guide, at_points, fit_guide
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
+from lipmotion.engines.selection.model import Guide, SelectionModel, at_points, fit_guide
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
@@ -57,7 +55,6 @@ def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
 
 
 def _segments(duration_s: float) -> Timeline[Unit]:
-    """Return segments of equal duration; their phone is not used."""
     edges = np.linspace(0, duration_s, max(round(duration_s / SEGMENT_S), 1) + 1).tolist()
     return Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
 
@@ -99,11 +96,23 @@ def fit_selection(
     inventory = inventory_of(examples, values, guide)
     monitor(Progress(_STAGE, 2, 3, 0.92))
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-    scale = comparison_scale(recorded, motion.space)
+    deviations = np.maximum(recorded.std(axis=0), 1e-9)
+    count = len(motion.space.direct)
+    deviations[count:] = deviations[count:].max(initial=1e-9)
+    weights = np.ones(len(deviations))
+    weights[:count] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in motion.space.direct_names]
+    scale = np.sqrt(weights) / deviations
     rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
     costs, left_out = model.costs(config), _left_out(model, config, examples)
-    model = replace(model, variances=_error_variances(left_out, costs, values, recorded))
+    errors = []
+    for one in left_out:
+        original, chosen = values[one.number], one.chosen
+        joined = concatenated(costs.inventory, chosen.target, chosen.pieces, len(original))
+        errors.append(with_dynamics(original - joined)[one.frames])
+    spread = with_dynamics(recorded).var(axis=0)
+    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
+    model = replace(model, variances=np.maximum(variances, 1e-4 * spread + 1e-12))
     compared = (
         (values[out.number][out.frames], motion.space.reduce(made.values.astype(float))[out.frames])
         for out in left_out
@@ -116,10 +125,8 @@ def fit_selection(
 
 
 def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
-    """Return the inventory of some examples.
-
-    values : motion of each in the motion space [each shape=(T, Q)]
-    Raises CorpusError: the motion of no phone of speech was measured throughout.
+    """Return the inventory of some examples, from motion in the motion space. Raises CorpusError: no phone was measured
+    whole.
     """
     timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = phone_windows(timelines)
@@ -148,20 +155,6 @@ def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Gu
     kept = _kept(examples, first)
     motion = np.concatenate(values)[np.concatenate([np.arange(start, stop) for start, stop in kept])].astype(np.float16)
     return RecordedUnits(names, windows, usable, first, np.array(kept, np.intp), motion, predicted)
-
-
-def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
-    """Return the factors of the dimensions in comparisons of motion [shape=(Q,)].
-
-    recorded : motion in the motion space [shape=(N, Q)]
-    A channel counts by its own deviation, a principal component by that of the first one.
-    """
-    deviations = np.maximum(recorded.std(axis=0), 1e-9)
-    direct = len(space.direct)
-    deviations[direct:] = deviations[direct:].max(initial=1e-9)
-    weights = np.ones(len(deviations))
-    weights[:direct] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in space.direct_names]
-    return np.sqrt(weights) / deviations
 
 
 def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int]]:
@@ -193,11 +186,7 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
 
 @dataclass(frozen=True, eq=False)
 class _LeftOut:
-    """What was chosen for a recording without its own units.
-
-    number : of its example
-    frames : whether motion, Δ and Δ² of each frame were measured [shape=(T,)]
-    """
+    """What was chosen for recording ``number`` without its own units, and the measured frames [shape=(T,)]."""
 
     number: int
     frames: NDArray[np.bool_]
@@ -215,22 +204,6 @@ def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence
             chosen = _chosen(model, costs, examples[number], costs.inventory.windows.recording == number)
             found.append(_LeftOut(number, frames, chosen))
     return found
-
-
-def _error_variances(left_out: Sequence[_LeftOut], costs: Costs, values: Sequence[Array], recorded: Array) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)].
-
-    values   : motion of all examples in the motion space [each shape=(T, Q)]
-    recorded : all measured motion [shape=(N, Q)]
-    """
-    errors = []
-    for out in left_out:
-        original, chosen = values[out.number], out.chosen
-        track = concatenated(costs.inventory, chosen.target, chosen.pieces, len(original))
-        errors.append(with_dynamics(original - track)[out.frames])
-    spread = with_dynamics(recorded).var(axis=0)
-    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
-    return np.maximum(variances, 1e-4 * spread + 1e-12)
 
 
 def _chosen(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Chosen:

@@ -1,4 +1,4 @@
-"""Emission densities of motion: a Gaussian for each tied state, whose mean may be regressed on acoustic features."""
+"""Emission densities of motion, a Gaussian for each tied state, and how states and predictor are combined."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.articulation import ArticulationPrior, slice_dynamics, unseen_share
 from lipmotion.motion.context_window import (
     WINDOW,
     AcousticContext,
@@ -17,9 +18,13 @@ from lipmotion.motion.context_window import (
     acoustic_context_to_arrays,
 )
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
+from lipmotion.motion.generation import Statistics
 from lipmotion.motion.limits import check_spread
+from lipmotion.motion.predictors import Predictor
+from lipmotion.motion.rest import rate_phones
 from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
+from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
 
@@ -101,12 +106,7 @@ class Emission:
         return f"{left}-{unit}+{right} {name}: {self._names[name, leaf]}"
 
     def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
-        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames.
-
-        rows     : the density of each frame [shape=(N,)]
-        features : acoustic features of the whole recording [shape=(T, D)]
-        frames   : the N frames of the recording
-        """
+        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames of densities [shape=(N,)]."""
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
         if self.regression is not None:
             add_acoustic_regression(means, self.regression, rows, self.regression.context(features, frames))
@@ -116,12 +116,7 @@ class Emission:
 def add_acoustic_regression(
     means: Array, regression: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
 ) -> None:
-    """Add the regressions on the acoustic features to constant means, in place.
-
-    means : of N frames [shape=(N, 3, Q)]
-    rows  : the density of each frame [shape=(N,)]
-    z     : reduced acoustic features around each frame [shape=(N, F)]
-    """
+    """Add the regressions on reduced features [shape=(N, F)] to constant means [shape=(N, 3, Q)], in place."""
     used = regression.rows[rows]
     for row in np.unique(used[used >= 0]):
         frames = np.nonzero(used == row)[0]
@@ -179,3 +174,71 @@ def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> Aco
     if rows.max() >= stored.sizes["C"]:
         raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
     return AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
+
+
+NETWORK_SHARE = 0.6
+"""Weight of the predictor beside the states, 0 to 1, in models that have no other."""
+RESTING_SHARE = 0.5
+"""Share of its weight that the predictor has where the states rest, with voices that training knows: their mouths open
+before they speak."""
+STRANGER_LOSS = 0.8
+"""Share of their weight that states lose with voices that training does not know at all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Experts:
+    """The states and the predictor on one recording.
+
+    emission, rows : densities, and the one of each frame [shape=(T,)]; the last density is that of the rest pose
+    network        : predicts motion without the states (None: there was too little speech to train it)
+    network_share  : weight of that predictor, 0 to 1, in contexts that training knows well
+    prior          : says how well training knows a phone in its context (None: taken as well known)
+    silent         : frames of digital silence, in which states count alone [shape=(T,)] (None: there are none)
+    """
+
+    emission: Emission
+    rows: NDArray[np.intp]
+    speech: Speech
+    network: Predictor | None
+    prior: ArticulationPrior | None
+    network_share: float = NETWORK_SHARE
+    silent: NDArray[np.bool_] | None = None
+
+    def statistics(self, frames: slice) -> Statistics:
+        """Return means and precisions of a range of N frames [each shape=(N, 3, Q)]: weighted means of both."""
+        means, precisions = self.emission.statistics(self.rows[frames], np.asarray(self.speech.features.values), frames)
+        if self.network is None or self._predicted is None:
+            return means, precisions
+        share = self._share[frames, None, None]
+        means += share * (slice_dynamics(self._predicted[0], frames) - means)
+        precisions += share * (1 / self.network.variances - precisions)
+        return means, precisions
+
+    @cached_property
+    def reliability(self) -> Array:
+        """How far the phones in time can be relied on, 0 to 1 [shape=(T,)]."""
+        return rate_phones(self.speech, None if self._predicted is None else self._predicted[1], len(self.rows))
+
+    @cached_property
+    def _predicted(self) -> tuple[Array, Array] | None:
+        """Motion [shape=(T, Q)] and distortion [shape=(T,)] by the predictor."""
+        if self.network is None or not self.network.can_predict(self.speech):
+            return None
+        return self.network.predict(self.speech)
+
+    @cached_property
+    def _share(self) -> Array:
+        """The share of the predictor in every frame, 0 to 1 [shape=(T,)]."""
+        familiarity = np.ones(len(self.rows))
+        if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
+            familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
+        resting = self.rows == len(self.emission.means) - 1
+        own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
+        strange = unseen_share(self.speech.voice)
+        known = 1.0 if own else 1 - STRANGER_LOSS * strange
+        states = (1 - self.network_share) * self.reliability * familiarity * known
+        at_rest = np.maximum(1 - self.reliability, 0.0 if own else RESTING_SHARE * (1 - strange))
+        if self.silent is not None:
+            at_rest[self.silent] = 0
+        network = self.network_share * np.where(resting, at_rest, 1.0)
+        return network / np.maximum(states + network, 1e-12)

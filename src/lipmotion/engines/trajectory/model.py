@@ -10,8 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
-from lipmotion.engines.trajectory.experts import NETWORK_SHARE
+from lipmotion.engines.trajectory.emission import (
+    EMISSION,
+    NETWORK_SHARE,
+    Emission,
+    emission_arrays,
+    emission_from_arrays,
+)
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,
@@ -42,9 +47,7 @@ from lipmotion.units import UnitSet
 class TrajectoryModel:
     """Full-context hidden Markov models of motion.
 
-    units    : the unit of every phone
     space    : the Q dimensions in which motion is modelled
-    emission : densities of all tied states
     variance_factors : factors of variance scaling about the rest pose [shape=(Q,)]
     closure  : of the lips in p, b and m (None: the motion has no channel ``opening``)
     phone_recogniser : recognises the phones of speakers that it was trained on (None: there was too little speech)
@@ -103,12 +106,8 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
 def model_from_arrays(
     arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str, *, filtered: bool
 ) -> TrajectoryModel:
-    """Deserialise a model.
-
-    layout : returns the states of phones and silences, for a unit set
-    units  : name of the unit set; the set itself is in the arrays
-    filtered : there must be a modulation filter
-    Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
+    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: an array is missing or
+    wrong.
     """
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.emission import AcousticRegression, Emission, add_acoustic_regression
-from lipmotion.engines.trajectory.experts import NETWORK_SHARE, Experts
+from lipmotion.engines.trajectory.emission import (
+    NETWORK_SHARE,
+    AcousticRegression,
+    Emission,
+    Experts,
+    add_acoustic_regression,
+)
 from lipmotion.engines.trajectory.model import TrajectoryModel
-from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.kernels.banded import solve_mlpg
@@ -36,7 +40,78 @@ from lipmotion.stats.trees import (
     zero_statistics,
 )
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import Example, Monitor, Progress, sub_monitor
+from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """Options of the training, from a ``TrajectoryConfig``.
+
+    layout       : the states of phones and silences
+    components   : principal components that all point channels (``x_17``, ...) are reduced to
+    tree_factor  : gain that a split of a decision tree must have, in units of its description length
+    least_frames : smallest number of frames of a leaf
+    shrinkage, variance_shrinkage : weights, in frames, of the mean and of the variance of the parent node
+    acoustic_regression : regress the means on the acoustic features around the frame
+    acoustic_components : principal components that these features are reduced to
+    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the regression that
+                   all nodes share towards zero
+    ridge_frames : smallest number of frames of a node with a regression of its own
+    joint_recogniser : train the joint model as well
+    epochs : how often the training of the predictor uses each recording
+    articulation : lean on the table of articulation
+    predictor : name of the predictor, or ``auto``
+    modulation_filter : strength of the filter of generated motion; 0: none
+    """
+
+    layout: StateLayout
+    components: int
+    tree_factor: float
+    least_frames: float
+    shrinkage: float
+    variance_shrinkage: float
+    acoustic_regression: bool
+    acoustic_components: int
+    ridge: float
+    shared_ridge: float
+    ridge_frames: float
+    joint_recogniser: bool
+    epochs: int
+    articulation: bool
+    predictor: str
+    modulation_filter: float
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingClip:
+    """One example, prepared for training.
+
+    states   : full-context state of each frame [length T]
+    frames   : int array [shape=(N,)], the frames that are valid and have valid neighbours
+    rows     : float32 array [shape=(N, 3, Q)], static value, Δ and Δ² of the motion in these frames
+    """
+
+    speech: Speech
+    states: list[FullContextState]
+    frames: NDArray[np.intp]
+    rows: NDArray[np.float32]
+
+    @property
+    def features(self) -> NDArray[np.float32]:
+        """Acoustic features [shape=(T, D)]."""
+        return np.asarray(self.speech.features.values)
+
+    @property
+    def training_states(self) -> list[FullContextState]:
+        """Full-context state of each frame of ``frames`` [length N]."""
+        return [self.states[frame] for frame in self.frames]
+
+
+def density_rows(emission: Emission, states: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
+    """Return the number of the density of each state [shape=(len(states),)]."""
+    distinct = {state: emission.row(state, layout) for state in dict.fromkeys(states)}
+    return np.array([distinct[state] for state in states], np.intp)
+
 
 Array = NDArray[np.float64]
 SHARE_DIVISOR = 170
@@ -53,7 +128,11 @@ def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], o
     that of its parent node, so that states with few frames share the regression of their relatives.
     """
     context = fit_acoustic_context((clip.features for clip in clips), options.acoustic_components)
-    owners = _owners(emission, options)
+    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
+    nodes: list[_Node | None] = []
+    for name, tree in emission.forest.items():
+        nodes += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
+    owners = [*nodes, None]
     components, outputs = context.basis.shape[1], emission.means[0].size
     statistics = {node: zero_statistics(components, outputs) for node in dict.fromkeys(owners) if node is not None}
     for node, z, error in _frames(emission, clips, options, context, owners):
@@ -68,15 +147,6 @@ _Node = tuple[str, int]
 """A node of a tree: name of the tree, number of the node."""
 
 
-def _owners(emission: Emission, options: TrainingOptions) -> list[_Node | None]:
-    """Return, for every density, the node whose regression it uses; None for the rest pose."""
-    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
-    owners: list[_Node | None] = []
-    for name, tree in emission.forest.items():
-        owners += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
-    return [*owners, None]
-
-
 def _frames(
     emission: Emission,
     clips: Sequence[TrainingClip],
@@ -84,11 +154,7 @@ def _frames(
     context: AcousticContext,
     owners: Sequence[_Node | None],
 ) -> Iterator[tuple[_Node, NDArray[np.float32], NDArray[np.float32]]]:
-    """Yield, block by block, the frames of each node with a regression.
-
-    Each item is the node, the reduced features around its frames [shape=(N, F)], and the motion in these frames minus
-    the mean of its density [shape=(N, 3·Q)].
-    """
+    """Yield, by blocks, each node with a regression, the features around its frames, and its motion less its mean."""
     numbers = {node: number for number, node in enumerate(dict.fromkeys(owners))}
     nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
@@ -132,16 +198,7 @@ def _variances(
         add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
         np.add.at(squares, rows, np.square(clip.rows - means))
         np.add.at(counts, rows, 1)
-    return _shrunk(emission, squares, counts, options.variance_shrinkage)
-
-
-def _shrunk(emission: Emission, squares: Array, counts: Array, strength: float) -> NDArray[np.float32]:
-    """Return the variances of all densities [shape=(L, 3, Q)], shrunk towards their prior.
-
-    squares  : sums of squared deviations from the regressed means [shape=(L, 3, Q)]
-    counts   : frames of each density [shape=(L,)]
-    strength : weight of the prior, in frames
-    """
+    strength = options.variance_shrinkage
     before = emission.variances.astype(float)
     ratio = squares[:-1].sum(axis=0) / np.maximum((before[:-1] * counts[:-1, None, None]).sum(axis=0), 1e-30)
     prior = before * np.clip(ratio, 0, 1)  # variances without regression, reduced by the mean share that it explains
@@ -202,7 +259,6 @@ def fit_trajectory(
 
 
 _STAGE = "trees"
-"""Name of this stage in reports of progress."""
 
 
 def _share_of_predictor(
@@ -210,7 +266,6 @@ def _share_of_predictor(
 ) -> float:
     """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
 
-    predictions : of each clip by predictors that were trained on the other folds [each shape=(T, Q)]
     direct      : number of channels that are modelled as they are; the weight is chosen for them
     The states are trained on the same folds. With a single clip, the predictor has all the weight.
     """
@@ -255,10 +310,7 @@ def _recorded_and_generated(
 
 
 def training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:
-    """Return an example prepared for training.
-
-    values : its motion in the motion space [shape=(T, Q)]
-    """
+    """Return an example prepared for training."""
     frames = np.nonzero(mark_known_dynamics(example.valid))[0]
     states = label_full_context(example.speech.units, len(values), layout)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
@@ -346,10 +398,7 @@ def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: Trainin
 def _rest_gaussian(
     clips: Sequence[TrainingClip], options: TrainingOptions, fallback: Array, overall: Array
 ) -> tuple[Array, Array]:
-    """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech.
-
-    Movements in these frames (breath, a lick of the lips) are not speech: Δ and Δ² have mean 0 and a small variance.
-    """
+    """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech."""
     poses = [
         clip.rows[number, 0]
         for clip in clips

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import TriphoneStates, expand_triphones
-from lipmotion.hmm.network import build_chain
+from lipmotion.hmm.network import LogLikelihoods, build_chain
 
 MIN_VARIANCE = 1.0
 """Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
@@ -21,11 +20,7 @@ MIN_VARIANCE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class StatePath:
-    """The state of every frame.
-
-    states : those of the sequence of units
-    frames : [shape=(T,)], the number of the frame's state among them
-    """
+    """The states of a sequence of units, and which of them each frame has [shape=(T,)]."""
 
     states: TriphoneStates
     frames: NDArray[np.intp]
@@ -87,11 +82,7 @@ def check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
 def measure_durations(
     hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
 ) -> NDArray[np.float64]:
-    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)].
-
-    Utterances with fewer frames than states, or without a stream that is active in training, are left out. For a state
-    that never occurred they are those of the geometric distribution that its probability of staying gives.
-    """
+    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)]."""
     sums = np.zeros((len(hmm.log_stay), 3))
     for observed, units in utterances:
         active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)

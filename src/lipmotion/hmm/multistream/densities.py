@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.multistream.streams import Stream
+from lipmotion.hmm.multistream.streams import ObservedStream
 from lipmotion.stats.mixture import LOG_2PI, Mixtures, QuadraticForm
 
 MIN_FRAMES = 2.0
@@ -28,19 +28,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class StreamScale:
-    """Mean and standard deviation of a stream's dimensions, which standardise its values.
-
-    mean, deviation : [shape=(D,)]
-    """
+    """Mean and standard deviation of a stream's dimensions [shape=(D,)], which standardise its values."""
 
     mean: Array
     deviation: Array
 
-    def standardise(self, stream: Stream) -> Floats:
-        """Return the frames of a stream in the form that its densities take [shape=(T, 2 + 2·D)].
-
-        A row is 1 and, where the frame has a value, 1, the standardised value and its square, else all 0.
-        """
+    def standardise(self, stream: ObservedStream) -> Floats:
+        """Return the frames of a stream in the form that its densities take [shape=(T, 2 + 2·D)]."""
         values = (stream.values - self.mean) / self.deviation
         known = stream.known[:, None]
         ones = np.ones((len(values), 1))
@@ -70,11 +64,7 @@ class GaussianStatistics:
         return cls(np.zeros(densities), np.zeros((densities, components, 1 + 2 * dimensions)))
 
     def add(self, densities: NDArray[np.intp], rows: Array) -> None:
-        """Accumulate, in place, statistics of single Gaussians.
-
-        densities : [shape=(N,)], each at most once
-        rows      : [shape=(N, 2 + 2·D)], sums of standardised frames weighted by posteriors
-        """
+        """Accumulate statistics of single Gaussians: weighted sums of standardised frames [shape=(N, 2 + 2·D)]."""
         self.frames[densities] += rows[:, 0]
         self.moments[densities, 0] += rows[:, 1:]
 
@@ -102,7 +92,6 @@ class TiedDensities:
     def log_density(self, rows: Floats, leaves: NDArray[np.intp], log_determinant: float = 0.0) -> Floats:
         """Return the log density of every frame under some of the densities [shape=(T, len(leaves))].
 
-        rows            : from ``StreamScale.standardise``
         log_determinant : of the scale: then densities are those of values before they were standardised
         """
         if self.mixtures.size[1] == 1:
@@ -155,10 +144,8 @@ class TiedDensities:
             statistics.frames[leaf] += (known if self.voiced is None else posteriors[pairs]).sum()
 
     def reestimate(self, statistics: GaussianStatistics, floor: float) -> TiedDensities:
-        """Return the densities re-estimated from sufficient statistics (the M-step).
-
-        floor : least variance of standardised values
-        Gaussians with less than ``MIN_FRAMES`` of data stay as they are, so the likelihood never falls.
+        """Return the densities of an M-step; Gaussians with less than ``MIN_FRAMES`` stay, so the likelihood never
+        falls.
         """
         count, first, second = np.split(statistics.moments, [1, 1 + self.mixtures.size[2]], axis=2)
         enough = count >= MIN_FRAMES
@@ -198,17 +185,14 @@ class TiedDensities:
 
 
 def make_standard_normals(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> TiedDensities:
-    """Return equal densities of mean 0 and variance 1, those of the whole standardised stream.
-
-    has_spaces : whether frames may be without a value;  voiced : the share of frames with one
-    """
+    """Return equal densities of mean 0 and variance 1, those of the whole standardised stream."""
     shape = (densities, 1, dimensions)
     mixtures = Mixtures(np.zeros((densities, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
     share = float(np.clip(voiced, MIN_VOICED_PROBABILITY, 1 - MIN_VOICED_PROBABILITY))
     return TiedDensities(mixtures, np.full(densities, share) if has_spaces else None)
 
 
-def fit_scale(streams: list[Stream]) -> tuple[StreamScale, float]:
+def fit_scale(streams: list[ObservedStream]) -> tuple[StreamScale, float]:
     """Return the scale of a stream over all utterances, and the share of its frames that have a value."""
     known = np.concatenate([stream.values[stream.known] for stream in streams]).astype(float)
     dimensions = known.shape[1]

@@ -46,11 +46,7 @@ class FrameDensities:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A generated trajectory.
-
-    values, variance : [shape=(T, Q)], in units of the motion; the variance follows from the Gaussians
-    log_likelihoods  : of the trajectory with its dynamics, after every step of EM; they never fall
-    """
+    """A trajectory and its variance [shape=(T, Q)], in units of the motion, and its log likelihoods."""
 
     values: Array
     variance: Array
@@ -58,10 +54,7 @@ class Trajectory:
 
 
 def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
-    """Return the densities of motion in every frame along a path of states.
-
-    Raises InputError: the model has no motion, or motion has weight 0 in synthesis.
-    """
+    """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
     model, means, precisions = _motion_gaussians(hmm)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
     return _make_densities(model.tied.mixtures.log_weights[chosen].astype(float), means[chosen], precisions[chosen])
@@ -92,9 +85,8 @@ def average_densities(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array)
 
 
 def average_path_densities(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
-    """Return one Gaussian for every frame, that of several equally probable paths (``JointRecogniser.draw_paths``).
-
-    Raises InputError: as ``average_densities``, or no paths, or of different lengths.
+    """Return one Gaussian for every frame, that of several equally probable paths. Raises InputError: as
+    ``average_densities``.
     """
     model, _, _ = _motion_gaussians(hmm)
     if not paths or len({len(path.frames) for path in paths}) > 1:
@@ -137,10 +129,7 @@ def solve_trajectory(
 
 
 def merge_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
-    """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)].
-
-    The Gaussians of a mixture are merged by their posteriors given the most probable trajectory, which EM finds.
-    """
+    """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)]."""
     if densities.log_weights.shape[1] == 1:
         return densities.means[:, 0], densities.precisions[:, 0]
     components = densities.log_components(solve_trajectory(densities).values)
@@ -167,9 +156,8 @@ def _solve(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int
 
 
 def _motion_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
-    """Return the model of motion, and means and weighted precisions of its leaves in its units [shape=(G, M, 3, Q)].
-
-    Raises InputError: there is none.
+    """Return the model of motion, its leaves' means and weighted precisions [shape=(G, M, 3, Q)]. Raises InputError:
+    none.
     """
     weight = hmm.config.synthesis.motion
     if MOTION not in hmm.models or not weight:

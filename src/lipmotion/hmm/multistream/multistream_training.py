@@ -1,35 +1,237 @@
-"""Training of all streams together: equal states, units without context, decision trees, units in context, mixtures."""
+"""Training of joint models: embedded Baum–Welch over all streams, from a flat start or known times to tied states."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
 from lipmotion.hmm.multistream.align import check_bounds, measure_durations
-from lipmotion.hmm.multistream.densities import fit_scale, make_standard_normals
-from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest, unit_forest
-from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
-from lipmotion.hmm.multistream.multistream_baum_welch import (
-    PreparedUtterances,
-    StatePosteriors,
-    StreamStatistics,
-    accumulate_statistics,
-    iterate_posteriors,
-    max_stay_probability,
-    prepare_utterances,
-    reestimate_hmm,
+from lipmotion.hmm.multistream.densities import (
+    MIN_POSTERIOR,
+    GaussianStatistics,
+    TiedDensities,
+    fit_scale,
+    make_standard_normals,
+)
+from lipmotion.hmm.multistream.model import (
+    JointConfig,
+    JointHmm,
+    StreamModel,
+    TreeCosts,
+    context_questions,
+    grow_forest,
+    unit_forest,
 )
 from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, StreamObservations
-from lipmotion.hmm.multistream.unit_states import Inventory, expand_triphones
+from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
+from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import run_em
 from lipmotion.stats.trees import Question
 from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
+
+MIN_STAY_PROBABILITY = 0.05
+"""Smallest probability of staying in a state."""
+MIN_MIXTURE_POSTERIOR = 1e-5
+"""Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
+FRAMES_AT_ONCE = 50_000
+"""Frames whose statistics for mixtures are accumulated together."""
+Rows = NDArray[np.float32]
+Leaves = Mapping[str, NDArray[np.intp]]
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedUtterance:
+    """The standardised streams of an utterance, and the S states of its units.
+
+    monophones : [shape=(S,)], the number of each state without context
+    triphones  : [shape=(S,)], the number of each state in its context, in ``PreparedUtterances.triphones``
+    distinct   : [shape=(N,)], the numbers in ``triphones``, each once
+    member     : [shape=(S, N)], 1 where a state is the distinct one of the column, else 0
+    """
+
+    streams: Mapping[str, Rows]
+    monophones: NDArray[np.intp]
+    triphones: NDArray[np.intp]
+    distinct: NDArray[np.intp]
+    member: NDArray[np.float32]
+    frames: int
+
+    @property
+    def fits(self) -> bool:
+        """Whether there are at least as many frames as states."""
+        return len(self.monophones) <= self.frames
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedUtterances:
+    """Utterances, and all distinct states in context that occur in them."""
+
+    items: tuple[PreparedUtterance, ...]
+    triphones: tuple[TriphoneState, ...]
+
+    def leaves(self, hmm: JointHmm) -> Leaves:
+        """Return the leaves of all states in context, by stream [shape=(len(triphones),)]."""
+        return hmm.leaves(self.triphones)
+
+
+class StatePosteriors(NamedTuple):
+    """The posteriors of an utterance's states [shape=(T, S)], and expected transitions to themselves [shape=(S,)]."""
+
+    utterance: int
+    states: NDArray[np.float64]
+    stay: NDArray[np.float64]
+    log_likelihood: float
+
+
+@dataclass(frozen=True, eq=False)
+class StreamStatistics:
+    """The sufficient statistics of utterances for the models of all streams (the result of the E-step).
+
+    triphones : by stream, of every state in context (``PreparedUtterances.triphones``), for one Gaussian each
+    leaves    : by stream, of its leaves, for all their Gaussians
+    stay, occupied : [shape=(R,)], expected transitions of each state without context to itself, and its frames
+    """
+
+    triphones: Mapping[str, GaussianStatistics]
+    leaves: Mapping[str, GaussianStatistics]
+    stay: NDArray[np.float64]
+    occupied: NDArray[np.float64]
+    log_likelihood: float
+    frames: int
+
+    @property
+    def mean_log_likelihood(self) -> float:
+        """Mean log likelihood per frame."""
+        return self.log_likelihood / max(self.frames, 1)
+
+
+def prepare_utterances(
+    hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
+) -> PreparedUtterances:
+    """Return utterances in the model's scale and states. Raises InputError: an unknown unit."""
+    index: dict[TriphoneState, int] = {}
+    items = []
+    for observed, units in utterances:
+        states = expand_triphones(hmm.inventory, units)
+        triphones = np.array([index.setdefault(state, len(index)) for state in states.triphones], np.intp)
+        distinct, local = np.unique(triphones, return_inverse=True)
+        member = np.eye(len(distinct), dtype=np.float32)[local]
+        streams = {
+            name: hmm.models[name].scale.standardise(stream)
+            for name, stream in observed.streams.items()
+            if name in hmm.models
+        }
+        items.append(PreparedUtterance(streams, states.monophones, triphones, distinct, member, observed.frames))
+    return PreparedUtterances(tuple(items), tuple(index))
+
+
+def iterate_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[StatePosteriors]:
+    """Give the state posteriors of utterances by length; too short ones, or without an active stream, are left out."""
+    leaves, log_move, weights = utterances.leaves(hmm), hmm.log_move, hmm.config.training
+    usable = [i for i, item in enumerate(utterances.items) if item.fits and set(weights.active) & set(item.streams)]
+    items = [utterances.items[i] for i in usable]
+    counts = [len(item.monophones) for item in items]
+    for batch in group_by_length([item.frames for item in items], counts):
+        frames = np.array([items[i].frames for i in batch], np.intp)
+        states = np.array([counts[i] for i in batch], np.intp)
+        log_emission = np.zeros((frames.max(), len(batch), states.max()))
+        log_keep, log_leave = np.full((2, len(batch), states.max()), -1.0)
+        for u, i in enumerate(batch):
+            item, inside = items[i], (slice(frames[u]), u, slice(states[u]))
+            streams = {name: stream for name, stream in item.streams.items() if name in weights.active}
+            item_leaves = {name: leaves[name][item.triphones] for name in streams}
+            log_emission[inside] = hmm.log_density(streams, item_leaves, weights)
+            log_keep[inside[1:]], log_leave[inside[1:]] = hmm.log_stay[item.monophones], log_move[item.monophones]
+        posterior, stay, log_likelihood = chain_posteriors(log_emission, log_keep, log_leave, frames, states)
+        for u, i in enumerate(batch):
+            if log_likelihood[u] > LOG_ZERO / 2:
+                of_item = posterior[: frames[u], u, : states[u]]
+                yield StatePosteriors(usable[i], of_item, stay[u, : states[u]], float(log_likelihood[u]))
+
+
+class _MixtureAccumulator:
+    """The statistics of frames for mixtures, accumulated over many utterances at once: that is faster."""
+
+    def __init__(self, tied: TiedDensities) -> None:
+        self._tied, self._statistics = tied, GaussianStatistics.zeros(*tied.mixtures.size)
+        self._waiting: list[tuple[Rows, NDArray[np.intp], Rows]] = []
+
+    def add(self, rows: Rows, leaves: NDArray[np.intp], posterior: Rows) -> None:
+        """Add an utterance with the leaves [shape=(S,)] and posteriors [shape=(T, S)] of its states."""
+        frame, state = np.nonzero(posterior > MIN_MIXTURE_POSTERIOR)
+        self._waiting.append((rows[frame], leaves[state], posterior[frame, state]))
+        if sum(len(leaves_of_frames) for _, leaves_of_frames, _ in self._waiting) > FRAMES_AT_ONCE:
+            self.statistics()
+
+    def statistics(self) -> GaussianStatistics:
+        """Return the statistics of all frames so far."""
+        if self._waiting:
+            rows, leaves, weights = (np.concatenate(arrays) for arrays in zip(*self._waiting, strict=True))
+            self._tied.accumulate_components(self._statistics, rows, leaves, weights)
+            self._waiting.clear()
+        return self._statistics
+
+
+def accumulate_statistics(
+    hmm: JointHmm, utterances: PreparedUtterances, posteriors: Iterator[StatePosteriors] | None = None
+) -> StreamStatistics:
+    """Return the sufficient statistics of utterances (E-step), with their state posteriors (None: the model's)."""
+    triphones = {
+        name: GaussianStatistics.zeros(len(utterances.triphones), 1, len(model.scale.mean))
+        for name, model in hmm.models.items()
+    }
+    mixed = {
+        name: _MixtureAccumulator(model.tied) for name, model in hmm.models.items() if model.tied.mixtures.size[1] > 1
+    }
+    stay, occupied, leaf_of = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay)), utterances.leaves(hmm)
+    log_likelihood, frames = 0.0, 0
+    for posterior in iterate_posteriors(hmm, utterances) if posteriors is None else posteriors:
+        item = utterances.items[posterior.utterance]
+        states = posterior.states.astype(np.float32)
+        states[states < MIN_POSTERIOR] = 0
+        by_triphone = (states @ item.member).T
+        for name, rows in item.streams.items():
+            triphones[name].add(item.distinct, by_triphone @ rows)
+            if name in mixed:
+                mixed[name].add(rows, leaf_of[name][item.triphones], states)
+        np.add.at(stay, item.monophones, posterior.stay)
+        np.add.at(occupied, item.monophones, posterior.states.sum(axis=0))
+        log_likelihood += posterior.log_likelihood
+        frames += item.frames
+    leaves = {
+        name: mixed[name].statistics() if name in mixed else triphones[name].pool(leaf_of[name], model.forest.size)
+        for name, model in hmm.models.items()
+    }
+    return StreamStatistics(triphones, leaves, stay, occupied, log_likelihood, frames)
+
+
+def reestimate_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
+    """Return the models re-estimated from sufficient statistics (the M-step)."""
+    floor = hmm.config.variance_floor
+    models = {
+        name: replace(model, tied=model.tied.reestimate(statistics.leaves[name], floor))
+        for name, model in hmm.models.items()
+    }
+    measured = statistics.stay / np.maximum(statistics.occupied, 1e-9)
+    stay = np.where(statistics.occupied > 1, measured, np.exp(hmm.log_stay))
+    log_stay = np.log(np.clip(stay, MIN_STAY_PROBABILITY, max_stay_probability(hmm.inventory)))
+    return replace(hmm, models=models, log_stay=log_stay)
+
+
+def max_stay_probability(inventory: Inventory) -> NDArray[np.float64]:
+    """Return the largest probability of staying allowed for each state without context [shape=(R,)]."""
+    longest = [
+        LONGEST_SILENCE_FRAMES if unit in inventory.free else LONGEST_STATE_FRAMES for unit, _ in inventory.monophones
+    ]
+    return 1 - 1 / np.array(longest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +312,8 @@ def grow_joint(
 def _start(
     utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig
 ) -> tuple[JointHmm, PreparedUtterances]:
-    """Return models without context, estimated from states of equal length inside known bounds, and the utterances.
-
-    Raises as ``grow_joint``.
+    """Return models without context, from states of equal length inside known bounds, and the utterances. Raises as
+    ``grow_joint``.
     """
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
@@ -143,7 +344,6 @@ def _start(
 def _make_equal_models(
     utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig, streams: Sequence[str]
 ) -> JointHmm:
-    """Return models in which all units have equal densities."""
     occurring = {unit for utterance in utterances for unit in utterance.units} | {inventory.silence}
     spoken = tuple(unit for unit in inventory.names if unit in occurring)
     models = {}
@@ -161,10 +361,7 @@ def _make_equal_models(
 
 
 def _spread_states(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
-    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long.
-
-    positions : [shape=(S,)], the unit that each state belongs to
-    """
+    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long."""
     if bounds is None:
         return np.arange(frames) * len(positions) // frames
     path = np.empty(frames, np.intp)
@@ -186,7 +383,6 @@ def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
 
 
 def _run_em(hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int, monitor: Monitor) -> JointHmm:
-    """Return the models after some steps of embedded Baum–Welch."""
 
     def report(step: int, _: JointHmm, statistics: StreamStatistics) -> None:
         monitor(Progress(stage, step, steps, step / steps, statistics.mean_log_likelihood))
@@ -217,9 +413,8 @@ def _tie_states(
 def _split(
     hmm: JointHmm, prepared: PreparedUtterances, held_out: PreparedUtterances, name: str, monitor: Monitor
 ) -> JointHmm | None:
-    """Return the models with the Gaussians of a stream split, and trained.
-
-    None: none has enough data to be split, or the likelihood of the held-out utterances does not rise.
+    """Return the models with a stream's Gaussians split, and trained; None: too little data, or no gain on held-out
+    speech.
     """
     model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared).leaves[name]
     if not model.tied.can_split(statistics):

@@ -33,19 +33,13 @@ studio -9 to -7."""
 SIMILARITY_FRAMES = 400
 """Frames, spread evenly over a recording, from which the speaker similarity score is computed."""
 _CHECKPOINT = "joint"
-"""Name of the stage in a checkpoint."""
 JOINT_PREFIX = "joint_"
-"""Prefix of the names of the arrays of the recogniser."""
 SCORE = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 
 
 @dataclass(frozen=True, eq=False)
 class OwnPhoneRecogniser:
-    """The joint model as a recogniser of phones.
-
-    hmm            : the joint model; recognition uses its streams of speech and F0
-    training_score : mean speaker similarity score of its training data
-    """
+    """The joint model as a recogniser of phones, and the mean speaker similarity score of its training data."""
 
     hmm: JointHmm
     training_score: float
@@ -73,7 +67,6 @@ def fit_phone_recogniser(
 ) -> OwnPhoneRecogniser | None:
     """Return a recogniser of phones that is trained on sound and motion, or None if there is too little speech.
 
-    values : motion of each example in the motion space [each shape=(T, Q)]
     Source: Hofer 2008, §4 to §6: all streams are trained together; those of speech and F0 are used in recognition.
     """
     spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))
@@ -102,9 +95,8 @@ def recogniser_to_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[An
 
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
-    """Deserialise a recogniser; None if the arrays contain none.
-
-    Raises ModelFormatError, KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """Deserialise a recogniser; None: the arrays have none. Raises ModelFormatError, KeyError, ValueError: a wrong
+    array.
     """
     own = arrays_under(arrays, JOINT_PREFIX)
     if not own:

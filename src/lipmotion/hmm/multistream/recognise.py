@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import UnitLoop, decode_units
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, expand_triphones
-from lipmotion.hmm.network import NetworkBuilder
+from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder
 from lipmotion.kernels.paths import sample_paths
 
 Grid = NDArray[np.intp]
@@ -27,7 +26,6 @@ Grid = NDArray[np.intp]
 class ContextLoop:
     """The network in which every unit that was spoken in training may follow every other, in context.
 
-    network    : its densities are the columns of ``leaves``
     leaves     : by acoustic stream, the leaves of each distinct density [shape=(C,)]
     monophones : [shape=(nodes,)], the number of each node's state without context
     """
@@ -62,11 +60,7 @@ class _StateNodes:
 
 
 def build_context_loop(hmm: JointHmm) -> ContextLoop:
-    """Return the loop of a model's units with the back-off bigram.
-
-    A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
-    Source: Hofer 2008, Eq. 5.
-    """
+    """Return the loop of a model's units with the back-off bigram (Hofer 2008, Eq. 5), as if silence were around it."""
     inventory = hmm.inventory
     units = [unit for unit in hmm.spoken if unit not in inventory.free[1:]]
     leaves, densities = _number_densities(hmm, units)
@@ -119,10 +113,7 @@ def _language_score(hmm: JointHmm, unit: str, following: str) -> float:
 
 
 def _number_densities(hmm: JointHmm, units: Sequence[str]) -> tuple[dict[str, NDArray[np.intp]], dict[str, Grid]]:
-    """Return the leaves of distinct densities by stream, and by unit the density of each state beside N² neighbours.
-
-    The grids have the shape (states, N, N): the left neighbour, then the right one.
-    """
+    """Return the leaves of distinct densities by stream, and by unit the density of each state beside N² neighbours."""
     acoustic = [name for name in ACOUSTIC_STREAMS if name in hmm.models]
     counts = [hmm.inventory.count(unit) for unit in units]
     grids = np.stack(
@@ -153,8 +144,6 @@ def _advance(builder: NetworkBuilder, source: _StateNodes, target: _StateNodes, 
 class JointRecogniser:
     """Recogniser that searches the loop of all units that occurred in training, in context, with the back-off bigram.
 
-    hmm     : the models
-    weights : of the streams; None: those of recognition
     The search is exact, whether trees of acoustic streams ask about one neighbour or both. Where units have one state,
     a unit spoken twice in a row is recognised once.
     Raises InputError: the weight of motion is not 0.
@@ -169,18 +158,15 @@ class JointRecogniser:
             raise InputError("recognition uses no motion: give the stream motion the weight 0")
 
     def recognise(self, observed: StreamObservations, beam: float | None = None) -> list[RecognisedUnit]:
-        """Return the most probable sequence of units, in order.
-
-        beam : as in ``hmm.decode.decode_units``; None: exact
-        Raises InputError: no active stream was observed. Raises AlignmentError: too few frames.
+        """Return the most probable units, in order. Raises InputError: no active stream. Raises AlignmentError: too few
+        frames.
         """
         units, starts = decode_units(self._loop.network, self._log_likelihoods(observed), beam)
         return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
     def draw_paths(self, observed: StreamObservations, count: int, seed: int) -> list[StatePath]:
-        """Return ``count`` paths of states, drawn independently from the posterior of all paths.
-
-        Memory grows with the frames: 20 kB each, in GRID. Raises as ``recognise``.
+        """Return ``count`` paths of states, drawn from their posterior. Memory: 20 kB a frame in GRID. Raises as
+        ``recognise``.
         """
         if count < 1:
             raise InputError(f"{count} paths, required one or more")

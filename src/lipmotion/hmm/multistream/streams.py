@@ -16,15 +16,11 @@ SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
 STREAMS = (SPEECH, *F0_STREAMS, MOTION)
 ACOUSTIC_STREAMS = (SPEECH, *F0_STREAMS)
-"""The streams that are computed from sound."""
 
 
 @dataclass(frozen=True)
 class StreamWeights:
-    """Factors of the streams' log densities; 0 switches a stream off.
-
-    Raises InputError: a weight is negative or not finite.
-    """
+    """Factors of the streams' log densities; 0: off. Raises InputError: a weight is negative or not finite."""
 
     speech: float = 1.0
     f0: float = 1.0
@@ -47,12 +43,8 @@ class StreamWeights:
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
-    """One kind of data of an utterance.
-
-    values : [shape=(T, D)], any finite number where they are not known
-    known  : [shape=(T,)], whether a frame has a value; for F0, whether it is voiced
-    """
+class ObservedStream:
+    """One kind of data of an utterance [shape=(T, D)], and which frames have a value, or are voiced [shape=(T,)]."""
 
     values: NDArray[np.floating[Any]]
     known: NDArray[np.bool_]
@@ -65,7 +57,7 @@ class StreamObservations:
     Raises InputError: no speech, an unknown stream, streams of different lengths, or known values that are not finite.
     """
 
-    streams: Mapping[str, Stream]
+    streams: Mapping[str, ObservedStream]
 
     def __post_init__(self) -> None:
         if SPEECH not in self.streams or not set(self.streams) <= set(STREAMS):
@@ -104,7 +96,7 @@ def stream_observations(
     that of the frames, or a measured value that is not finite.
     """
     speech = np.asarray(speech)
-    streams = {SPEECH: Stream(speech, np.ones(len(speech), bool))}
+    streams = {SPEECH: ObservedStream(speech, np.ones(len(speech), bool))}
     if log_f0 is not None:
         pitch: NDArray[np.float64] = np.asarray(log_f0, np.float64)
         if pitch.ndim != 1 or np.isinf(pitch).any():
@@ -115,7 +107,7 @@ def stream_observations(
         dynamics = with_dynamics(np.where(voiced, pitch, 0.0)[:, None])
         masks = (voiced, *[mark_known_dynamics(voiced)] * 2)
         for window, (name, mask) in enumerate(zip(F0_STREAMS, masks, strict=True)):
-            streams[name] = Stream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
+            streams[name] = ObservedStream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
     if motion is not None:
         values: NDArray[np.float64] = np.asarray(motion, np.float64)
         seen = np.ones(len(values), bool) if measured is None else np.asarray(measured)
@@ -127,5 +119,5 @@ def stream_observations(
             )
         known = mark_known_dynamics(np.asarray(seen, bool))
         dynamics = with_dynamics(np.where(seen[:, None], values, 0.0)).reshape(len(values), -1)
-        streams[MOTION] = Stream(np.where(known[:, None], dynamics, 0.0), known)
+        streams[MOTION] = ObservedStream(np.where(known[:, None], dynamics, 0.0), known)
     return StreamObservations(streams)

@@ -23,7 +23,6 @@ TriphoneState = tuple[Context, int]
 class Inventory:
     """All units that a model can have, whether or not they occurred in training.
 
-    names  : of the units
     free   : the silent ones, whose sound depends on no neighbour; as neighbours, all are represented by the first
     states : number of states of a unit, left to right without skips; silent units but the first have one
     Raises InputError: no silent unit, one that is no unit, a unit named twice or with a space, or no state.
@@ -72,9 +71,8 @@ class Inventory:
         return 0 if unit in self.free else (middle > 0) - (middle < 0)
 
     def contexts(self, units: Sequence[str]) -> list[Context]:
-        """Return the context of every unit of a sequence: (left, unit, right); beyond the ends lies silence.
-
-        Raises InputError: a unit that is not in the inventory.
+        """Return the (left, unit, right) of every unit of a sequence, silence beyond its ends. Raises InputError: an
+        unknown unit.
         """
         unknown = sorted(set(units) - set(self.names))
         if unknown:
@@ -87,7 +85,6 @@ class Inventory:
 class TriphoneStates:
     """The states of a sequence of units, one after another.
 
-    triphones  : every state in its context
     positions  : [shape=(S,)], the unit of the sequence that it belongs to
     monophones : [shape=(S,)], the number of the state without context, which has its duration
     """
@@ -149,9 +146,8 @@ def units_to_frames(
 def frames_to_units(
     recognised: Sequence[RecognisedUnit], duration_s: float, label_of: Callable[[str], Unit] = Unit
 ) -> Timeline[Unit]:
-    """Return recognised units in time: frame n covers (n ± ½) · 10 ms; together they last from 0 s to ``duration_s``.
-
-    label_of : gives the label of a unit's name; by default the name is the phone
+    """Return recognised units in time, from 0 s to ``duration_s``: frame n covers (n ± ½) · 10 ms; labels by
+    ``label_of``.
     """
     edges = np.clip((np.array([unit.first for unit in recognised]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
     spans = zip(edges, [*edges[1:], duration_s], recognised, strict=True)

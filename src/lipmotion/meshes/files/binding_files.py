@@ -55,11 +55,7 @@ def save_binding(path: Path, binding: ControlBinding, mesh: Mesh) -> None:
 
 
 def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
-    """Return the binding of a file, for the mesh that it was made for.
-
-    Raises InputError: no such file, or it was made for a mesh of another number of vertices. Raises
-    ModelFormatError: it is no binding, damaged, or of another version.
-    """
+    """Return the binding of a file. Raises InputError: no file, or another mesh. Raises ModelFormatError: damaged."""
     check_source(path, "binding")
     try:
         header = read_archive_header(path)

@@ -43,10 +43,7 @@ _VERTEX = re.compile(rb"(?:\A|[\r\n])v[ \t]([^\r\n]*)")
 
 @dataclass
 class _Surface:
-    """What the lines of a file have given so far: three numbers a vertex, two a corner of a texture, and triangles.
-
-    corners, mapped : of each triangle, its vertices and its corners of textures (-1: none);  parts : its part
-    """
+    """What the lines of a file have given so far: vertices, corners of textures, triangles and their parts."""
 
     budget: Budget
     vertices: array[float] = field(default_factory=lambda: array("d"))
@@ -136,7 +133,6 @@ def read_obj(path: Path) -> Mesh:
 def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True) -> Mesh:
     """Return the neutral mesh of a folder of OBJ files, with the other files as blendshapes, named by their files.
 
-    wanted : whether a blendshape of a name is read; the others are left out
     Raises InputError: no neutral mesh or several ones, a file with another number of vertices, or as ``read_obj``.
     """
     files = sorted(path for path in folder.glob("*.[oO][bB][jJ]") if not path.name.startswith("."))

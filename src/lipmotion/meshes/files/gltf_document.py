@@ -1,4 +1,4 @@
-"""A glTF 2.0 document (``.glb``, ``.gltf``, ``.vrm``): its JSON and buffers, the arrays in them, and its nodes."""
+"""A glTF 2.0 document (``.glb``, ``.gltf``, ``.vrm``): its schema, JSON, buffers, the arrays in them, its nodes."""
 
 from __future__ import annotations
 
@@ -15,13 +15,161 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.files.gltf_schema import ASSET, COMPONENTS, COMPRESSION, LARGEST_NUMBER, WIDTHS, gltf_schema
 from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
-from lipmotion.meshes.model.bones import bone_kind
-from lipmotion.meshes.model.file_limits import Budget
+from lipmotion.meshes.model.file_limits import ALLOWANCE, Budget
+from lipmotion.meshes.model.mesh import bone_kind
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.types.values import SchemaError
+from lipmotion.types.values import (
+    Schema,
+    SchemaError,
+    any_members,
+    if_fits,
+    items,
+    members,
+    number,
+    one_of,
+    text,
+    truth,
+    whole,
+)
+
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+LARGEST_NUMBER = 1e9
+"""Largest plausible number of a file: a place, a factor."""
+MOST_GROUPS = 8
+"""Most groups of four joints a vertex."""
+_LISTS = (
+    *("accessors", "animations", "buffers", "bufferViews", "images", "materials", "meshes", "nodes", "scenes", "skins"),
+    "textures",
+)
+_LARGEST_INTEGER = 1 << 53
+_NAME = if_fits(text(1000))
+_WORD = text(1000)
+_SIZE = whole(0, _LARGEST_INTEGER)
+_NUMBER = number(-LARGEST_NUMBER, LARGEST_NUMBER)
+ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])
+"""What a document of any version has."""
+
+
+_ANY_NUMBER = whole(-_LARGEST_INTEGER, _LARGEST_INTEGER)
+_OLD_BIND = {"mesh": _ANY_NUMBER, "index": _ANY_NUMBER, "weight": _NUMBER}
+_OLD_BINDS = items(if_fits(members(_OLD_BIND, list(_OLD_BIND))))
+_NEW_BIND = {"node": _ANY_NUMBER, "index": _ANY_NUMBER, "weight": _NUMBER}
+_NEW_BINDS = any_members(members({"morphTargetBinds": items(if_fits(members(_NEW_BIND, list(_NEW_BIND))))}))
+_GROUP = members({"name": _NAME, "presetName": _NAME, "binds": _OLD_BINDS})
+_MOVED = any_members(if_fits(members({"node": whole(0, _LARGEST_INTEGER)}, ["node"])))
+_VRM = {
+    "VRMC_vrm_animation": if_fits(members({"expressions": members({"preset": _MOVED, "custom": _MOVED})})),
+    "VRM": members({"blendShapeMaster": members({"blendShapeGroups": items(_GROUP)})}),
+    "VRMC_vrm": members({"expressions": members({"preset": _NEW_BINDS, "custom": _NEW_BINDS})}),
+}
+"""What is used of VRM 0.x and of VRM 1.0."""
+
+
+def gltf_schema(json: Mapping[str, Any]) -> Schema:
+    """Return the schema of one document: its references must be to items that it has."""
+    counts = {name: len(listed) for name in _LISTS if isinstance(listed := json.get(name), list)}
+
+    def to(name: str) -> Schema:
+        count = counts.get(name, 0)
+        exists = whole(0, count - 1)
+
+        def check(value: Any) -> int:
+            try:
+                return int(exists(value))
+            except SchemaError as error:
+                raise SchemaError(error.found, f"the number of one of its {count} {name}") from None
+
+        return check
+
+    def vector(size: int) -> Schema:
+        return items(_NUMBER, size, size)
+
+    target = members({"POSITION": to("accessors")})
+    groups = [f"{kind}_{group}" for kind in ("JOINTS", "WEIGHTS") for group in range(MOST_GROUPS)]
+    primitive = {
+        "attributes": members({name: to("accessors") for name in ("POSITION", "TEXCOORD_0", "COLOR_0", *groups)}),
+        "indices": to("accessors"),
+        "material": to("materials"),
+        "mode": whole(0, 6),
+        "targets": items(target, most=ALLOWANCE["blendshapes"]),
+        "extras": if_fits(members({"targetNames": items(_WORD)})),
+    }
+    mesh = {"name": _NAME, "primitives": items(members(primitive, ["attributes"])), "extras": primitive["extras"]}
+    node = {
+        **{"name": _NAME, "mesh": to("meshes"), "skin": to("skins"), "children": items(to("nodes"))},
+        **{"matrix": vector(16), "translation": vector(3), "rotation": vector(4), "scale": vector(3)},
+    }
+    place = {"bufferView": to("bufferViews"), "byteOffset": _SIZE}
+    indices = {**place, "componentType": one_of([5121, 5123, 5125])}
+    sparse = {
+        "count": _SIZE,
+        "indices": members(indices, ["bufferView", "componentType"]),
+        "values": members(place, ["bufferView"]),
+    }
+    accessor = {
+        **{**place, "componentType": one_of(COMPONENTS), "count": _SIZE, "type": one_of(WIDTHS), "normalized": truth},
+        **{"name": _NAME, "sparse": members(sparse, list(sparse))},
+    }
+    webp = members({"source": to("images")}, ["source"])
+    lists = {
+        "accessors": members(accessor, ["componentType", "count", "type"]),
+        "animations": if_fits(members(_animation(to("nodes"), to("accessors")))),
+        "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
+        "bufferViews": members(_view(to("buffers")), ["buffer", "byteLength"]),
+        "images": members({"uri": text(_LARGEST_INTEGER), "bufferView": to("bufferViews")}),
+        "materials": members(_material(to("textures"), vector)),
+        "meshes": members(mesh, ["primitives"]),
+        "nodes": members(node),
+        "scenes": members({"nodes": items(to("nodes"))}),
+        "skins": members({"joints": items(to("nodes"), 1), "inverseBindMatrices": to("accessors")}, ["joints"]),
+        "textures": members({"source": to("images"), "extensions": members({"EXT_texture_webp": webp})}),
+    }
+    table = {name: items(each, most=ALLOWANCE["nodes"] if name == "nodes" else None) for name, each in lists.items()}
+    others = {"scene": to("scenes"), "extensionsRequired": items(_WORD), "extensions": members(_VRM)}
+    return members(table | others)
+
+
+def _animation(node: Schema, accessor: Schema) -> dict[str, Schema]:
+    """Return what is used of an animation; channels of other kinds are left out."""
+    pointer = members({"KHR_animation_pointer": members({"pointer": _WORD})})
+    target = members({"node": node, "path": _WORD, "extensions": if_fits(pointer)})
+    channel = members({"sampler": _SIZE, "target": target}, ["sampler", "target"])
+    return {
+        "name": _NAME,
+        "channels": items(if_fits(channel)),
+        "samplers": items(members({"input": accessor, "output": accessor, "interpolation": _WORD})),
+    }
+
+
+def _view(buffer: Schema) -> dict[str, Schema]:
+    place = {"buffer": buffer, "byteOffset": _SIZE, "byteLength": _SIZE}
+    packed = {
+        **{**place, "byteStride": whole(1, 256), "count": _SIZE, "filter": _WORD},
+        "mode": one_of(["ATTRIBUTES", "TRIANGLES", "INDICES"]),
+    }
+    needed = ["buffer", "byteLength", "byteStride", "count", "mode"]
+    return {
+        **{**place, "byteStride": whole(0, 1 << 16)},
+        "extensions": members(dict.fromkeys(COMPRESSION, members(packed, needed))),
+    }
+
+
+def _material(texture: Schema, vector: Any) -> dict[str, Schema]:
+    moved = members({"offset": vector(2), "scale": vector(2), "rotation": _NUMBER})
+    placed = {"index": texture, "extensions": members({"KHR_texture_transform": moved})}
+    look = {
+        **{"baseColorFactor": vector(4), "roughnessFactor": _NUMBER},
+        "baseColorTexture": members(placed, ["index"]),
+    }
+    return {
+        **{"name": _NAME, "pbrMetallicRoughness": members(look), "doubleSided": truth},
+        **{"alphaMode": one_of(["OPAQUE", "MASK", "BLEND"]), "alphaCutoff": _NUMBER},
+    }
+
 
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -41,9 +189,7 @@ extensions are accepted as well."""
 class GltfDocument:
     """The JSON of a glTF file, and its buffers.
 
-    json    : the document as it was written
     parts   : what is used of it, of the types and in the ranges of ``gltf_schema``
-    folder  : where the files are that the document names
     budget  : what has been read so far
     buffers : by number; a buffer that only the extension for compression could use is missing
     """
@@ -59,10 +205,8 @@ class GltfDocument:
         return self.parts.get(name, [])
 
     def linked(self, uri: str, kind: str) -> bytes:
-        """Return what an address in the document stands for: bytes inside of it, or a file in the same folder.
-
-        kind : what it should be, for messages
-        Raises InputError: no such file, a file elsewhere, too large, or damaged.
+        """Return the bytes of an address, or of a file in the same folder. Raises InputError: no such file, elsewhere,
+        damaged.
         """
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
@@ -109,16 +253,15 @@ def read_gltf_document(path: Path) -> GltfDocument:
             raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
         if name not in READABLE and not name.startswith("KHR_materials_"):
             raise InputError(f"it requires the extension {shorten(name)!r}, which is not read; export without it")
-    for number, buffer in enumerate(document.items("buffers")):
+    for index, buffer in enumerate(document.items("buffers")):
         if "uri" in buffer:
-            document.buffers[number] = memoryview(document.linked(buffer["uri"], "buffer"))
-        elif number == 0 and binary is not None:
-            document.buffers[number] = binary
+            document.buffers[index] = memoryview(document.linked(buffer["uri"], "buffer"))
+        elif index == 0 and binary is not None:
+            document.buffers[index] = binary
     return document
 
 
 def _split_chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
-    """Return the document and the bytes of a GLB."""
     if len(content) < 20:
         raise InputError(f"{len(content)} bytes, required a whole .glb; copy it again")
     _, version, length = struct.unpack_from("<4sII", content)
@@ -273,20 +416,15 @@ DEEPEST_NESTING = 256
 
 @dataclass(frozen=True, eq=False)
 class PlacedNode:
-    """A node of a scene.
-
-    matrix : from its own frame to that of the scene [shape=(4, 4)]
-    kinds  : the node of each kind of bone that it is or hangs on; of several, the one nearest to the root
-    """
+    """A node of a scene, and the nearest node to the root of each kind of bone that it is or hangs on."""
 
     matrix: Matrix
     kinds: Mapping[str, int]
 
 
 def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
-    """Return the nodes of the scene by their numbers; without scenes, all that hang on a node that hangs on none.
-
-    Raises InputError: a node is in the scene twice, too deep, or too far away.
+    """Return the nodes of the scene, or all roots', by number. Raises InputError: one is there twice, too deep, too far
+    away.
     """
     nodes, scenes = document.items("nodes"), document.items("scenes")
     if scenes:

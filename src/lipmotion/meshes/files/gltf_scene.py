@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.files.gltf_document import (
+    COMPONENTS,
+    LARGEST_NUMBER,
+    MOST_GROUPS,
+    WIDTHS,
     GltfArrays,
     GltfDocument,
     PlacedNode,
@@ -23,9 +27,7 @@ from lipmotion.meshes.files.gltf_document import (
     plain_name,
     read_gltf_document,
 )
-from lipmotion.meshes.files.gltf_schema import COMPONENTS, LARGEST_NUMBER, MOST_GROUPS, WIDTHS
-from lipmotion.meshes.model.bones import Bone, merge_bones
-from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Material, Mesh, MeshPart, PartNames
+from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Bone, Material, Mesh, MeshPart, PartNames, merge_bones
 from lipmotion.meshes.model.textures import Texture, decode_srgb, encode_srgb, read_texture
 
 Array = NDArray[np.float64]
@@ -58,11 +60,7 @@ class _Materials:
         self._materials: dict[int, Material] = {}
 
     def material(self, number: int | None) -> Material:
-        """Return a material: its base colour as sRGB, its texture, its gloss from its roughness.
-
-        number : of the document; None: the default material
-        A texture that cannot be read gives a warning and the colour ``UNKNOWN``.
-        """
+        """Return a material (None: the default one): base colour, texture (unreadable: ``UNKNOWN``), gloss."""
         if number is None:
             return Material()
         if number not in self._materials:
@@ -87,10 +85,7 @@ class _Materials:
         return self._materials[number]
 
     def move_uv(self, number: int | None, uv: Array) -> Array:
-        """Return places in a material's texture as its extension ``KHR_texture_transform`` moves them.
-
-        uv : v downwards [shape=(N, 2)]
-        """
+        """Return places in a material's texture, v down [shape=(N, 2)], as ``KHR_texture_transform`` moves them."""
         look = {} if number is None else self._document.items("materials")[number].get("pbrMetallicRoughness", {})
         how = look.get("baseColorTexture", {}).get("extensions", {}).get("KHR_texture_transform")
         if not how:
@@ -177,10 +172,7 @@ class _Skin:
     def find_head_bones(
         self, joints: Rows, weights: Array, nodes: Mapping[int, PlacedNode], first: int
     ) -> Iterator[Bone]:
-        """Yield the bones of the head that vertices follow, or whose parts they follow.
-
-        joints, weights : as of ``weigh``;  first : number of the first vertex in the whole mesh
-        """
+        """Yield the bones of the head that vertices follow, or whose parts they follow; arguments as of ``weigh``."""
         total = np.maximum(weights.sum(axis=1), MIN_WEIGHT)
         for kind in sorted({kind for joint in self.joints for kind in joint.kinds}):
             member = np.array([kind in joint.kinds for joint in self.joints])
@@ -386,10 +378,7 @@ def _map_vectors(linear: Array, vectors: Array) -> Array:
 
 
 def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
-    """Return the names of the morph targets of a primitive: those of the mesh, or else of its arrays.
-
-    Targets without a name, or with that of another before, are numbered.
-    """
+    """Return the names of the targets of a primitive, of its mesh or arrays; missing and repeated ones are numbered."""
     targets = primitive.get("targets", [])
     accessors = document.items("accessors")
     arrays = [accessors[target["POSITION"]].get("name", "") if "POSITION" in target else "" for target in targets]

@@ -21,7 +21,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.gltf_document import GltfArrays, GltfDocument, place_nodes, plain_name, read_gltf_document
 from lipmotion.meshes.files.gltf_scene import name_mesh_targets
 from lipmotion.meshes.files.steady_rate import choose_columns, exact_rate
-from lipmotion.meshes.model.bones import ANGLES, HEAD, NECK, bone_kind, head_angles
+from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, bone_kind, head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.moods import MOODS
@@ -56,13 +56,7 @@ TURNING = (NECK, HEAD)
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """Curves of one channel of an animation.
-
-    names  : of the S curves
-    time_s : of the K keys
-    keys   : values, with the tangents before and after where they are splines [shape=(K, S) or (K, 3, S)]
-    kind   : the interpolation
-    """
+    """Curves of one channel of an animation: K times, and keys [shape=(K, S); of splines (K, 3, S)]."""
 
     names: tuple[str, ...]
     time_s: Array
@@ -70,9 +64,8 @@ class _Track:
     kind: str
 
     def at(self, time_s: Array) -> Array:
-        """Return the values at the times of frames [shape=(len(time_s), S)]; constant beyond both ends.
-
-        A frame that is a key but for its rounding has the key's value: a step would else come a frame late.
+        """Return values at frames' times [shape=(len(time_s), S)]; a frame that is a key but for rounding has its
+        value.
         """
         rounding = ROUNDING_FRAMES * time_s[1] if len(time_s) > 1 else 0.0
         before = np.clip(np.searchsorted(self.time_s, time_s + rounding, "right") - 1, 0, len(self.time_s) - 1)
@@ -128,11 +121,6 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         if target == "rotation" and kind in TURNING and kind not in turns:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
-    return _merge_tracks(document, tracks, ordered), Timeline(())
-
-
-def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
-    """Return all curves of some tracks at one rate."""
     longest = max(tracks, key=lambda track: len(track.time_s))
     end_s = max(float(track.time_s[-1]) for track in tracks)
     hertz = _rate(longest.time_s)
@@ -148,11 +136,11 @@ def _merge_tracks(document: GltfDocument, tracks: list[_Track], turns: Mapping[i
     columns = choose_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
     curves = dict(every[column] for column in columns)
     channels = [Channel(name, WEIGHT) for name in curves]
-    if turns:
-        angles = np.unwrap(head_angles(_turn_head(document, turns, time_s)), axis=0)
+    if ordered:
+        angles = np.unwrap(head_angles(_turn_head(document, ordered, time_s)), axis=0)
         curves |= dict(zip(ANGLES, angles.T, strict=True))
         channels += [Channel(name, RADIAN) for name in ANGLES]
-    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels))
+    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels)), Timeline(())
 
 
 def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:

@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_document import read_gltf_document, write_container
 from lipmotion.meshes.files.gltf_scene import name_mesh_targets
-from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Blendshape, MeshPart
-from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, compute_shading_normals
+from lipmotion.meshes.model.scene import (
+    EVERY_KEY,
+    HeadTurn,
+    Scene,
+    ShadingNormals,
+    Thinning,
+    compute_shading_normals,
+    place_keys,
+)
 from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion.storage.files import as_text
 from lipmotion.types import Motion
@@ -210,7 +217,6 @@ def _add_primitive(
 
 
 def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) -> None:
-    """Add the joints of body and head, as the last two nodes, and let all meshes follow them."""
     nodes, pivot = document["nodes"], turn.pivot.astype("<f4").astype(np.float64)
     first = len(nodes)
     for node in nodes:
@@ -227,7 +233,6 @@ def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) ->
 
 
 def _add_animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
-    """Return the animation of the weights of node 0, and of the rotation of the node of the head."""
     time_s, table = scene.keys()
     frames_s = scene.weights.time_s if scene.weights else np.zeros(0)
     times = buffer.add(time_s, "SCALAR", limits=True)

@@ -24,11 +24,7 @@ _DAMAGED = "its compressed data is damaged; export it again, without compression
 
 
 def decode_attributes(data: bytes, count: int, stride: int) -> Bytes:
-    """Return the elements of a stream of vertex attributes [shape=(count, stride)].
-
-    stride : bytes of an element, a multiple of 4 up to 256
-    Raises InputError: another version, or data that is too short.
-    """
+    """Return a stream of vertex attributes [shape=(count, stride)]. Raises InputError: wrong version or length."""
     if not 0 < stride <= LARGEST_BLOCK or stride % 4:
         raise InputError(f"compressed elements of {stride} bytes, required a multiple of 4 up to 256")
     _check_header(data, ATTRIBUTES, (0,))
@@ -93,10 +89,7 @@ def decode_exponents(elements: Bytes) -> NDArray[np.float32]:
 
 
 def decode_indices(data: bytes, count: int) -> NDArray[np.uint32]:
-    """Return the numbers of a stream of indices without triangles [shape=(count,)].
-
-    Raises InputError: another version, or data that is too short.
-    """
+    """Return the vertices of a stream of indices [shape=(count,)]. Raises InputError: another version, or too short."""
     _check_header(data, INDICES, (0, 1))
     reader = _Reader(data, 1, len(data) - INDEX_TAIL)
     last = [0, 0]
@@ -110,8 +103,6 @@ def decode_indices(data: bytes, count: int) -> NDArray[np.uint32]:
 
 
 class _Reader:
-    """Reads bytes in order, up to an end."""
-
     def __init__(self, data: bytes, position: int, end: int) -> None:
         self.data, self.position, self.end, self.last = data, position, end, 0
 
@@ -206,10 +197,7 @@ class _Triangles:
 
 
 def decode_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
-    """Return the vertices of a stream of triangles [shape=(count,)]; ``count`` is three times their number.
-
-    Raises InputError: another version, or data that is too short.
-    """
+    """Return the vertices of a stream of triangles [shape=(count,)]. Raises InputError: another version, or short."""
     _check_header(data, TRIANGLES, (0, 1))
     cached_codes = 13 if data[0] & 15 else 15
     end = len(data) - TRIANGLE_TAIL

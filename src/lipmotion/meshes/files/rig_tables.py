@@ -36,10 +36,7 @@ CLOSED_VISEME = "viseme_PP"
 
 @dataclass(frozen=True)
 class RigRow:
-    """One row of the table: a control follows ``offset + gain · source``; rows of one control are added up.
-
-    low, high : limits of the control; of several rows, those of the first count
-    """
+    """A control that follows ``offset + gain · source``; rows of one control add up, with the limits of the first."""
 
     control: str
     source: str
@@ -113,10 +110,8 @@ def suggest_names(name: str, names: Iterable[str]) -> str:
 
 
 def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
-    """Return the controls of a rig over time, in the order of the table.
-
-    sources : curves by name, blendshapes of ARKit, visemes, channels of motion [each shape=(T,)]
-    Raises InputError: a row asks for a source that is not among them.
+    """Return a rig's controls over time, in order, of curves by name [each shape=(T,)]. Raises InputError: one is
+    missing.
     """
     curves: dict[str, NDArray[np.float64]] = {}
     limits: dict[str, tuple[float, float]] = {}
@@ -149,9 +144,8 @@ def table_path(character: Path) -> Path:
 
 
 def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
-    """Return the rows of the table beside a character by its blendshapes; without limits: 0 to 1. None: no table.
-
-    Raises InputError: a damaged table, no such blendshape or curve, or a blendshape that occurs twice.
+    """Return the rows of the table beside a character by its blendshapes, None without one. Raises InputError: a
+    damaged table.
     """
     path = table_path(character)
     if not is_file(path):

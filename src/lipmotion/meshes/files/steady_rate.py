@@ -52,20 +52,15 @@ LONGEST_STEP_S = 2.0
 
 
 def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
-    """Return a rate of television, N · 1000 / 1001 (29.97), that a rounded rate stands for, else the same rate.
-
-    off_hz : by how much rounding may have changed it
+    """Return the rate of television, N · 1000 / 1001 (29.97), that a rate rounded by ``off_hz`` stands for, or the
+    rate.
     """
     television = float(np.rint(hertz * 1.001)) * 1000 / 1001
     return television if television and abs(television - hertz) <= off_hz else hertz
 
 
 def match_sound_rate(rate_hz: float, frames: int, duration_s: float) -> float:
-    """Return the rate of motion that lasts as long as its sound but for 1001 / 1000, else the same rate.
-
-    duration_s : of the sound
-    Timecodes of television count whole numbers of frames a second (30), which pass in 1.001 s (at 29.97).
-    """
+    """Return the rate of motion as long as its sound but for 1001 / 1000 (timecodes of television), else the same."""
     near = any(abs(rate_hz / each - 1) < 1.5 * (TELEVISION_RATIO - 1) for each in (24, 30, 48, 60, 120))
     for ratio in (TELEVISION_RATIO, 1 / TELEVISION_RATIO):
         off = abs(duration_s * rate_hz / ratio - frames)
@@ -122,9 +117,8 @@ def tabulate_frames(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], A
 
 
 def times_to_seconds(times: Array, key: str) -> Array:
-    """Return times in seconds; their size shows the unit where the name of their column (``column_key``) does not.
-
-    Raises InputError: one is no number.
+    """Return times in seconds, told by the name of their column (``column_key``) or their size. Raises InputError: no
+    number.
     """
     if not np.isfinite(times).all():
         raise InputError(f"the time of row {int(np.argmin(np.isfinite(times))) + 1} is no number, required one in each")

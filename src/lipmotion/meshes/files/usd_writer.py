@@ -240,7 +240,6 @@ def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
 
 
 def _list_looks(mesh: Mesh) -> Iterator[str]:
-    """Yield the materials: of one colour each, or of the colours of the vertices."""
     for name, part in _parts(mesh):
         place, painted = f"{LOOKS}/{name}", mesh.colours is not None
         colour = f" = {_tuple(decode_srgb(part.material.colour))}"
@@ -271,7 +270,6 @@ def _codes_per_key(scene: Scene) -> float:
 
 
 def _last_code(scene: Scene) -> float:
-    """Return the time code of the last key."""
     return max(len(scene.weights.values) - 1, 0) * _codes_per_key(scene) if scene.weights else 0.0
 
 

@@ -19,6 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_character_table, table_path, with_sources
+from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.meshes.fitting.lip_placement import (
     LipPlacement,
     find_opening_shape,
@@ -26,12 +27,10 @@ from lipmotion.meshes.fitting.lip_placement import (
     place_lips_by_points,
     place_lips_by_shape,
 )
-from lipmotion.meshes.fitting.point_motion import move_points
 from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights, with_gap
 from lipmotion.meshes.model.binding import ControlBinding, bind, paint_weights
-from lipmotion.meshes.model.bones import JAW
 from lipmotion.meshes.model.face_shapes import FaceShapes, find_face_shapes, measure_lip_parting, numbers_by_name
-from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.mesh import JAW, Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
@@ -108,11 +107,7 @@ def plain_row(control: str, source: str) -> RigRow:
 
 
 def list_rows(mesh: Mesh, shapes: FaceShapes | None, others: Mapping[str, str]) -> Iterator[RigRow]:
-    """Yield the rows of a table that change nothing: every blendshape of a mesh, with the curve that moves it.
-
-    shapes : of its mouth;  others : the curves of eyes and brows by blendshapes
-    Blendshapes that nothing moves have an empty source.
-    """
+    """Yield rows of a table that change nothing: every blendshape of a mesh, with its curve; an empty source: none."""
     for shape in mesh.shapes:
         solved = None if shapes is None else _find_solved_name(shape, shapes)
         source = others.get(shape.name, "")
@@ -130,10 +125,8 @@ def _find_solved_name(shape: Blendshape, shapes: FaceShapes) -> str | None:
 
 
 class DrivenPose(NamedTuple):
-    """What moves a character in one frame.
-
-    mouth  : weights of its blendshapes of the mouth [shape=(S,)], or displacements of points [shape=(52, 3)]
-    others : weights of its blendshapes of eyes and brows [shape=(S',)]
+    """What moves a character in one frame: weights of its mouth's shapes, or displacements of points [shape=(52, 3)],
+    and of others.
     """
 
     mouth: Array
@@ -196,10 +189,7 @@ class DrivenCharacter:
         return list(map(DrivenPose, rows, other_rows))
 
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
-        """Return the weights of whole expressions that stand for moods, by the mesh's names [each shape=(T,)].
-
-        None, where the character has finer shapes, or no expressions. Those that part the lips vanish in p, b and m.
-        """
+        """Return weights of expressions for moods [each shape=(T,)], none parting p, b, m; None: there is none."""
         moods = expression_weights(read_moods(motion)) if self._expressions else {}
         upper, lower = (self.placement.vertices[self.placement.row(point)] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
         curves = {}
@@ -225,10 +215,7 @@ class DrivenCharacter:
         return map(self.place_vertices, self.poses(motion, units, time_s, others))
 
     def place_vertices(self, pose: DrivenPose) -> Array:
-        """Return the vertices in a pose [shape=(V, 3)].
-
-        Raises InputError: the character has neither blendshapes of the mouth nor a binding.
-        """
+        """Return the vertices in a pose [shape=(V, 3)]. Raises InputError: no blendshapes of the mouth, no binding."""
         of_mouth, of_others = self._displacements
         if self.shapes is not None:
             vertices = self.mesh.vertices.copy()
@@ -256,9 +243,8 @@ class DrivenCharacter:
         return known in others or (self.shapes is not None and known in self.shapes.known)
 
     def weigh_others(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
-        """Return the weights of the blendshapes of eyes and brows over time, by the mesh's names [each shape=(T,)].
-
-        others : weights of ARKit's blendshapes [each shape=(T,)]; those that are missing are 0;  count : of frames
+        """Return the weights of the blendshapes of eyes and brows over ``count`` frames, by the mesh's names; missing
+        ones are 0.
         """
         nothing = np.zeros(count)
         return {row.control: row.alone(others.get(row.source, nothing)) for row in self._other_rows}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import GAZE_COUNTER_SHARE, Liveliness, compute_liveliness
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights
-from lipmotion.meshes.model.bones import ANGLES
+from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, SIDES
 from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
 from lipmotion.types.motion import RADIAN, WEIGHT
@@ -75,10 +75,7 @@ def moves_by_itself(part: str, curves: Mapping[str, Array]) -> bool:
 
 
 def with_movements(moved: Liveliness, curves: Mapping[str, Array]) -> Liveliness:
-    """Return movements of moods, and of what a face moves by itself, with those that are given.
-
-    Faces that move both sides alike show the mean of both.
-    """
+    """Return movements of moods, and of what a face moves by itself, with those that are given."""
     if not curves:
         return moved
     none = np.zeros(len(moved.lids))
@@ -115,9 +112,8 @@ def with_movements(moved: Liveliness, curves: Mapping[str, Array]) -> Liveliness
 
 
 def weights_to_gaze(weights: Mapping[str, Array]) -> Array:
-    """Return where both eyes look in the mean, to the character's left and upwards, in radians [shape=(F, 2)].
-
-    weights : the weights of ARKit's blendshapes that turn the eyes, all of them [each shape=(F,)]
+    """Return where both eyes look in the mean, left and up, in radians [shape=(F, 2)], by ARKit's weights [each
+    shape=(F,)].
     """
     looks = {name: weights[f"eyeLook{name}"] for name in LOOKS}
     across = looks["OutLeft"] - looks["InLeft"] + looks["InRight"] - looks["OutRight"]
@@ -126,10 +122,7 @@ def weights_to_gaze(weights: Mapping[str, Array]) -> Array:
 
 
 def gaze_to_weights(gaze: Array) -> dict[str, Array]:
-    """Return the weights of ARKit's blendshapes that turn the eyes, 0 to 1 [each shape=(F,)].
-
-    gaze : of both eyes, to the character's left and upwards, in radians [shape=(F, 2)]
-    """
+    """Return ARKit's weights that turn the eyes [each shape=(F,)] to a gaze, left and up, in radians [shape=(F, 2)]."""
     across, upwards = gaze.T
     return {
         f"eyeLook{name}{side}": np.clip(angle / FULL_LOOK_RAD, 0, 1)
@@ -167,7 +160,6 @@ def compute_living_curves(
     motion  : needs ``opening`` where the prosody is not known
     staging : seed, and what moves on its own; None: everything moves
     prosody : of the speech, for accents of brows and head; None: they follow the opening
-    frames  : those that are wanted
     They are those of all faces with the same seed. Channels are blendshapes (weights), and ``ANGLES`` in radians.
     """
     moved = stage_liveliness(motion.time_s[frames], motion, units, staging, prosody)

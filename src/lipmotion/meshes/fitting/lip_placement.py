@@ -145,9 +145,8 @@ def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, i
 
 
 def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
-    """Return how a mesh hangs together whose lip points are named: its lips are apart, also where they touch.
-
-    Raises InputError: as ``place_lips_by_points``.
+    """Return how a mesh hangs together, its named lips apart even where they touch. Raises InputError: as
+    ``place_lips_by_points``.
     """
     _check_named(named, len(mesh.vertices))
     surface = build_surface(mesh)
@@ -166,10 +165,7 @@ def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
 
 
 def find_opening_shape(mesh: Mesh) -> Blendshape:
-    """Return the blendshape that opens the mouth most plainly. Raises InputError: there is none.
-
-    ARKit's ``jawOpen``, else the vowel or viseme ``aa``, else another whose name says so.
-    """
+    """Return the blendshape that opens the mouth most: ``jawOpen``, ``aa`` or by name. Raises InputError: none."""
     tests: tuple[Callable[[str], bool], ...] = (
         lambda name: arkit_name(name) == "jawOpen",
         lambda name: viseme_name(name) == "aa",
@@ -282,7 +278,6 @@ def _check_named(named: Mapping[int, int], vertices: int) -> None:
 
 
 def _tree(places: Places) -> Any:
-    """Return a tree of places [shape=(N, D)] that finds the nearest ones."""
     from scipy.spatial import cKDTree  # a tenth of a second, which those who only draw faces need not wait
 
     return cKDTree(places)

@@ -90,19 +90,16 @@ class ControlBinding:
         return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
 
     def moved(self, mesh: Mesh, displacements: Array) -> Array:
-        """Return the vertices when control points are displaced [shape=(V, 3)].
-
-        displacements : one of each control point, eye distances, in the head frame of motion [shape=(C, 3)]
+        """Return the vertices [shape=(V, 3)] when control points are displaced, in eye distances, head frame [shape=(C,
+        3)].
         """
         matrices = np.tile(np.eye(3, 4), (len(displacements), 1, 1))
         matrices[:, :, 3] = self.placement.to_mesh(displacements)
         return self.transformed(mesh, matrices)
 
     def transformed(self, mesh: Mesh, matrices: Array) -> Array:
-        """Return the vertices under any transformations of the control points [shape=(V, 3)].
-
-        matrices : rotation, scale and shift of each, in the frame of the mesh [shape=(C, 3, 4)]
-        Source: Hofer 2008, Eq. 12.
+        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)] (Hofer 2008,
+        Eq. 12).
         """
         vertices = mesh.vertices.copy()
         vertices[self.rows] = skin_vertices(self.matrix, matrices, mesh.vertices[self.rows])

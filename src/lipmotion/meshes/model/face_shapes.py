@@ -113,9 +113,8 @@ def measure_lip_parting(mesh: Mesh, placement: LipPlacement) -> Array:
 
 
 def numbers_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str, list[int]]:
-    """Return the numbers of the blendshapes of a mesh by the names that they are understood as.
-
-    Those that a table says, all of one name; else the first of one name that moves something.
+    """Return the numbers of blendshapes by the names they are understood as: a table's, or the first that moves
+    something.
     """
     numbers: dict[str, list[int]] = {}
     for number, shape in enumerate(mesh.shapes):

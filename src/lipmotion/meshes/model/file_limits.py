@@ -55,11 +55,7 @@ class Budget:
             )
 
     def file_bytes(self, path: Path, kind: str) -> bytes:
-        """Return the content of a file, which counts.
-
-        kind : what it should be, for messages
-        Raises InputError: no such file, not a file, empty, too large, or not readable.
-        """
+        """Return the content of a file, which counts. Raises InputError: no file, empty, too large, unreadable."""
         check_source(path, kind)
         size = path.stat().st_size
         try:

@@ -76,9 +76,8 @@ def vowel_name(name: str) -> str | None:
 
 
 def spoken_name(name: str) -> str | None:
-    """Return the viseme or vowel of a blendshape, but for silence, or None.
-
-    ``viseme_I`` is ``viseme_ih``, ``Fcl_MTH_A`` is ``vowel_aa``.
+    """Return the viseme or vowel (``viseme_ih``, ``vowel_aa``) of a blendshape as files spell it, or None; silence is
+    none.
     """
     viseme, vowel = viseme_name(name), vowel_name(name)
     if viseme is not None:

@@ -41,16 +41,14 @@ class MeshSurface:
     normals: NDArray[np.float64]
 
     def distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
-        """Return the distance along edges from each source vertex to every vertex [shape=(len(sources), V)].
-
-        limit : beyond this distance, in the unit of the mesh, infinity is returned
+        """Return distances along edges from sources to every vertex [shape=(len(sources), V)]; infinite beyond
+        ``limit``.
         """
         return self.place_distances(sources, limit)[:, self.places]
 
     def place_distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
         """Return the distance along edges from each source vertex to every place [shape=(len(sources), P)].
 
-        limit : as of ``distances``
         Cost: O(N · P' log P') for N sources and the P' places within the limit.
         """
         from scipy.sparse.csgraph import dijkstra  # takes 0.2 s, which those without a mesh would wait
@@ -93,10 +91,7 @@ def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSur
 
 
 def compute_normals(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the normal of every vertex, the mean of its triangles weighted by their area [shape=(V, 3)], of length 1.
-
-    A vertex without triangles gets (0, 0, 1).
-    """
+    """Return the area-weighted unit normal of every vertex [shape=(V, 3)]; (0, 0, 1) where no triangle is."""
     total = normal_sums(places, triangles)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])

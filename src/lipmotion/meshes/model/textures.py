@@ -30,10 +30,8 @@ Extremes = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """A picture on a surface.
-
-    pixels : red, green and blue as sRGB, and opacity, 0 to 255; the first row is at the top [shape=(H, W, 4)]
-    Raises InputError: another shape or type, or no pixels.
+    """A picture on a surface: sRGB and opacity, 0 to 255, from the top [shape=(H, W, 4)]. Raises InputError: another
+    shape.
     """
 
     pixels: NDArray[np.uint8]
@@ -46,12 +44,7 @@ class Texture:
     def range_of_opacity(
         self, low: NDArray[np.float64], high: NDArray[np.float64], reach: NDArray[np.int64]
     ) -> Extremes:
-        """Return the least and the largest opacity in boxes of the texture, 0 to 1 [shape=(N,), both].
-
-        low, high : corners of the boxes, v downwards [shape=(N, 2)]
-        reach     : pixels around them that count [shape=(N,)]
-        Boxes that lead over an edge of the texture get 0 and 1.
-        """
+        """Return least and largest opacity in boxes, v down [shape=(N, 2)], 0 to 1; those over an edge get 0 and 1."""
         size = np.array(self.pixels.shape[1::-1])
         shift = np.floor(low)
         first = np.floor((low - shift) * size).astype(np.int64) - reach[:, None]
@@ -70,10 +63,7 @@ class Texture:
         return low_opacity, high_opacity
 
     def at(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the nearest pixels at some places, 0 to 1 [shape=(N, 4)].
-
-        uv : places, v downwards, repeated beyond 0 to 1 [shape=(N, 2)]
-        """
+        """Return the nearest pixels at places, v down, repeated beyond 0 to 1, as 0 to 1 [shapes=(N, 4), (N, 2)]."""
         height, width = self.pixels.shape[:2]
         at = uv % 1.0 * (width, height)
         column = np.minimum(at[:, 0].astype(int), width - 1)
@@ -126,11 +116,8 @@ class TextureTable:
     first: tuple[int, ...]
 
     def level(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Return the row of ``levels`` that suits triangles: about one of its pixels to a pixel of the screen.
-
-        texture    : its number
-        in_texture : areas of the triangles, as parts of the texture's [shape=(F,)]
-        on_screen  : their areas in pixels of the screen [shape=(F,)]
+        """Return the row of ``levels`` that suits triangles, by areas in the texture and on the screen [each
+        shape=(F,)].
         """
         first = self.first[texture]
         last = (*self.first, len(self.levels))[texture + 1] - 1

@@ -18,7 +18,7 @@ from lipmotion.pipeline.request import Pauses, Request
 from lipmotion.speech.sound.overlap_add import JoinedPieces, overlapped
 from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import SILENCE, Lexicon, split_words
-from lipmotion.units.sentences import split_sentences
+from lipmotion.units.text_normalisation import split_sentences
 
 REST_S = 0.25
 """Silence before the first and after the last word,"""

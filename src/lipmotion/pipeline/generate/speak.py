@@ -31,7 +31,7 @@ from lipmotion.types.moods import MoodTag
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
-from lipmotion.units.sentences import MAX_CHARACTERS, split_sentences
+from lipmotion.units.text_normalisation import MAX_CHARACTERS, split_sentences
 
 LOG = logging.getLogger("lipmotion")
 CORPUS_VOICE = "corpus"

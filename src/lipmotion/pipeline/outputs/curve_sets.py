@@ -18,8 +18,12 @@ from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_rig_table
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
-from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS, weigh_visemes
-from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights
+from lipmotion.meshes.fitting.shape_weights import (
+    VISEME_CHANNELS,
+    expression_weights,
+    solve_shape_weights,
+    weigh_visemes,
+)
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, arkit_name
 from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Timeline, Unit

@@ -23,7 +23,7 @@ from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
-from lipmotion.meshes.model.keys import Thinning
+from lipmotion.meshes.model.scene import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import (
     ARKIT,

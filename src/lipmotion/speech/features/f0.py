@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import cheapest_arrivals, trace_back
 from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import Audio

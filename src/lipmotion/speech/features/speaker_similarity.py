@@ -19,7 +19,7 @@ WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)
 JUDGED_FRAMES = 2000
 """20 seconds are enough to judge a speaker by."""
 STRANGER_SCORE, OWN_SCORE = -9.0, -3.0
-"""Of a voice with the first speaker similarity score a model knows nothing; with the second it is its training's own.
+"""A model knows nothing of a voice with the first speaker similarity score; one with the second is its training's own.
 The score of another speaker in the same studio is -4 to -6 for GRID's models, of other voices in other rooms -7 to -15,
 and of the training's own in noise no more."""
 STRANGER_LIKENESS, OWN_LIKENESS = 0.2, 0.75

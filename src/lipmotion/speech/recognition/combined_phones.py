@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.log_likelihoods import DensitySelection, LogLikelihoods
 from lipmotion.hmm.model import StateTable, UnitHmm
+from lipmotion.hmm.network import DensitySelection, LogLikelihoods
 from lipmotion.speech.recognition.general.acoustic import density_column, general_model
 from lipmotion.speech.recognition.general.language import english_bigram
 from lipmotion.stats.bigram import Bigram

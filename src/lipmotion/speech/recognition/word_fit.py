@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.align import align_states, choose_pronunciations
-from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
+from lipmotion.hmm.network import LogLikelihoods
 from lipmotion.speech.recognition.combined_phones import NOISES
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import FULL_FORMS

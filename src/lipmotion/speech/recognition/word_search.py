@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.decode import UnitLoop, decode_path
-from lipmotion.hmm.log_likelihoods import LogLikelihoods, penalise_silence, wrap_log_likelihoods
 from lipmotion.hmm.model import UnitHmm
+from lipmotion.hmm.network import LogLikelihoods, penalise_silence, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.combined_phones import NOISES
 from lipmotion.speech.recognition.recognised_speech import (

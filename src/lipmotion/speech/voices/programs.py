@@ -24,7 +24,7 @@ POLL_S = 0.05
 LARGEST_OUTPUT_BYTES = 4 << 20
 """Most bytes that a program may print: many times the phones of twenty sentences."""
 LARGEST_SOUND_BYTES = 32 << 20
-"""Most bytes that it may write for each sentence: many times the longest one (``units.sentences``)."""
+"""Most bytes that it may write for each sentence: many times the longest one (``units.text_normalisation``)."""
 SHOWN_CHARACTERS = 200
 """Characters of a program's error message that ours repeats."""
 

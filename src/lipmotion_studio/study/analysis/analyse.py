@@ -1,19 +1,161 @@
-"""The analysis of a study: all its figures, with and without screening of raters."""
+"""The analysis of a study: all its figures, with and without screening of raters, and their table."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lipmotion.errors import InputError, shorten
-from lipmotion_studio.study.analysis.crossed import CONFIDENCE, Components, variance_of_mean
-from lipmotion_studio.study.analysis.paired import pair_table, paired_figures, share_components
+from lipmotion.printable import printable
+from lipmotion_studio.study.analysis.crossed import BOTH, CONFIDENCE, Components, variance_of_mean
+from lipmotion_studio.study.analysis.paired import order_agreement, pair_table, paired_figures, share_components
 from lipmotion_studio.study.analysis.ratings import difference_components, rating_figures, rating_table
-from lipmotion_studio.study.analysis.screening import counts, screen
-from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, Answer, read_answers
+from lipmotion_studio.study.answers import ANCHOR, FIRST, MOS, PAIRED, RECORDING, Answer, read_answers
+
+MIN_ATTENTION = 2 / 3
+"""Share of the checks of attention that must be right."""
+MAX_ANCHOR = 0.5
+"""Share of the comparisons with the anchor in which it may be preferred."""
+MIN_CHANCE = 0.01
+"""A rater whose answers to both orders disagree more than by so small a chance presses the same side."""
+MIN_ALIKE = 8
+"""From so many judgements on, one who always gives the same value does not judge."""
+MIN_PANEL = 5
+"""With fewer raters nobody is said to be faster than the others."""
+FASTEST, DEVIATIONS = 0.5, 3.0
+"""A rater is too fast who is below this share of the usual time, and so many deviations of its logarithm below it."""
+MIN_ANSWERS = 0.5
+"""Share of the usual number of answers below which a rater gave too few."""
+NORMAL = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+RULES = {
+    "attention": f"at least {MIN_ATTENTION:.0%} of the checks of attention right",
+    "anchor": f"the anchor rated below the recording (without one: below the mean of the others); preferred in at "
+    f"most {MAX_ANCHOR:.0%} of its comparisons",
+    "sides": f"not one side whatever is shown: pairs in both orders answered alike not more rarely than by a chance "
+    f"of {MIN_CHANCE:.0%}",
+    "same value": f"not one value throughout, from {MIN_ALIKE} judgements of a kind on",
+    "time": f"median time (relative to the same question's usual time) not below {FASTEST:.0%} and {DEVIATIONS:g} "
+    f"robust deviations under the panel's; from {MIN_PANEL} raters on. How long the videos are is not known here",
+    "answers": f"at least {MIN_ANSWERS:.0%} of the usual number of answers",
+}
+
+
+@dataclass(frozen=True)
+class Screening:
+    """All raters, and for each that is left out what was found, by rule."""
+
+    raters: tuple[str, ...]
+    found: Mapping[str, Mapping[str, str]]
+
+    def kept(self, answers: Sequence[Answer]) -> list[Answer]:
+        """Return the answers of the raters that are kept."""
+        return [answer for answer in answers if answer.rater not in self.found]
+
+    def figures(self) -> Figures:
+        """Return the rules, and whom they leave out."""
+        return {
+            "rules": dict(RULES),
+            "raters": len(self.raters),
+            "kept": len(self.raters) - len(self.found),
+            "left_out": [
+                {"rater": rater, "rule": rule, "found": text}
+                for rater, texts in self.found.items()
+                for rule, text in texts.items()
+            ],
+        }
+
+
+def counts(answers: Sequence[Answer]) -> list[Answer]:
+    """Return the answers that count: neither practice nor checks of attention."""
+    return [answer for answer in answers if not answer.practice and not answer.expected]
+
+
+def screen(answers: Sequence[Answer]) -> Screening:
+    """Return which raters of a study are left out."""
+    real = [answer for answer in answers if not answer.practice]
+    raters = sorted({answer.rater for answer in real})
+    judged: dict[str, list[Answer]] = {rater: [] for rater in raters}
+    checks: dict[str, list[Answer]] = {rater: [] for rater in raters}
+    for answer in real:
+        (checks if answer.expected else judged)[answer.rater].append(answer)
+    fast = _find_fast(counts(real))
+    usual = float(np.median([len(mine) for mine in judged.values()])) if raters else 0.0
+    found: dict[str, dict[str, str]] = {}
+    for rater, mine in judged.items():
+        right, shown = sum(each.value == each.expected for each in checks[rater]), len(checks[rater])
+        texts = {
+            "attention": f"{right} of {shown} right" if right < MIN_ATTENTION * shown else "",
+            "anchor": _check_anchor(mine),
+            "sides": _check_sides([each for each in mine if each.kind == PAIRED]),
+            "same value": _check_values(mine),
+            "time": fast.get(rater, ""),
+            "answers": f"{len(mine)} of usually {usual:g}" if len(mine) < MIN_ANSWERS * usual else "",
+        }
+        if any(texts.values()):
+            found[rater] = {rule: text for rule, text in texts.items() if text}
+    return Screening(tuple(raters), found)
+
+
+def _check_values(mine: Sequence[Answer]) -> str:
+    for kind in sorted({each.kind for each in mine} - {PAIRED}):
+        values = [each.value for each in mine if each.kind == kind]
+        if len(values) >= MIN_ALIKE and len(set(values)) == 1:
+            return f"{values[0]} in all {len(values)}"
+    return ""
+
+
+def _check_anchor(mine: Sequence[Answer]) -> str:
+    compared = [each for each in mine if each.kind == PAIRED and ANCHOR in (each.condition, each.other)]
+    chosen = sum((each.condition == ANCHOR) == (each.value == FIRST) for each in compared)
+    if chosen > MAX_ANCHOR * len(compared):
+        return f"preferred in {chosen} of {len(compared)}"
+    for kind in sorted({each.kind for each in mine} - {PAIRED}):
+        rated = [(each.condition, int(each.value)) for each in mine if each.kind == kind]
+        names = {name for name, _ in rated} - {ANCHOR}
+        standard = {RECORDING} & names or names
+        values = [value for name, value in rated if name in standard]
+        low = [value for name, value in rated if name == ANCHOR]
+        if low and values and np.mean(low) >= np.mean(values):
+            better = RECORDING if standard == {RECORDING} else "others"
+            return f"rated {np.mean(low):.2f}, {better} {np.mean(values):.2f}"
+    return ""
+
+
+def _check_sides(mine: Sequence[Answer]) -> str:
+    from scipy.special import bdtr
+
+    if not mine:
+        return ""
+    alike, pairs = order_agreement(pair_table(mine)).sum(axis=0).tolist()
+    if pairs and bdtr(alike, pairs, 0.5) < MIN_CHANCE:
+        return f"{alike} of {pairs} pairs answered alike in both orders"
+    return ""
+
+
+def _find_fast(answers: Sequence[Answer]) -> dict[str, str]:
+    """Return raters too fast, with their share of the usual time: the median over answers, in logarithms."""
+    timed = [each for each in answers if 0 < each.seconds < np.inf]
+    logs: dict[tuple[str, str], list[float]] = {}
+    for each in timed:
+        logs.setdefault((each.kind, each.question), []).append(float(np.log(each.seconds)))
+    usual = {question: float(np.median(found)) for question, found in logs.items()}
+    by_rater: dict[str, list[float]] = {}
+    for each in timed:
+        by_rater.setdefault(each.rater, []).append(float(np.log(each.seconds)) - usual[each.kind, each.question])
+    if len(by_rater) < MIN_PANEL:
+        return {}
+    times = {rater: float(np.median(found)) for rater, found in by_rater.items()}
+    panel = np.array(list(times.values()))
+    middle = float(np.median(panel))
+    spread = DEVIATIONS * NORMAL * float(np.median(np.abs(panel - middle)))
+    limit = middle - max(spread, -np.log(FASTEST))
+    return {rater: f"{np.exp(time - middle):.0%} of the usual time" for rater, time in times.items() if time < limit}
+
 
 MAX_RATERS = 1000
 """No search goes beyond."""
@@ -24,18 +166,13 @@ SHARES = (0.55, 0.6, 0.65, 0.7, 0.75)
 """Preferences whose numbers of raters are given."""
 USUAL_POWER = 0.8
 DRAWS, SEED = 1000, 0
-"""Simulated studies of a size."""
 MAX_DEGREES = 1e6
 """Degrees of freedom from which on Student's t is normal."""
 Figures = dict[str, Any]
 
 
 def power_of(components: Components, difference: float, raters: int, sentences: int) -> float:
-    """Return the probability that the test of ``crossed_mean`` tells a mean difference from 0, at the 5 % level.
-
-    Every rater judges every sentence; two raters and two sentences at least. Judgements are normal: mean squares are
-    then chi-squared, drawn with a fixed seed, and independent of the mean, whose probability is exact for each draw.
-    """
+    """Return the probability that the test of ``crossed_mean`` tells a mean difference from 0, at the 5 % level."""
     from scipy.special import ndtr, stdtrit
 
     rater, sentence, rest = components.rater / raters, components.sentence / sentences, components.residual
@@ -53,10 +190,7 @@ def power_of(components: Components, difference: float, raters: int, sentences: 
 
 
 def raters_needed(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
-    """Return the smallest number of raters that tells a difference with some power.
-
-    None: even ``MAX_RATERS`` do not; then the sentences are too few.
-    """
+    """Return the least number of raters that tells a difference; None: ``MAX_RATERS`` do not, for want of sentences."""
     low, high = 1, 2  # the power grows with the raters; one rater is no panel
     while power_of(components, difference, high, sentences) < power:
         low, high = high, 2 * high
@@ -147,7 +281,6 @@ def analyse_study(
 
 
 def _parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:
-    """Return the figures of each question of each kind."""
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
@@ -180,3 +313,132 @@ def _comparison_figures(answers: Sequence[Answer], power: float, sentences: int 
         "planned_sentences": planned,
         "raters_needed": share_power(components, planned, power),
     }
+
+
+NO_FIGURE = "–"
+
+
+def analysis_table(figures: Figures) -> str:
+    """Return the figures of ``analyse_study`` as text."""
+    lines = [f"{figures['answers']} answers count; {figures['left_aside']} of practice and attention do not"]
+    screening = figures["screening"]
+    lines += [f"screening: {screening['kept']} of {screening['raters']} raters kept; required of each:"]
+    lines += [f"  {name}: {rule}" for name, rule in screening["rules"].items()]
+    lines += [f"  left out: {row['rater']} ({row['rule']}: {row['found']})" for row in screening["left_out"]]
+    parts = figures["screened"]
+    if parts is None:
+        lines += ["", "no rater is left after screening: figures of all raters"]
+    shown = figures["all"] if parts is None else parts
+    others = {(part["kind"], part["question"]): part for part in figures["all"]}
+    for part in shown:
+        everybody = others[part["kind"], part["question"]]
+        title = f"{part['kind']}, {part['question']}: {part['answers']} answers, {part['raters']} raters, "
+        lines += ["", f"{title}{part['sentences']} sentences"]
+        unscreened = everybody if everybody["raters"] > part["raters"] else None
+        lines += (_paired_lines if part["kind"] == PAIRED else _rating_lines)(part, unscreened)
+        if part.get("raters_needed"):
+            needed = []
+            for row in part["raters_needed"]:
+                size = f"{row['share']:.0%}" if "share" in row else f"{row['difference']:g}"
+                needed.append(f"{size}: {row['raters'] or 'more sentences'}")
+            what = "a preference" if part["kind"] == PAIRED else "a difference"
+            planned = f"{part['planned_sentences']} sentences, power {figures['power']:.0%}"
+            lines.append(f"  raters to tell {what} ({planned}): {', '.join(needed)}")
+    return "\n".join(map(printable, lines))
+
+
+def _rating_lines(part: Figures, everybody: Figures | None) -> list[str]:
+    before = {row["condition"]: row["mean"] for row in everybody["conditions"]} if everybody else {}
+    relative = {row["condition"]: row for row in part["relative_improvement"]}
+    rows = [["condition", "mean", "95 %", "deviation", f"% over {part['baseline']}", "95 %", "all raters"]]
+    for row in part["conditions"]:
+        better = relative.get(row["condition"], {"percent": None, "low": None, "high": None})
+        mean = [row["condition"], _number(row["mean"], ".2f"), _limits(row, ".2f"), _number(row["deviation"], ".2f")]
+        gain = [_number(better["percent"], "+.1f"), _limits(better, "+.1f")]
+        rows.append([*mean, *gain, _number(before.get(row["condition"]), ".2f")])
+    pairs = [["pair", "difference", "95 %", "p", "p (Holm)"]]
+    pairs += [
+        [f"{row['condition']} - {row['other']}", _number(row["difference"], "+.2f"), _limits(row, "+.2f"), *_tests(row)]
+        for row in part["pairs"]
+    ]
+    return [*_align(_without_last(rows, bool(before))), *_scope_lines(part["conditions"]), *_align(pairs)]
+
+
+def _paired_lines(part: Figures, everybody: Figures | None) -> list[str]:
+    """Return how often each condition was preferred, the pairs, the strengths, and the effect of the order."""
+    if "missing" in part:
+        return [f"  {part['missing']}"]
+    before = {(row["condition"], row["other"]): row["share"] for row in everybody.get("pairs", ())} if everybody else {}
+    scores = [["condition", "preferred", "share", "95 %"]]
+    scores += [
+        [row["condition"], f"{row['wins']} of {row['answers']}", _number(row["share"], ".1%"), _limits(row, ".1%")]
+        for row in part["conditions"]
+    ]
+    pairs = [["pair", "preferred", "share", "95 %", "p", "p (Holm)", "p (binomial)", "all raters"]]
+    for row in part["pairs"]:
+        name = f"{row['condition']} over {row['other']}"
+        share = [f"{row['wins']} of {row['answers']}", _number(row["share"], ".1%"), _limits(row, ".1%")]
+        all_raters = _number(before.get((row["condition"], row["other"])), ".1%")
+        pairs.append([name, *share, *_tests(row), _p_text(row["p_binomial"]), all_raters])
+    first, both = part["first_preferred"], part["consistency"]
+    orders = f"  the first was preferred in {_number(first['share'], '.1%')} ({_limits(first, '.1%')}); "
+    orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_number(both['share'], '.1%')})"
+    lines = [*_align(scores), *_align(_without_last(pairs, bool(before))), *_scope_lines(part["pairs"]), orders]
+    model = part["bradley_terry"]
+    if "missing" in model:
+        return [*lines, f"  no Bradley–Terry strengths: {model['missing']}"]
+    rows = [["Bradley–Terry", "log odds", "95 %"]]
+    rows += [[row["condition"], _number(row["strength"], "+.2f"), _limits(row, "+.2f")] for row in model["conditions"]]
+    rows.append(["shown first", _number(model["order"]["strength"], "+.2f"), _limits(model["order"], "+.2f")])
+    lines += _align(rows)
+    if model["is_shrunk"]:
+        lines.append("  a strength would be infinite: half a win was given to both sides of each comparison")
+    return lines
+
+
+def _scope_lines(rows: Sequence[Figures]) -> list[str]:
+    """Return what the intervals are over, where it is not raters and sentences."""
+    scopes = sorted({row["over"] for row in rows} - {BOTH})
+    found = [row for row in rows if row["over"] in scopes]
+    named = [f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in found]
+    return [f"  intervals over {' / '.join(scopes)} only: {', '.join(named)}"] if scopes else []
+
+
+def _without_last(rows: list[list[str]], is_kept: bool) -> list[list[str]]:
+    return rows if is_kept else [row[:-1] for row in rows]
+
+
+def _align(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return rows in columns, the first to the left, the others to the right; no line for a head alone."""
+    if len(rows) < 2:
+        return []
+    sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  "
+        + "  ".join(
+            [f"{row[0]:{sizes[0]}}", *(f"{cell:>{size}}" for cell, size in zip(row[1:], sizes[1:], strict=True))]
+        )
+        for row in rows
+    ]
+
+
+def _tests(row: Figures) -> list[str]:
+    return [_p_text(row["p"]), _p_text(row["p_holm"])]
+
+
+def _p_text(p: float | None) -> str:
+    return "<0.001" if p is not None and p < 0.001 else _number(p, ".3f")
+
+
+def _limits(row: Figures, form: str) -> str:
+    if _is_missing(row["low"]):
+        return NO_FIGURE
+    return f"{row['low']:{form}} to {row['high']:{form}}"
+
+
+def _number(value: float | None, form: str) -> str:
+    return NO_FIGURE if value is None or _is_missing(value) else format(value, form)
+
+
+def _is_missing(value: float | None) -> bool:
+    return value is None or value != value  # noqa: PLR0124 - NaN

@@ -44,9 +44,7 @@ UNKNOWN = Interval(np.nan, np.nan)
 class CrossedMean:
     """A mean over raters and sentences.
 
-    mean       : of all cells of the table
     error      : standard error; 0 where all judgements are equal, which says nothing of those of other raters
-    degrees    : of freedom of the error
     over       : what the error generalises over
     components : variances of the effects; None where they cannot be told apart
     """
@@ -132,11 +130,7 @@ def crossed_mean(values: Array, width: float) -> CrossedMean:
 def variance_of_mean(
     rater: Array, sentence: Array, rest: Array, free: tuple[float, float, float]
 ) -> tuple[Array, Array]:
-    """Return the variance of a mean, and its degrees of freedom, from its parts.
-
-    rater, sentence, rest : what each effect adds to the variance, in one or several studies [each shape=(N,)]
-    free : degrees of freedom of raters, of sentences, and of the rest
-    """
+    """Return the variance of a mean and its degrees of freedom, from those of raters, sentences, the rest."""
     variance = rater + sentence + rest
     doubt = np.where(rater > 0, (rater + rest) ** 2 / free[0], 0) + np.where(
         sentence > 0, (sentence + rest) ** 2 / free[1], 0
@@ -146,9 +140,8 @@ def variance_of_mean(
 
 
 def _components(rest: Array, seen: NDArray[np.bool_]) -> Components:
-    """Return the variances of the effects in a table with gaps, by three sums of squares.
-
-    rest : differences from the mean, 0 where there is no judgement [shape=(R, S)]
+    """Return the variances of effects by three sums of squares, from rests [shape=(R, S)], 0 where there is no
+    judgement.
     """
     of_rater, of_sentence, cells = seen.sum(axis=1), seen.sum(axis=0), int(seen.sum())
     squares = float(np.square(rest).sum())

@@ -64,30 +64,6 @@ def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
     if is_shrunk:
         made = HALF_WIN * (first_wins + second_wins > 0)
         first_wins, second_wins = first_wins + made, second_wins + made
-    strengths, order = _maximise(first_wins, second_wins, has_order)
-    probability = _logistic(strengths[:, None] - strengths + order)
-    weights = (first_wins + second_wins) * probability * (1 - probability)
-    pairs = np.argwhere(weights > 0)
-    contrasts = _contrasts(pairs, len(weights))
-    contrasts[:, -1] *= has_order
-    information = (contrasts * weights[tuple(pairs.T)][:, None]).T @ contrasts  # Fisher's, on strengths and order
-    covariance: Array = np.linalg.pinv(information, hermitian=True, rcond=1e-10).astype(float)
-    return Strengths(strengths, order, covariance, is_shrunk)
-
-
-def link_groups(comparisons: Array) -> list[list[int]]:
-    """Return the groups of conditions that are linked by comparisons.
-
-    comparisons : how often i was compared with j, in this order [shape=(C, C)]
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    count, labels = connected_components(comparisons, directed=False)
-    return [np.flatnonzero(labels == label).tolist() for label in range(count)]
-
-
-def _maximise(first_wins: Array, second_wins: Array, has_order: bool) -> tuple[Array, float]:
-    """Return log strengths, mean 0 [shape=(C,)], and the effect of the order."""
     comparisons = first_wins + second_wins
     wins = first_wins.sum(axis=1) + second_wins.sum(axis=0)
     worth, place = np.ones(len(wins)), 1.0
@@ -100,7 +76,23 @@ def _maximise(first_wins: Array, second_wins: Array, has_order: bool) -> tuple[A
             place = first_wins.sum() / (comparisons * worth[:, None] / (place * worth[:, None] + worth)).sum()
         if np.abs(np.append(worth, place) / before - 1).max() < SMALLEST_STEP:
             break
-    return np.log(worth), float(np.log(place))
+    strengths, order = np.log(worth), float(np.log(place))
+    probability = _logistic(strengths[:, None] - strengths + order)
+    weights = (first_wins + second_wins) * probability * (1 - probability)
+    pairs = np.argwhere(weights > 0)
+    contrasts = _contrasts(pairs, len(weights))
+    contrasts[:, -1] *= has_order
+    information = (contrasts * weights[tuple(pairs.T)][:, None]).T @ contrasts  # Fisher's, on strengths and order
+    covariance: Array = np.linalg.pinv(information, hermitian=True, rcond=1e-10).astype(float)
+    return Strengths(strengths, order, covariance, is_shrunk)
+
+
+def link_groups(comparisons: Array) -> list[list[int]]:
+    """Return the groups of conditions that are linked by comparisons [shape=(C, C)]."""
+    from scipy.sparse.csgraph import connected_components
+
+    count, labels = connected_components(comparisons, directed=False)
+    return [np.flatnonzero(labels == label).tolist() for label in range(count)]
 
 
 def _has_maximum(first_wins: Array, second_wins: Array, has_order: bool) -> bool:
@@ -153,13 +145,7 @@ ALL_EQUAL = "raters, all agree"
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Answers to paired comparisons, N of them.
-
-    conditions, raters, sentences : their names, in alphabetical order
-    shown    : which conditions were shown first and second [shape=(N, 2)]
-    is_first : whether the first was preferred [shape=(N,)]
-    rater, sentence : of each answer [shape=(N,)]
-    """
+    """Answers to N paired comparisons: conditions shown first and second [shape=(N, 2)], rater and sentence."""
 
     conditions: tuple[str, ...]
     raters: tuple[str, ...]
@@ -202,10 +188,7 @@ class PairTable:
 
 
 def pair_table(answers: Sequence[Answer]) -> PairTable:
-    """Return the table of answers to paired comparisons.
-
-    Raises InputError: a condition is compared with itself, or with nothing.
-    """
+    """Return the table of answers to paired comparisons. Raises InputError: a condition meets itself, or nothing."""
     for answer in answers:
         if not answer.other or answer.other == answer.condition:
             raise InputError(
@@ -288,10 +271,7 @@ def binomial_p(wins: int, count: int) -> float:
 
 
 def consistency(table: PairTable) -> Figures:
-    """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice.
-
-    Chance alone gives one half, and so do conditions that look alike.
-    """
+    """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice."""
     agreed = order_agreement(table)
     count = int(agreed[:, 1].sum())
     share = float(agreed[:, 0].sum() / count) if count else np.nan
@@ -343,10 +323,7 @@ def strength_figures(table: PairTable) -> Figures:
 
 
 def share_components(table: PairTable) -> Components | None:
-    """Return the mean variances of the effects on shares over all pairs, each divided by that of one answer.
-
-    None: they cannot be told apart in any pair, or all its answers agree.
-    """
+    """Return the mean variances of effects on shares, by that of one answer; None: they cannot be told apart."""
     found = []
     for _, _, cells in _pair_cells(table):
         share = crossed_mean(cells, 1.0)

@@ -21,12 +21,7 @@ Figures = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class RatingTable:
-    """The judgements on one scale.
-
-    values : mean judgement of each rater of each sentence in each condition; NaN where there is none [shape=(C, R, S)]
-    count  : of the judgements
-    scale  : lowest and highest value
-    """
+    """Mean judgements on one scale [shape=(C, R, S)], NaN where there is none, and the scale's ends."""
 
     conditions: tuple[str, ...]
     values: Array
@@ -68,10 +63,7 @@ def rating_table(answers: Sequence[Answer]) -> RatingTable:
 
 
 def rating_figures(table: RatingTable, baseline: str | None) -> Figures:
-    """Return the figures of one scale: means, differences of all pairs, improvement relative to a baseline.
-
-    baseline : condition to which the others are relative; None: that with the lowest mean
-    """
+    """Return means, differences of all pairs, and improvement on a baseline (None: the lowest mean) of one scale."""
     means = []
     for number, name in enumerate(table.conditions):
         values = table.of(name)
@@ -88,13 +80,21 @@ def rating_figures(table: RatingTable, baseline: str | None) -> Figures:
         }
         means.append(row)
     base = baseline if baseline in table.conditions else lowest(table)
+    pairs = table.compared()
+    differences = [table.difference(*pair) for pair in pairs]
+    p_values = [each.p_value for each in differences]
     return {
         "conditions": sorted(means, key=lambda row: -row["mean"]),
         "baseline": base,
         "relative_improvement": [
             relative_improvement(table, name, base) for name in table.conditions if base and name not in (base, ANCHOR)
         ],
-        "pairs": pair_figures(table),
+        "pairs": [
+            {"condition": pair[0], "other": pair[1], "difference": mean.mean}
+            | mean.interval._asdict()
+            | {"p": p, "p_holm": corrected, "over": mean.over}
+            for pair, mean, p, corrected in zip(pairs, differences, p_values, holm(p_values), strict=True)
+        ],
     }
 
 
@@ -121,19 +121,6 @@ def relative_improvement(table: RatingTable, condition: str, base: str) -> Figur
     percent = 100 * (ratio - 1)
     interval = crossed_mean(100 * (values - ratio * others) / level, 100 * table.width / level).interval
     return row | {"percent": percent, "low": percent + interval.low, "high": percent + interval.high}
-
-
-def pair_figures(table: RatingTable) -> list[Figures]:
-    """Return the difference of every pair of conditions, with its test, corrected for their number (Holm 1979)."""
-    pairs = table.compared()
-    differences = [table.difference(*pair) for pair in pairs]
-    p_values = [each.p_value for each in differences]
-    return [
-        {"condition": pair[0], "other": pair[1], "difference": mean.mean}
-        | mean.interval._asdict()
-        | {"p": p, "p_holm": corrected, "over": mean.over}
-        for pair, mean, p, corrected in zip(pairs, differences, p_values, holm(p_values), strict=True)
-    ]
 
 
 def difference_components(table: RatingTable) -> Components | None:

@@ -10,8 +10,11 @@ from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct,
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, UNSEEN_LOSS
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert
-from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, growing_chains
-from lipmotion.engines.coupled.training.initialisation import with_joint_state_densities
+from lipmotion.engines.coupled.training.chain_training import (
+    MixtureSchedule,
+    growing_chains,
+    with_joint_state_densities,
+)
 
 
 def both(seed=0) -> tuple[Chains, Chains]:

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
+from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
-from lipmotion.engines.coupled.chains.transitions import Transitions
 from lipmotion.engines.coupled.conversion.em_conversion import precision_statistics
 from oracles import coupled as oracle
 

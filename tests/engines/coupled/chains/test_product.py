@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, grammar, structure
-from lipmotion.engines.coupled.chains.product import JointState, reachable
+from lipmotion.engines.coupled.chains.product import JointState, Transitions, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS, unit_sets
-from lipmotion.engines.coupled.chains.transitions import Transitions, initial_transitions
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.errors import InputError
 

@@ -18,10 +18,8 @@ LEAST_COMPONENT_FRAMES = 0.1
 
 @dataclass(frozen=True, eq=False)
 class AudioVisualObservations:
-    """The observation vectors of T frames, stream by stream; the first stream is speech, the others are visual.
-
-    streams  : values of every stream [each shape=(T, D_s)]
-    observed : in which frames each stream was observed [each shape=(T,)]; None: in all
+    """Streams of T frames [each shape=(T, D_s)], speech first, and where each was observed [each shape=(T,)] (None:
+    all).
     """
 
     streams: tuple[Single, ...]
@@ -39,9 +37,8 @@ class AudioVisualObservations:
     def with_stream(
         self, stream: int, values: Single, observed: NDArray[np.bool_] | None = None
     ) -> AudioVisualObservations:
-        """Return the observations with other values of one stream [shape=(T, D_s)].
-
-        observed : in which frames these values were observed [shape=(T,)]; None: in all
+        """Return the observations with other values of a stream [shape=(T, D_s)], observed in these frames
+        [shape=(T,)].
         """
         streams, masks = list(self.streams), list(self.observed)
         streams[stream], masks[stream] = values, observed
@@ -52,7 +49,6 @@ class AudioVisualObservations:
 class StreamGroup:
     """The emission densities of one or more streams that share their mixture components.
 
-    streams  : the numbers of the streams
     columns  : for each of these streams, its columns among the D dimensions of the mixtures
     mixtures : G densities over all of these streams
     weights  : the exponent of each stream's density
@@ -94,10 +90,6 @@ class EmissionEvaluator:
         The responsibilities [shape=(T, M, G')] sum to 1 over the M components; they are None where M is 1.
         A stream that was not observed is left out. This is exact: its density integrates to 1.
         """
-        return normalised_components(self._component_log_densities(observations, densities))
-
-    def _component_log_densities(self, observations: AudioVisualObservations, densities: Index) -> Single:
-        """Return log weight + weighted log density of every component [shape=(T, M, G')]."""
         group = self.group
         log_weights = group.mixtures.log_weights[densities].T
         total = np.zeros((observations.frames, *log_weights.shape), np.float32)
@@ -112,11 +104,10 @@ class EmissionEvaluator:
                 log[~observed] = 0
             total += log
         total += log_weights
-        return total
+        return normalised_components(total)
 
 
 def _restricted(form: QuadraticForm, densities: Index) -> QuadraticForm:
-    """Return the quadratic form of some of its densities [shape=(G',)]."""
     if np.array_equal(densities, np.arange(form.constant.shape[1])):
         return form
     columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, densities]
@@ -175,20 +166,14 @@ def zero_emission_statistics(group: StreamGroup) -> EmissionStatistics:
 
 
 def component_posteriors(posterior: Single, responsibilities: Single | None) -> Single:
-    """Return γ(q, k) [shape=(T, M, G')].
-
-    posterior        : γ(q) of the densities [shape=(T, G')]
-    responsibilities : of their components [shape=(T, M, G')]; None: one component
+    """Return γ(q, k) [shape=(T, M, G')], from γ(q) [shape=(T, G')] and responsibilities [shape=(T, M, G')] (None: M is
+    1).
     """
     return posterior[:, None] if responsibilities is None else responsibilities * posterior[:, None]
 
 
 def reestimated_group(
-    group: StreamGroup,
-    statistics: EmissionStatistics,
-    floors: Sequence[Single],
-    least: float,
-    streams: Sequence[int],
+    group: StreamGroup, statistics: EmissionStatistics, floors: Sequence[Single], least: float, streams: Sequence[int]
 ) -> StreamGroup:
     """Return the group with the mixtures that maximise the expected log likelihood (M-step).
 

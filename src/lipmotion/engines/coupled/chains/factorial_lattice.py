@@ -27,10 +27,7 @@ VISIBLE_FRAMES = 10
 
 @dataclass(frozen=True, eq=False)
 class FactorialProduct:
-    """Two chains, each of which may be in any of its states; joint state = first chain's state · N_1 + second's.
-
-    grammar : each chain has its own
-    """
+    """Two chains, each of which may be in any of its states; joint state = first chain's state · N_1 + second's."""
 
     structure: Structure
     grammar: Grammar
@@ -65,9 +62,8 @@ class FactorialTransitions:
         return 2 * sum(self.product.structure.state_counts)
 
     def reestimated(self, counts: Array) -> FactorialTransitions:
-        """Return the transitions with the most likely probabilities (M-step); states without data keep theirs.
-
-        counts : how often each state is expected to be left and to be kept [shape=(statistic_count,)]
+        """Return the transitions of an M-step, from counts of leaving and keeping [shape=(statistic_count,)]; unseen
+        states stay.
         """
         edges = np.cumsum([0, *np.repeat(self.product.structure.state_counts, 2)])
         parts = [counts[a:b] for a, b in pairwise(edges.tolist())]
@@ -191,9 +187,15 @@ def factorial_lattice(
         for units, allowed in zip(structure.units, (allowed_units, visible_units), strict=True)
     )
     states = _kernel_states(first, structure.states), _kernel_states(second, structure.states)
-    own_density_positions = _positions_of(transitions.own_density_states, states, structure)
+    columns = []
+    for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
+        position = np.full(count, -1)
+        position[own] = np.arange(len(own))
+        columns.append(position[transitions.own_density_states[:, chain]])
+    own_density_positions = np.stack(columns, axis=1)
     inside = np.flatnonzero((own_density_positions >= 0).all(axis=1))
-    densities = _needed_densities(len(ties), states, inside, structure)
+    chains = [min(number, 1) for number in range(len(ties))]
+    densities = tuple(np.concatenate([states[chain], structure.state_counts[chain] + inside]) for chain in chains)
     return FactorialLattice(
         transition_index=_transition_index(states, structure),
         densities=densities,
@@ -209,10 +211,7 @@ def factorial_lattice(
 
 
 def _visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the units of the second chain that each frame may belong to [shape=(T, V)].
-
-    These correspond to the units of the first chain [shape=(T, U)] that are allowed within 100 ms.
-    """
+    """Return the units of the second chain that correspond to those allowed within 100 ms [shape=(T, V)]."""
     padded = np.pad(allowed_units.astype(np.intp), ((VISIBLE_FRAMES + 1, VISIBLE_FRAMES), (0, 0)))
     total = np.cumsum(padded, axis=0)
     near = (total[2 * VISIBLE_FRAMES + 1 :] - total[: -2 * VISIBLE_FRAMES - 1]) > 0
@@ -226,37 +225,12 @@ def _kernel_states(units: Index, states: int) -> Index:
     return np.concatenate([units * states + state for state in range(states)])
 
 
-def _positions_of(joint_states: Index, states: tuple[Index, Index], structure: Structure) -> Index:
-    """Return where the chains' states in joint states [shape=(P, 2)] stand among ``states`` [shape=(P, 2)]; -1: absent.
-
-    states : of each chain [each shape=(N'_c,)]
-    """
-    columns = []
-    for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
-        position = np.full(count, -1)
-        position[own] = np.arange(len(own))
-        columns.append(position[joint_states[:, chain]])
-    return np.stack(columns, axis=1)
-
-
 def _transition_index(states: tuple[Index, Index], structure: Structure) -> Index:
-    """Return the positions of the transition statistics of ``states`` among those of all states."""
     index, start = [], 0
     for own, count in zip(states, structure.state_counts, strict=True):
         index += [start + own, start + count + own]
         start += 2 * count
     return np.concatenate(index)
-
-
-def _needed_densities(
-    groups: int, states: tuple[Index, Index], inside: Index, structure: Structure
-) -> tuple[Index, ...]:
-    """Return, for each stream group, the densities of its chain's ``states``, then those of joint states.
-
-    inside : the joint states of the lattice with densities of their own, by number [shape=(P',)]
-    """
-    chains = [min(number, 1) for number in range(groups)]
-    return tuple(np.concatenate([states[chain], structure.state_counts[chain] + inside]) for chain in chains)
 
 
 def _within(densities: Index, tie: Index) -> Index:

@@ -34,37 +34,25 @@ class Lattice(ABC):
     allowed_units: NDArray[np.bool_] | None
 
     def masked(self, logs: Sequence[Single]) -> tuple[Single, ...]:
-        """Return log densities [each shape=(T, G')], with -inf for units that are not allowed in a frame.
-
-        logs : of each stream group [each shape=(T, G')]
-        """
+        """Return log densities of stream groups [each shape=(T, G')], -inf for units not allowed in a frame."""
         if self.allowed_units is None:
             return tuple(logs)
         return (np.where(self.allowed_units[:, self.density_units], logs[0], np.float32(-np.inf)), *logs[1:])
 
     @abstractmethod
     def posteriors(self, transitions: Any, logs: Sequence[Single]) -> LatticePosteriors:
-        """Return the posteriors of states, by the forward–backward algorithm.
-
-        transitions : of the chains that the lattice belongs to
-        logs        : log densities of each stream group [each shape=(T, G')]
+        """Return the posteriors of states, by forward–backward, from log densities of stream groups [each shape=(T,
+        G')].
         """
 
     @abstractmethod
     def best_path(self, transitions: Any, logs: Sequence[Single]) -> tuple[Index, float]:
-        """Return the most probable path of joint states [shape=(T,)] and its log probability (-inf: there is no path).
-
-        Arguments as in ``posteriors``.
-        """
+        """Return the most probable path of joint states [shape=(T,)] and its log probability (-inf: there is none)."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointPosteriors:
-    """Posteriors of joint states.
-
-    states      : the joint states [shape=(S',)]
-    probability : their posteriors in every frame [shape=(T, S')]
-    """
+    """Joint states [shape=(S',)] and their posteriors in every frame [shape=(T, S')]."""
 
     states: Index
     probability: Single

@@ -9,16 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import (
-    AudioVisualObservations,
-    EmissionEvaluator,
-    Single,
-    StreamGroup,
-)
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, EmissionEvaluator, Single, StreamGroup
 from lipmotion.engines.coupled.chains.factorial_lattice import FactorialTransitions, factorial_lattice
 from lipmotion.engines.coupled.chains.lattice import Index, JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
+from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.engines.coupled.chains.transitions import Transitions
 from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.paths import NetworkArrays, best_path
 
@@ -85,11 +80,7 @@ class NetworkLattice(Lattice):
 def network_lattice(
     transitions: Transitions, ties: Sequence[Index], allowed_units: NDArray[np.bool_] | None
 ) -> NetworkLattice:
-    """Return the lattice of the joint states whose units are allowed in some frame.
-
-    ties          : for each stream group, the density of each joint state [each shape=(S,)]
-    allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
-    """
+    """Return the lattice of joint states whose units are allowed in some frame [shape=(T, U)]; None: all."""
     product = transitions.product
     structure = product.structure
     inside = np.ones(len(product.joint_states), bool)
@@ -127,12 +118,7 @@ def network_lattice(
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Chains of hidden states with their transitions and emission densities.
-
-    streams     : the names of the streams; the first is speech
-    transitions : with the product of the chains
-    groups      : the stream groups; speech is in the first
-    """
+    """Chains of hidden states with transitions and emission densities; the first stream and group are of speech."""
 
     streams: tuple[str, ...]
     transitions: Transitions | FactorialTransitions
@@ -159,10 +145,7 @@ class Chains:
         return self._lattice(None)
 
     def lattice(self, allowed_units: NDArray[np.bool_]) -> Lattice:
-        """Return the lattice of the joint states that an utterance may be in.
-
-        allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]
-        """
+        """Return the lattice of the joint states that an utterance may be in, given allowed units [shape=(T, U)]."""
         return self._lattice(allowed_units)
 
     def _lattice(self, allowed_units: NDArray[np.bool_] | None) -> Lattice:

@@ -124,9 +124,8 @@ class Structure:
 
 
 def unit_sets(names: str) -> tuple[UnitSet, ...]:
-    """Return the unit sets of chains, from names or files with their tables, separated by blanks.
-
-    Raises InputError: no such unit set, or no name.
+    """Return the unit sets named, or read from files, in a text with blanks between. Raises InputError: none, or no
+    such set.
     """
     sets = tuple(load_unit_set(name) for name in names.split())
     if not sets:

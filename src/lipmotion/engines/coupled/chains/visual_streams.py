@@ -61,11 +61,7 @@ def stream_rows(values: Array, dynamic: bool) -> Array:
 def fit_visual_streams(
     space: MotionSpace, values: Sequence[Array], valid: Sequence[NDArray[np.bool_]], dynamic: bool
 ) -> tuple[VisualStream, ...]:
-    """Return the visual streams of some utterances, one for each kind of channel.
-
-    values : motion in the space [each shape=(T, Q)]
-    valid  : the frames from which mean and deviation are computed [each shape=(T,)]
-    """
+    """Return the visual streams of some motion [each shape=(T, Q)], one a kind of channel, scaled on valid frames."""
     units = [space.channels[channel].unit for channel in space.direct]
     other = [unit if unit == GREY else EYE_DISTANCE for unit in units]
     kinds = np.array([*other, *[EYE_DISTANCE] * (space.dimensions - len(units))])

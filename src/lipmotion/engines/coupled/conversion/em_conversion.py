@@ -43,11 +43,7 @@ class ConversionSettings:
 
 @dataclass(frozen=True, eq=False)
 class ConversionResult:
-    """The streams that conversion found.
-
-    streams        : values of every stream, speech first [each shape=(T, D_s)]
-    log_likelihood : joint log likelihood of speech and visual streams per frame, before every step and after the last
-    """
+    """The streams of a conversion, speech first [each shape=(T, D_s)], and the log likelihood per frame by step."""
 
     streams: tuple[Array, ...]
     log_likelihood: tuple[float, ...]
@@ -112,10 +108,7 @@ def precision_statistics(chains: Chains, inference: Inference, stream: int) -> t
 
 
 def path_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
-    """Return the mean of a stream's mixture in every state along a path [shape=(T, D)].
-
-    path : joint states [shape=(T,)]
-    """
+    """Return the mean of a stream's mixture in every state along a path of joint states [shape=(T, D)]."""
     group = chains.groups[group_index(chains, stream)]
     mixtures = group.stream_mixtures(stream)
     means = (np.exp(mixtures.log_weights)[:, :, None] * mixtures.means).sum(axis=1)
@@ -147,10 +140,7 @@ def _updated_streams(chains: Chains, inference: Inference, update: str) -> tuple
 
 
 def _printed_statistics(chains: Chains, inference: Inference, stream: int) -> tuple[Array, Array]:
-    """Return precisions and precision-weighted means of a stream as Eq. 9 sums them [each shape=(T, D)].
-
-    Eq. 9 counts a density once for each joint state that it serves, and the weights of components twice.
-    """
+    """Return precisions and precision-weighted means of a stream as Eq. 9 sums them [each shape=(T, D)]."""
     number = group_index(chains, stream)
     group, densities = chains.groups[number], inference.lattice.densities[number]
     joint_states = np.bincount(inference.lattice.ties[number], minlength=len(densities))
@@ -164,9 +154,8 @@ def _printed_statistics(chains: Chains, inference: Inference, stream: int) -> tu
 def _weighted_precisions(
     group: StreamGroup, stream: int, densities: NDArray[np.intp], weight: Single
 ) -> tuple[Array, Array]:
-    """Return the sums of precisions, and of precisions times means, of a stream [each shape=(T, D)].
-
-    weight : of the components of these densities in every frame [shape=(T, M, G')]
+    """Return the sums of weighted [shape=(T, M, G')] precisions, and of these times means, of a stream [each shape=(T,
+    D)].
     """
     mixtures = group.stream_mixtures(stream).select(densities)
     precision = (1 / mixtures.variances).transpose(1, 0, 2)

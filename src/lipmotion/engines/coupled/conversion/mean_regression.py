@@ -45,7 +45,6 @@ LEAST_FRAMES = 20.0
 class RegressionInputs:
     """The map from acoustic features and posteriors around a frame to F regression inputs.
 
-    acoustic        : the window of acoustic features
     posterior_basis : principal axes of the posteriors of the first chain's N states, as columns [shape=(N, R)], float32
     mean, basis     : of both together [shapes=(F',), (F', F)], float32
     """
@@ -56,10 +55,8 @@ class RegressionInputs:
     basis: Single
 
     def __call__(self, features: Single, posterior: Single) -> Single:
-        """Return the regression inputs of all frames, with a constant as the last [shape=(T, F + 1)].
-
-        features  : [shape=(T, 39)]
-        posterior : of the first chain's states [shape=(T, N)]
+        """Return the regression inputs [shape=(T, F + 1)], constant last, of features [shape=(T, 39)] and posteriors
+        [shape=(T, N)].
         """
         return self._projected(_context(self.acoustic, features, posterior @ self.posterior_basis))
 
@@ -87,10 +84,8 @@ class VisualRegression:
     variances: Single
 
     def means(self, inputs: Single, posterior: Single) -> Array:
-        """Return the expected means of all frames [shape=(T, D)].
-
-        inputs    : from ``RegressionInputs`` [shape=(T, F + 1)]
-        posterior : of the states of the stream's chain [shape=(T, N_v)]
+        """Return the expected means [shape=(T, D)] for regression inputs [shape=(T, F + 1)] and posteriors [shape=(T,
+        N_v)].
         """
         weights = regression_weights(posterior, self.regression_of_state, len(self.coefficients))
         means = np.zeros((len(inputs), self.coefficients.shape[2]))
@@ -105,10 +100,8 @@ class VisualRegression:
 
 
 def regression_weights(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
-    """Return the weight of each regression in each frame [shape=(T, count)]; rows sum to 1, small weights are 0.
-
-    posterior           : of the states of a chain [shape=(T, N)]
-    regression_of_state : the regression of each of these states [shape=(N,)]
+    """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states [shape=(T,
+    N)].
     """
     weight = posterior @ np.eye(count, dtype=np.float32)[regression_of_state]
     weight[weight < LEAST_WEIGHT] = 0
@@ -134,9 +127,8 @@ class RegressionUtterance:
 
 
 def posterior_axes(posteriors: Iterable[Single]) -> Single:
-    """Return the principal axes of posteriors [each shape=(T, N)] as columns [shape=(N, R)].
-
-    Raises CorpusError: no posteriors.
+    """Return the principal axes of posteriors [each shape=(T, N)] as columns [shape=(N, R)]. Raises CorpusError: no
+    posteriors.
     """
     total: Array | None = None
     for posterior in posteriors:
@@ -148,10 +140,7 @@ def posterior_axes(posteriors: Iterable[Single]) -> Single:
 
 
 def fit_regression_inputs(posterior_basis: Single, utterances: Sequence[RegressionUtterance]) -> RegressionInputs:
-    """Return regression inputs along the principal axes of some utterances.
-
-    posterior_basis : from ``posterior_axes`` [shape=(N, R)]
-    """
+    """Return regression inputs along the principal axes of some utterances, with the basis of ``posterior_axes``."""
     acoustic = fit_acoustic_context((utterance.features for utterance in utterances), ACOUSTIC_AXES)
     count, total, products = 0, np.zeros(0), np.zeros(0)
     for utterance in utterances:
@@ -175,7 +164,6 @@ def fit_visual_regression(
 ) -> VisualRegression:
     """Return the regressions of the means of a visual stream, by ridge regression towards those of their families.
 
-    stream              : the number of the visual stream
     regression_of_state : the regression of each state of its chain [shape=(N_v,)]
     family              : the family of each regression [shape=(E,)]; that of a family has a ridge towards that of all
     """
@@ -239,10 +227,7 @@ def _context(acoustic: AcousticContext, features: Single, reduced_posteriors: Si
 
 
 def _smoothed(values: Single, reach: int) -> Single:
-    """Return a moving average with a cosine window of 2·reach + 1 frames [shape as ``values``].
-
-    Before the first frame and after the last, these frames are repeated.
-    """
+    """Return a moving average with a cosine window of 2·reach + 1 frames; frames beyond the edges repeat them."""
     window = np.hanning(2 * reach + 3)[1:-1]
     window = (window / window.sum()).astype(np.float32)
     padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")

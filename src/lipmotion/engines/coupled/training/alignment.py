@@ -33,10 +33,7 @@ class AlignedUtterance:
 
 
 def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
-    """Return the units of the first chain that each frame may belong to [shape=(T, U)]: those labelled near it.
-
-    Frames without a label may be silence.
-    """
+    """Return the units that each frame may belong to [shape=(T, U)]: labelled near it; without a label, silence."""
     names, first = structure.units[0], structure.chains[0]
     allowed = np.zeros((frames, len(names)), bool)
     slack = round(SLACK_S * FRAME_RATE_HZ)

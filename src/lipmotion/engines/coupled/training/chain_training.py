@@ -1,17 +1,21 @@
-"""EM training of coupled chains from speech with motion, with more and more Gaussians."""
+"""EM training of coupled chains, from Viterbi training on, with more and more Gaussians."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import Single
+from lipmotion.engines.coupled.chains.densities import Single, StreamGroup, zero_emission_statistics
+from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.chains.product import Transitions, initial_transitions, reachable
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance, estimated_grammar, uniform_path
 from lipmotion.engines.coupled.training.em_steps import (
     ChainStatistics,
     LatticeUtterance,
@@ -20,9 +24,181 @@ from lipmotion.engines.coupled.training.em_steps import (
     m_step,
     variance_floors,
 )
-from lipmotion.engines.coupled.training.initialisation import initial_chains
 from lipmotion.stats.em import EmResult, run_em
 from lipmotion.stats.mixture import Mixtures
+from lipmotion.units import find_similar_phone
+
+LEAST_FRAMES = 10
+"""A joint state with at least so many frames in training has densities of its own."""
+
+
+def with_joint_state_densities(
+    chains: Chains, transitions: Transitions, visits: NDArray[Any], structure: Structure
+) -> Chains:
+    """Return two chains whose frequent joint states have emission densities of their own.
+
+    transitions : of the chains, with a limit of asynchrony
+    visits      : frames spent in each joint state [shape=(S,)]
+    structure   : of the returned chains: that of ``chains``, or the same without a limit of asynchrony
+    """
+    product = transitions.product
+    frequent = np.unique(product.chain_states[:, visits >= LEAST_FRAMES].T, axis=0)
+    new_transitions: Transitions | FactorialTransitions = transitions
+    chain_states = product.chain_states
+    if structure.limit is None:
+        new_transitions = _unlimited(transitions, structure, frequent)
+        chain_states = new_transitions.product.chain_states
+    number = np.full(structure.state_counts, -1)
+    number[tuple(frequent.T)] = np.arange(len(frequent))
+    frequent_number = number[chain_states[0], chain_states[1]]
+    groups = []
+    for group in chains.groups:
+        chain = structure.chain_of(group.streams[0])
+        mixtures = group.mixtures.concatenate(group.mixtures.select(frequent[:, chain]))
+        tie = np.where(frequent_number >= 0, structure.state_counts[chain] + frequent_number, chain_states[chain])
+        groups.append(replace(group, mixtures=mixtures, tie=tie))
+    return Chains(chains.streams, new_transitions, tuple(groups))
+
+
+def _unlimited(transitions: Transitions, structure: Structure, frequent: NDArray[np.intp]) -> FactorialTransitions:
+    """Return transitions of independent chains, which move on with the mean probability of joint states."""
+    product = transitions.product
+    first, second = (
+        _mean_by_state(product.chain_states[chain], advance[rows], count)
+        for chain, (advance, rows, count) in enumerate(
+            zip(transitions.advance, transitions.rows, structure.state_counts, strict=True)
+        )
+    )
+    return FactorialTransitions(FactorialProduct(structure, product.grammar), (first, second), frequent)
+
+
+def _mean_by_state(states: NDArray[np.intp], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return the mean, for each of ``count`` states, of the values [shape=(S,)] of the joint states that have it."""
+    return np.bincount(states, values, count) / np.maximum(np.bincount(states, minlength=count), 1)
+
+
+Index = NDArray[np.intp]
+VITERBI_STEPS = 2
+
+
+def initial_chains(
+    structure: Structure,
+    streams: tuple[str, ...],
+    data: Sequence[AlignedUtterance],
+    weights: Sequence[float],
+    floors: Sequence[Single],
+) -> Chains:
+    """Return chains with one Gaussian for each density, learned by Viterbi training.
+
+    floors  : the least variance of each stream [each shape=(D_s,)]
+    A structure without a limit of asynchrony has one, ``start_limit``, during the Viterbi training.
+    """
+    limited = (
+        replace(structure, limit=min(structure.start_limit, structure.states - 1))
+        if structure.limit is None
+        else structure
+    )
+    transitions = initial_transitions(reachable(limited, estimated_grammar(limited, data)))
+    chains = _untrained_chains(streams, transitions, data, weights)
+    utterances = [lattice_utterance(chains, utterance) for utterance in data]
+    paths = [uniform_path(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
+    for _ in range(1 + VITERBI_STEPS):
+        chains, transitions = _reestimated_along(chains, transitions, utterances, paths, floors)
+        paths = [_best_path(chains, utterance) for utterance in utterances]
+    visits = np.bincount(np.concatenate(paths), minlength=len(transitions.product.joint_states))
+    if structure.kind == COUPLED:
+        return replace(chains, transitions=transitions.tied(visits))
+    if structure.kind == FACTORIAL and len(structure.chains) == 2:
+        return with_joint_state_densities(chains, transitions, visits, structure)
+    return chains
+
+
+def _untrained_chains(
+    streams: tuple[str, ...], transitions: Transitions, data: Sequence[AlignedUtterance], weights: Sequence[float]
+) -> Chains:
+    """Return chains whose densities are all standard normal."""
+    product, structure, groups = transitions.product, transitions.product.structure, []
+    if structure.kind == HMM:
+        stream_groups = [tuple(range(len(streams)))]
+    else:
+        stream_groups = [(stream,) for stream in range(len(streams))]
+    dimensions = [stream.shape[1] for stream in data[0].observations.streams]
+    for members in stream_groups:
+        edges = np.cumsum([0, *(dimensions[s] for s in members)])
+        chain = structure.chain_of(members[0])
+        shape = (structure.state_counts[chain], 1, int(edges[-1]))
+        groups.append(
+            StreamGroup(
+                members,
+                tuple(slice(a, b) for a, b in pairwise(edges.tolist())),
+                Mixtures(np.zeros(shape[:2], np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32)),
+                tuple(weights[s] for s in members),
+                product.chain_states[chain],
+            )
+        )
+    return Chains(streams, transitions, tuple(groups))
+
+
+def _reestimated_along(
+    chains: Chains,
+    transitions: Transitions,
+    utterances: Sequence[LatticeUtterance],
+    paths: Sequence[Index],
+    floors: Sequence[Single],
+) -> tuple[Chains, Transitions]:
+    """Return the chains, and their transitions, that are most likely along paths of joint states [each shape=(T,)]."""
+    emission_statistics = []
+    for group in chains.groups:
+        statistics = zero_emission_statistics(group)
+        for utterance, path in zip(utterances, paths, strict=True):
+            densities, column = np.unique(group.tie[path], return_inverse=True)
+            posterior = np.eye(len(densities), dtype=np.float32)[column]
+            statistics.accumulate(group, utterance.observations, densities, posterior, None)
+        emission_statistics.append(statistics)
+    count = len(transitions.product.joint_states)
+    keys = transitions.product.arc_to * count + transitions.product.arc_from
+    steps = np.concatenate([path[1:] * count + path[:-1] for path in paths])
+    positions = np.minimum(np.searchsorted(keys, steps), len(keys) - 1)
+    arc_counts = np.bincount(positions[keys[positions] == steps], minlength=len(keys)).astype(float)
+    statistics_of_paths = ChainStatistics(tuple(emission_statistics), arc_counts, 0.0, 1)
+    chains = m_step(chains, statistics_of_paths, floors, streams=range(len(chains.streams)), transitions=False)
+    transitions = transitions.reestimated(arc_counts)
+    structure = chains.structure
+    groups = tuple(
+        _with_borrowed_densities(
+            group, statistics.occupancy.sum(axis=0) > 0, structure, structure.chain_of(group.streams[0])
+        )
+        for group, statistics in zip(chains.groups, emission_statistics, strict=True)
+    )
+    return replace(chains, transitions=transitions, groups=groups), transitions
+
+
+def _with_borrowed_densities(
+    group: StreamGroup, learned: NDArray[np.bool_], structure: Structure, chain: int
+) -> StreamGroup:
+    """Return the group in which states without data have the densities of the most similar unit (``learned``
+    [shape=(G,)]).
+    """
+    units, unit_set = structure.units[chain], structure.chains[chain]
+    source = np.arange(len(learned))
+    for state in np.flatnonzero(~learned):
+        unit, position = divmod(int(state), structure.states)
+        phones = [
+            phone
+            for number, name in enumerate(units)
+            if learned[structure.state(number, position)]
+            for phone in unit_set.phones(name)
+        ]
+        if phones:
+            similar = unit_set.unit(find_similar_phone(unit_set.phones(units[unit])[0], phones))
+            source[state] = structure.state(units.index(similar), position)
+    return replace(group, mixtures=group.mixtures.select(source))
+
+
+def _best_path(chains: Chains, utterance: LatticeUtterance) -> Index:
+    emissions = chains.emission_log_densities(utterance.observations, utterance.lattice)
+    return chains.best_path(emissions, utterance.lattice)[0]
+
 
 FRAMES_A_GAUSSIAN = 25.0
 """A density is split if it has so many frames for each Gaussian that it would have."""
@@ -32,11 +208,7 @@ CONVERGENCE_GAIN = 0.02
 
 @dataclass(frozen=True)
 class TrainingStep:
-    """One step of EM.
-
-    mixtures       : Gaussians per density of each stream group
-    log_likelihood : mean log likelihood per frame before the step
-    """
+    """One step of EM, with the mean log likelihood per frame before it."""
 
     mixtures: tuple[int, ...]
     log_likelihood: float
@@ -54,7 +226,6 @@ class MixtureSchedule:
     """How many Gaussians densities get, and how many steps of EM.
 
     mixtures   : Gaussians per density of each stream group in the end, powers of two
-    weights    : exponents of the streams
     most_steps : greatest number of EM steps between one splitting and the next
     """
 
@@ -99,12 +270,7 @@ def train_to_convergence(
     *,
     speech_only: bool = False,
 ) -> EmResult[Chains, ChainStatistics]:
-    """Return the result of EM with a fixed number of components.
-
-    floors      : the least variance of each stream [each shape=(D_s,)]
-    most_steps  : greatest number of steps; fewer if the likelihood stops rising
-    speech_only : re-estimate the densities of speech, and keep all else
-    """
+    """Return the result of EM with a fixed number of components; ``speech_only``: only densities of speech change."""
     streams = range(1 if speech_only else len(chains.streams))
     return run_em(
         chains,

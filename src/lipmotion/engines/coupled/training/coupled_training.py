@@ -67,7 +67,6 @@ class SpeechOnlySchedule:
     """How many Gaussians the densities of speech get in the second stage, and how many steps of EM.
 
     mixtures   : Gaussians per density of speech in the end, a power of two; never fewer than before
-    most_steps : greatest number of EM steps between one splitting and the next
     weight     : of a frame of the other speakers, relative to a frame of the first stage
     """
 
@@ -133,9 +132,8 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
 def growing_models(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
 ) -> Iterator[Callable[[], Fit[CoupledModel]]]:
-    """Yield functions that return the models with 1, 2, 4, … Gaussians that ``fit_coupled`` passes through.
-
-    The last function returns what ``fit_coupled`` does. Raises as ``fit_coupled``.
+    """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``. Raises as
+    that.
     """
     structure = config.structure_with(unit_sets(config.chains))
     moving = [example for example in examples if mark_known_dynamics(example.valid).any()]
@@ -161,7 +159,12 @@ def growing_models(
         chains = grown.model
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
-            chains = _second_stage(chains, data, speech_only, config, second_monitor)
+            schedule = SpeechOnlySchedule(
+                config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight
+            )
+            most_steps = schedule.most_steps * max(schedule.mixtures // config.mixtures, 1).bit_length()
+            report = _reporter("more speech", most_steps, second_monitor)
+            chains = train_on_speech(chains, data, speech_only, schedule, report, workers())
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
@@ -199,11 +202,7 @@ def frames_away_from_speech(units: Timeline[Unit], frames: int) -> NDArray[np.bo
 def _observations(
     example: Example, values: Array, valid: NDArray[np.bool_], visual: Sequence[VisualStream]
 ) -> AudioVisualObservations:
-    """Return the speech of an example with its visual streams.
-
-    values : motion in the space [shape=(T, Q)]
-    valid  : the frames in which it was observed [shape=(T,)]
-    """
+    """Return the speech of an example with its visual streams, from motion in the space [shape=(T, Q)]."""
     streams = (_features(example), *(stream.standardised(values) for stream in visual))
     return AudioVisualObservations(streams, (None, *(valid for _ in visual)))
 
@@ -221,25 +220,8 @@ def _schedule(structure: Structure, visual: Sequence[VisualStream], config: Coup
     )
 
 
-def _second_stage(
-    chains: Chains,
-    data: Sequence[AlignedUtterance],
-    speech_only: Sequence[AlignedUtterance],
-    config: CoupledConfig,
-    monitor: Monitor,
-) -> Chains:
-    """Return the chains after the second stage of training, on speech without motion as well."""
-    schedule = SpeechOnlySchedule(config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight)
-    most_steps = schedule.most_steps * max(schedule.mixtures // config.mixtures, 1).bit_length()
-    report = _reporter("more speech", most_steps, monitor)
-    return train_on_speech(chains, data, speech_only, schedule, report, workers())
-
-
 def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[TrainingStep], None]:
-    """Return a function that reports the steps of a stage of training to the monitor.
-
-    most_steps : how many steps there will be at most; the stage may end earlier
-    """
+    """Return a function that reports the steps of a stage of training, ``most_steps`` at most, to the monitor."""
     numbers = itertools.count(1)
 
     def report(step: TrainingStep) -> None:
@@ -250,11 +232,7 @@ def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[Traini
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
-    """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)].
-
-    values : motion in the space [each shape=(T, Q)]
-    valid  : the frames in which it was observed [each shape=(T,)]
-    """
+    """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)]."""
     silent_poses = [
         x[mask & frames_away_from_speech(example.speech.units, len(x))]
         for example, x, mask in zip(examples, values, valid, strict=True)
@@ -301,10 +279,7 @@ def _chain_posteriors(
 
 
 def _state_regressions(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the regression of each state of a chain [shape=(N,)], and the viseme of each regression [shape=(E,)].
-
-    There is one regression for each viseme and each position of a state within its unit.
-    """
+    """Return the regression of each state of a chain [shape=(N,)], and the viseme of each regression [shape=(E,)]."""
     visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
     numbers = np.unique(visemes, return_inverse=True)[1]
     family = np.repeat(np.arange(numbers.max() + 1), structure.states)
@@ -324,6 +299,5 @@ def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Ar
 
 
 def _threaded(function: Callable[[AlignedUtterance], ResultT], data: Sequence[AlignedUtterance]) -> Iterator[ResultT]:
-    """Yield the results in the order of the data."""
     with ThreadPoolExecutor(workers()) as pool:
         yield from pool.map(function, data)

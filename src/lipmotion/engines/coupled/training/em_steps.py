@@ -32,10 +32,7 @@ FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
 
 @dataclass(frozen=True, eq=False)
 class LatticeUtterance:
-    """The observations of an utterance, and the joint states that it may be in.
-
-    weight : how often the utterance counts
-    """
+    """The observations of an utterance, the joint states that it may be in, and how often it counts."""
 
     observations: AudioVisualObservations
     lattice: Lattice
@@ -43,10 +40,7 @@ class LatticeUtterance:
 
 
 def lattice_utterance(chains: Chains, utterance: AlignedUtterance, weight: float = 1.0) -> LatticeUtterance:
-    """Return an utterance with the joint states that its phone labels allow.
-
-    weight : how often the utterance counts
-    """
+    """Return an utterance, which counts ``weight`` times, with the joint states that its phone labels allow."""
     allowed = allowed_units(chains.structure, utterance.phones, utterance.observations.frames)
     return LatticeUtterance(utterance.observations, chains.lattice(allowed), weight)
 
@@ -55,7 +49,6 @@ def lattice_utterance(chains: Chains, utterance: AlignedUtterance, weight: float
 class ChainStatistics:
     """Sufficient statistics of chains, accumulated over utterances by their weights.
 
-    emissions         : of each stream group
     transition_counts : of the transitions [shape=(C,)]
     log_likelihood, frames : of the utterances that have a path through the chains
     """
@@ -81,11 +74,7 @@ class ChainStatistics:
 
 
 def e_step(chains: Chains, utterances: Sequence[LatticeUtterance], workers: int = 1) -> ChainStatistics:
-    """Return the sufficient statistics of utterances under the chains.
-
-    workers : number of threads; the result does not depend on it
-    Raises InputError: no utterance has a path through the chains.
-    """
+    """Return the sufficient statistics of utterances, whatever the workers. Raises InputError: none has a path."""
     starts = range(0, len(utterances), BATCH)
     jobs = ((chains, utterances[start : start + BATCH]) for start in starts)
     total: ChainStatistics | None = None
@@ -104,12 +93,7 @@ def m_step(
     streams: Sequence[int],
     transitions: bool = True,
 ) -> Chains:
-    """Return the chains that maximise the expected log likelihood.
-
-    floors      : the least variance of each stream [each shape=(D_s,)]
-    streams     : the streams whose densities are re-estimated
-    transitions : whether transitions are re-estimated
-    """
+    """Return the chains that maximise the expected log likelihood, with variances of ``floors`` at least."""
     groups = [
         reestimated_group(group, own, [floors[s] for s in group.streams], LEAST_FRAMES, streams)
         if set(group.streams) & set(streams)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.decode import UnitLoop
-from lipmotion.hmm.log_likelihoods import LogLikelihoods, penalise_silence, wrap_log_likelihoods
 from lipmotion.hmm.model import UnitHmm
+from lipmotion.hmm.network import LogLikelihoods, penalise_silence, wrap_log_likelihoods
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
