@@ -25,12 +25,12 @@ from scipy.signal import butter, fftconvolve, sosfilt
 from scipy.stats import spearmanr
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.corpora.layouts import spell_name
+from lipmotion.corpora.folder import spell_name
 from lipmotion.motion.articulation import read_articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio, Channel, Motion, Track
 from lipmotion_faces.tracking.track import track
 

@@ -33,13 +33,13 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion import animate, load_model
-from lipmotion.corpora.layouts import spell_name
+from lipmotion.corpora.folder import spell_name
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_recogniser
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, split_words
 from lipmotion.units.phones import count_phone_edits

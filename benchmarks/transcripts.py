@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from robust import SPOKEN
 
 import lipmotion
-from lipmotion.corpora.layouts import spell_name
+from lipmotion.corpora.folder import spell_name
 from lipmotion.errors import AlignmentError
 from lipmotion.formats.label_files import read_transcript
 from lipmotion.pipeline.analysis.speech_analysis import analyse_speech

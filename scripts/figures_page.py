@@ -2,11 +2,16 @@
 
 A sheet is one JSON file: ``page``, the page that it belongs to; ``tables`` by name, each with ``columns``, ``rows`` and
 its stamp; ``stated``, what the text of that page says in figures beside the tables. The stamp of that is the table
-``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
-``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A page shows the model, and
-the command as long as there is its benchmark. A model is ``shipped`` and the first digits of the SHA-256 of its file;
-an engine and the digest of its default options; ``none``, where no model takes part; or words. Of several models,
-``in row`` or ``in rows`` says which rows one made. A table without columns and stamp need not stand in a page.
+``text``, which has no columns. A stamp is ``commit`` and ``date``, where the table was made; ``model``, what made it;
+and ``command``. A page shows the model, and the command as long as there is its benchmark. A model is ``shipped`` and
+the first digits of the SHA-256 of its file; an engine and the digest of its default options; ``none``, where no model
+takes part; or words. Of several models, ``in row`` or ``in rows`` says which rows one made. A table without columns and
+stamp need not stand in a page.
+
+What an experiment stored in ``docs/results`` is not copied into a sheet. In a table with ``from``, the name of such a
+file (or several, by a name each), every cell may have ``{path[to][value]:format}``. ``cells`` are those of the last
+columns; then a row ends with keys instead, which stand for ``@0``, ``@1`` there: a cell of an empty key is empty.
+``where`` has short names of paths. ``computed`` of a sheet has such texts, by file, on what the page says.
 
 In a page a table stands between ``<!--figures:SHEET.TABLE-->`` and ``<!--end-->``. Run
 ``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.
@@ -26,6 +31,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 SHEETS, OVERVIEW, SHIPPED = DOCS / "results" / "figures", DOCS / "results" / "figures.md", "grid-s1.lipmotion"
 REGION = re.compile(r"(<!--figures:([\w-]+)\.([\w-]+)-->\n).*?(<!--end-->)", re.DOTALL)
+PLACE = re.compile(r"{(\w+)((?:\[.*?\])*):?([^}]*)}")
 UNITS = "%|ms|MB|GB|kB|dB|s|frames a second|times as fast"
 FIGURE = re.compile(rf"(?<![\w.,])\d[\d,]*(?:\.\d+(?![\w]|\.\d)|(?= (?:{UNITS})(?!\w)))")
 EXACT = re.compile(r"(?<![\w.,])0\.\d{3}(?!\d)")
@@ -34,9 +40,67 @@ EXACT = re.compile(r"(?<![\w.,])0\.\d{3}(?!\d)")
 Sheet = Mapping[str, Any]
 
 
+def as_shown(value: Any, form: str) -> str:
+    """Return a stored value in a format of Python; ``*`` marks an interval without 0, and nothing stored is a dash."""
+    if value is None:
+        return "–"
+    if form == "*":
+        from lipmotion_lab.evaluation.evaluate import significance_mark
+
+        return significance_mark(value)
+    if isinstance(value, list):
+        return (" to " if form.startswith("+") else "–").join(as_shown(each, form) for each in value)
+    text = format(value, form)
+    return text if isinstance(value, str) else text.replace("-", "−").replace("%", " %")
+
+
+def formatted(form: str, stored: Mapping[str, Any]) -> str:
+    """Return a text with stored values in place of ``{path[to][value]:format}``. Raises KeyError: nothing is there."""
+
+    def value_at(match: re.Match[str]) -> str:
+        value = stored[match[1]]
+        for part in re.findall(r"\[(.*?)\]", match[2]):
+            value = value[int(part) if isinstance(value, list) else part]
+        return as_shown(value, match[3])
+
+    return PLACE.sub(value_at, form)
+
+
+def filled(table: Sheet, stored: Mapping[str, Any]) -> Sheet:
+    """Return a table with the columns and rows that its formats make of what is stored. Raises KeyError: not there."""
+    where, cells = table.get("where", {}), table.get("cells", [])
+    typed = len(table["columns"]) - len(cells)
+
+    def cell(form: str, *keys: str) -> str:
+        form = re.sub(r"{(\w+)", lambda match: "{" + where.get(match[1], match[1]), form)
+        for number, key in enumerate(keys):
+            if not key and f"@{number}" in form:
+                return ""
+            form = form.replace(f"@{number}", key)
+        return formatted(form, stored)
+
+    rows = [[*map(cell, row[:typed]), *(cell(form, *row[typed:]) for form in cells)] for row in table["rows"]]
+    return {**table, "columns": [*map(cell, table["columns"])], "rows": rows}
+
+
+def stored_in(source: str | Mapping[str, str]) -> Any:
+    """Return what an experiment stored in a file in ``docs/results``; of several files by the names given."""
+    if isinstance(source, str):
+        return json.loads((DOCS / "results" / source).read_text(encoding="utf-8"))
+    return {name: stored_in(file) for name, file in source.items()}
+
+
 def sheets() -> dict[str, Sheet]:
-    """Return all sheets by name."""
-    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in sorted(SHEETS.glob("*.json"))}
+    """Return all sheets by name, with what their formats make of stored figures."""
+    found = {}
+    for path in sorted(SHEETS.glob("*.json")):
+        sheet = json.loads(path.read_text(encoding="utf-8"))
+        for name, table in sheet["tables"].items():
+            sheet["tables"][name] = filled(table, stored_in(table["from"])) if "from" in table else table
+        for file, forms in sheet.get("computed", {}).items():
+            sheet["stated"] += [formatted(form, stored_in(file)) for form in forms]
+        found[path.stem] = sheet
+    return found
 
 
 def current_models() -> frozenset[str]:

@@ -16,7 +16,7 @@ import numpy as np
 
 import lipmotion
 from lipmotion.motion.space import resample_to_model
-from lipmotion.speech.features.lip_speed import (
+from lipmotion.speech.sound.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     WEIGHTS,

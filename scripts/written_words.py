@@ -14,8 +14,8 @@ from pathlib import Path
 
 from hama.inference import G2PModel
 
-from lipmotion.speech.recognition.network.hama import Hama
-from lipmotion.speech.recognition.network.word_tree import english_words
+from lipmotion.speech.recognition.network.beam_search import english_words
+from lipmotion.speech.recognition.network.posteriors import Hama
 from lipmotion.units import Lexicon
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import FULL_FORMS

@@ -24,7 +24,7 @@ from lipmotion import Corpus, Model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
-from lipmotion.speech.recognition.network.hama import Hama
+from lipmotion.speech.recognition.network.posteriors import Hama
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion_faces.filmed.face import FilmedFace, save_face
 from testing.toy_face import toy_face

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.cli.terminal.status import outcome
+from lipmotion.cli.terminal.progress import outcome
 from lipmotion.corpora.folder import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.model import Model, load_model, save_model, with_person
     from lipmotion.pipeline.outputs.cues import cues, write_cues
-    from lipmotion.pipeline.outputs.write import write
+    from lipmotion.pipeline.outputs.output import write
     from lipmotion.pipeline.request import Outputs, Request
     from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.train import Run, adapt, train
@@ -112,7 +112,7 @@ _HOMES = {
     "state_runs": "lipmotion.pipeline.generate.explain",
     "train": "lipmotion.pipeline.training.train",
     "with_person": "lipmotion.pipeline.model",
-    "write": "lipmotion.pipeline.outputs.write",
+    "write": "lipmotion.pipeline.outputs.output",
     "write_cues": "lipmotion.pipeline.outputs.cues",
 }
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.fitting.eyes_and_brows import stage_liveliness as stage_liveliness  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion.types.staging import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.staging import SMALLEST_PX as SMALLEST_PX  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.staging import TRANSPARENT as TRANSPARENT  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.staging import Staging as Staging  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.delivery import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.delivery import SMALLEST_PX as SMALLEST_PX  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.delivery import TRANSPARENT as TRANSPARENT  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.delivery import Staging as Staging  # noqa: PLC0414 (part of this module's interface)
 
 PoseT = TypeVar("PoseT")
 Picture = NDArray[np.uint8]

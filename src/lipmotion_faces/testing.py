@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import atomic_file, make_folder
-from lipmotion.testing.contract import require, require_error
+from lipmotion.testing.check_engine import require, require_error
 from lipmotion.testing.examples import example
 from lipmotion.testing.toy import CAMERA_HZ, MOTION_HZ, toy_motion, toy_sentences
 from lipmotion.types import Timeline, Unit

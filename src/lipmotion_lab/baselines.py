@@ -16,7 +16,7 @@ from lipmotion.extensions import install_command
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.stats.trees import ridge, zero_statistics
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Constraints,

@@ -17,7 +17,7 @@ from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold, closure_figures
 from lipmotion.measures.curves import modulation_distance_db
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
-from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
 from lipmotion_faces.tracking.track import track

@@ -20,7 +20,7 @@ from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS, Lexicon

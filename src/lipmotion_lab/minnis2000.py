@@ -28,7 +28,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine

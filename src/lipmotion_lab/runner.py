@@ -27,10 +27,10 @@ from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
-from lipmotion.pipeline.training.fingerprint import digest_corpus, fingerprint_training
+from lipmotion.pipeline.training.labels import digest_corpus, fingerprint_training
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.files import make_folder
 from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon

@@ -22,7 +22,7 @@ from uuid import uuid4
 from lipmotion.errors import ExportError, InputError, LipMotionError
 from lipmotion.pipeline.batch.lines import is_recording, read_lines
 from lipmotion.pipeline.edit_files import EditFile, check_sound, read_edits, write_edits
-from lipmotion.speech.voices.pronunciations import LanguageLexicon
+from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.storage.files import (
     atomic_file,
     create_folders,

@@ -15,7 +15,7 @@ from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
 from lipmotion.storage.files import temporary_folder
 from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
-from lipmotion.types.moods import MOODS, MoodKey
+from lipmotion.types.delivery import MOODS, MoodKey
 from lipmotion_faces.filmed.face import SUFFIX
 from lipmotion_faces.mesh import MeshFace
 from lipmotion_faces.outputs.scenes import KEPT, head_scene, write_scene

@@ -286,9 +286,7 @@ def _choose_channels(motion: Motion, names: list[str]) -> Motion:
     for name in names:
         if name not in motion.names:
             raise InputError(f"names: there is no {shorten(repr(name))}, required some of: {', '.join(motion.names)}")
-    columns = list(map(motion.column, names))
-    channels = tuple(motion.channels[column] for column in columns)
-    return replace(motion, values=motion.values[:, columns], channels=channels)
+    return motion.selected(names)
 
 
 def _numbers_reply(motion: Motion, first: int, more: dict[str, str]) -> Response:

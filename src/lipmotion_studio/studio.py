@@ -24,9 +24,7 @@ from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
 from lipmotion.storage.files import create_folders, sha256_of, temporary_folder
 from lipmotion.types.configuration import ANY, kind_of
-from lipmotion.types.delivery import Delivery
-from lipmotion.types.moods import MANNERS, MOODS
-from lipmotion.types.staging import Staging
+from lipmotion.types.delivery import MANNERS, MOODS, Delivery, Staging
 from lipmotion.units import PHONES, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound

@@ -33,7 +33,7 @@ FORBIDDEN = [
     (DOWN, "lipmotion/speech/sound/audio_files.py", "def late():\n    from lipmotion.cli import main"),
     (DOWN, "lipmotion/pipeline/training/train.py", "from lipmotion.testing import toy"),
     (ROOMS, "lipmotion/pipeline/model.py", "def late():\n    from lipmotion.pipeline import session"),
-    (CIRCLES, "lipmotion/pipeline/outputs/output.py", "def late():\n    from lipmotion.pipeline.outputs import write"),
+    (CIRCLES, "lipmotion/pipeline/outputs/output.py", "def late():\n    from lipmotion.pipeline.outputs import cues"),
     (ENGINES, "lipmotion/engines/trajectory/model.py", "from lipmotion.engines.joint import engine"),
     (ENGINES, "lipmotion/engines/base.py", "from lipmotion.engines import registry"),
     (FACES, "lipmotion_faces/portrait/mouth_painting.py", "from lipmotion_faces import registry"),

@@ -13,7 +13,7 @@ from lipmotion.articulation.expression import (
 from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
 from lipmotion.types import Channel, Motion, Prosody
-from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, parse_moods
+from lipmotion.types.delivery import MOODS, NEUTRAL, MoodKey, parse_moods
 from meshes.speech import motion, units
 
 ACTION_UNITS = {1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 20, 23, 24, 25, 26, 43, 53, 54, 55, 56, 57, 58, 64}

@@ -5,7 +5,7 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.pipeline.outputs.deliver import FACTORS, with_detected, with_manners
 from lipmotion.types import Generation, StateTrace, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
-from lipmotion.types.moods import MANNERS, PLAIN, format_moods, parse_moods
+from lipmotion.types.delivery import MANNERS, PLAIN, format_moods, parse_moods
 from meshes.speech import motion, units
 
 

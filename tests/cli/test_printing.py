@@ -24,8 +24,7 @@ from lipmotion import Corpus
 from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
-from lipmotion.cli.terminal.progress import report_progress
-from lipmotion.cli.terminal.status import outcome
+from lipmotion.cli.terminal.progress import outcome, report_progress
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.cli.verbs import info
 from lipmotion.errors import InputError

@@ -14,7 +14,7 @@ from cli.conftest import RunCommand, is_one_error
 from lipmotion import read_motion
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.scene import Scene
-from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion_faces.outputs.scenes import write_scene
 from meshes.heads import head
@@ -105,7 +105,7 @@ def test_what_cannot_be_drawn(run: RunCommand, motion_file: Path, here: Path) ->
 
 
 def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lipmotion.pipeline.outputs.motion_input.LONGEST_S", 4.0)
+    monkeypatch.setattr("lipmotion.pipeline.outputs.motion_files.LONGEST_S", 4.0)
     (here / "long.csv").write_text("time_s,opening\n0,0.1\n1,0\n2,0\n3,0\n4,0\n5,0\n")
     with pytest.raises(InputError, match="lasts 5 s, required at most 4; cut it"):
         read_generation(here / "long.csv")

@@ -126,7 +126,7 @@ def test_events_go_to_standard_error_beside_motion(
     run: RunCommand, toy_model_file: Path, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept = io.BytesIO()
-    monkeypatch.setattr("lipmotion.cli.arguments.pipes.write_bytes", lambda path: kept.write(path.read_bytes()))
+    monkeypatch.setattr("lipmotion.cli.arguments.paths.write_bytes", lambda path: kept.write(path.read_bytes()))
     done = run("animate", toy_speech, "--model", toy_model_file, "-o", "-", "--machine-readable")
     assert (done.code, done.out) == (0, [])
     assert [json.loads(line)["type"] for line in done.err][0 :: len(done.err) - 1] == ["start", "success"]

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.facegood import read_bare_motion, read_channels
+from lipmotion.corpora.captured_faces import read_bare_motion, read_channels
 from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.errors import InputError

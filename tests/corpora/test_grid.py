@@ -2,8 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.folder import discover
-from lipmotion.corpora.layouts import read_aligned_words, read_grid, spell_name
+from lipmotion.corpora.folder import discover, read_aligned_words, read_grid, spell_name
 from lipmotion.errors import InputError
 
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.folder import discover
-from lipmotion.corpora.separate_sounds import add_separate_sounds, read_offsets
+from lipmotion.corpora.source_recordings import add_separate_sounds, read_offsets
 from lipmotion.errors import CorpusError, InputError
 
 

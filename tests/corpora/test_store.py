@@ -8,7 +8,7 @@ import pytest
 
 from children import run_child
 from lipmotion import Corpus
-from lipmotion.corpora.entry import quantise, read_entry
+from lipmotion.corpora.store import quantise, read_entry
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
 

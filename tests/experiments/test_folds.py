@@ -119,13 +119,6 @@ def test_corpora_that_cannot_be(toy_corpus: Corpus, tmp_path: Path) -> None:
         folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
-def test_the_document_shows_the_figures_beside_it() -> None:
-    results = Path(__file__).parents[2] / "docs" / "results"
-    figures = json.loads((results / "folds.json").read_text(encoding="utf-8"))
-    assert f"```text\n{table(figures)}\n```" in (results / "folds.md").read_text(encoding="utf-8")
-    assert (figures["folds"], figures["clips"]) == (5, 452)
-
-
 def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fold with an utterance that has no words lacks a condition, so all folds together lack it."""
     cut: list[tuple[str, ...]] = []

@@ -98,14 +98,3 @@ def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Pa
         hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
         hofer2008(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"))
-
-
-def test_the_document_shows_the_figures_beside_it() -> None:
-    results = Path(__file__).parents[2] / "docs" / "results"
-    figures = json.loads((results / "hofer2008.json").read_text(encoding="utf-8"))
-    page = (results / "hofer2008.md").read_text(encoding="utf-8")
-    shown = page.partition("```text\n")[2].partition("\n```")[0].splitlines()
-    assert len(shown) > 40
-    rest = iter(table(figures).splitlines())
-    assert [line for line in shown if line not in rest] == []  # all of them, in the order of the table
-    assert figures["trained_on"] == 452

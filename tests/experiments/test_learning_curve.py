@@ -14,7 +14,7 @@ from lipmotion import Corpus, Selection, evaluate, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import learning_curve as module
-from lipmotion_lab.learning_curve import SIZES, learning_curve, table
+from lipmotion_lab.learning_curve import learning_curve, table
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -73,13 +73,6 @@ def test_channels_that_are_not_there_are_dashes(toy_corpus: Corpus, tmp_path: Pa
     row = made["rows"][0]["conditions"]["audio only"]
     assert (row["acc_width"], row["acc_outer"]) == (None, None)
     assert table(made).splitlines()[4].split()[-2:] == ["–", "–"]
-
-
-def test_the_document_shows_the_figures_beside_it() -> None:
-    results = Path(__file__).parents[2] / "docs" / "results"
-    figures = json.loads((results / "learning-curve.json").read_text(encoding="utf-8"))
-    assert f"```text\n{table(figures)}\n```" in (results / "learning-curve.md").read_text(encoding="utf-8")
-    assert [row["names"] for row in figures["rows"]] == [4, 10, *SIZES, 452]
 
 
 def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(

@@ -9,7 +9,7 @@ from lipmotion import Corpus, Model, Selection
 from lipmotion.errors import InputError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.noise import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion_lab.evaluation.held_out import LONGEST_S, HeldOutRecordings, add_noise, load_held_out, read_talkers
 
 

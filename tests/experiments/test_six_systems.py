@@ -252,11 +252,3 @@ def test_noise_that_cannot_be_made() -> None:
         NoiseConditions(("pink",))
     with pytest.raises(InputError, match="a babble of 0 talkers; required at least 2"):
         NoiseConditions(("babble",))
-
-
-def test_the_document_shows_the_figures_beside_it() -> None:
-    results = Path(__file__).parents[2] / "docs" / "results"
-    text = (results / "xieliu2007.md").read_text(encoding="utf-8")
-    figures = json.loads((results / "xieliu2007.json").read_text(encoding="utf-8"))
-    assert f"```text\n{table(figures)}\n```" in text
-    assert REFERENCE_SYSTEM + TUNED in figures["rows"][0]["training"]

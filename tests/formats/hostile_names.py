@@ -26,8 +26,7 @@ from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion.meshes.model.scene import Scene
-from lipmotion.pipeline.batch.marks import Mark
-from lipmotion.pipeline.batch.report import _field, _for_page
+from lipmotion.pipeline.batch.report import Mark, _field, _for_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit

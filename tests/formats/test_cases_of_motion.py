@@ -13,7 +13,7 @@ import pytest
 from lipmotion import read_motion
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.shape_names import ARKIT_52
-from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
+from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
 from lipmotion.types import Motion
 
 CASES = Path(__file__).parents[1] / "data" / "cases" / "motion"

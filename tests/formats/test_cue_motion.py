@@ -10,7 +10,7 @@ from lipmotion import CueSheet, read_motion
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.formats.cues import CUE_FORMATS, cue_motion, read_cues, write_cue_file
-from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import Span, Timeline
 from lipmotion.units.visemes import SHAPES
 

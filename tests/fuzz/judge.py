@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fuzz.inputs import Files, Good, ImplausibleError, Reader, lay_out, picked_up
-from lipmotion.cli.terminal.status import outcome
+from lipmotion.cli.terminal.progress import outcome
 
 READ, REFUSED = "read", "refused"
 ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH = "error", "implausible", "left behind", "memory", "hang", "crash"

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from lipmotion.measures.offset import MIN_CLIPS, MIN_SCORE, best_offset, pooled_offset, shift_scores
+from lipmotion.measures.curves import MIN_CLIPS, MIN_SCORE, best_offset, pooled_offset, shift_scores
 
 RATE_HZ = 100.0
 REACH = 40

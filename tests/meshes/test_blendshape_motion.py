@@ -31,7 +31,7 @@ from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion.units import PHONES
 from lipmotion_faces.base import stage_liveliness

@@ -23,7 +23,7 @@ from lipmotion.meshes.model.mesh import (
     bone_kind,
     merge_bones,
 )
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, head, lip_points, shaped, write_glb, write_obj
 from meshes.speech import motion, units

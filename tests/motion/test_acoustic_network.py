@@ -9,7 +9,7 @@ from lipmotion.motion import acoustic_network, network_steps
 from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.network_steps import STEP, interpolate_steps
 from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.testing.examples import example
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example
 

@@ -24,7 +24,7 @@ from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, mak
 from lipmotion.pipeline.outputs.deliver import deliver
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
-from lipmotion.types.moods import MOODS
+from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.stage import figure, head_mesh, lip_gap

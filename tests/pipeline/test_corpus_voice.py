@@ -11,7 +11,7 @@ from lipmotion import Corpus, Model, Selection, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.generate.corpus_voice import REST_S, speak_from_corpus
+from lipmotion.pipeline.generate.speak import REST_S, speak_from_corpus
 from lipmotion.units import Lexicon
 
 SETTINGS = {"joint_recogniser": False, "articulation": False, "conditions": 0}

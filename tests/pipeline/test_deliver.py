@@ -20,7 +20,7 @@ from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.audio import LAUGHTER
-from lipmotion.types.moods import MoodKey
+from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Face, Staging
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.scenes import delivered_scene

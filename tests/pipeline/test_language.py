@@ -16,7 +16,7 @@ from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.request import as_request
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE, LanguageLexicon
+from lipmotion.speech.voices.espeak import MAPPED_CONFIDENCE, LanguageLexicon
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.units import Lexicon

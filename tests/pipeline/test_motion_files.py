@@ -21,12 +21,10 @@ from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_livin
 from lipmotion.meshes.model.mesh import ANGLES as HEAD
 from lipmotion.meshes.model.scene import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
-from lipmotion.pipeline.outputs.calibration import POSES, calibrate_rows, pose_sources
-from lipmotion.pipeline.outputs.curve_sets import make_curves
-from lipmotion.pipeline.outputs.motion_files import fit_to_format, thin_keys
-from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.outputs.curve_sets import POSES, calibrate_rows, make_curves, pose_sources
+from lipmotion.pipeline.outputs.motion_files import fit_to_format, read_generation, thin_keys
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units

@@ -14,8 +14,15 @@ from lipmotion.extensions import Registry
 from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.cues import CueOutput
 from lipmotion.pipeline.outputs.motion_files import MotionOutput
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, create_outputs, plan
-from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput
+from lipmotion.pipeline.outputs.output import (
+    LabelOutput,
+    Output,
+    OutputSettings,
+    Performance,
+    SoundOutput,
+    create_outputs,
+    plan,
+)
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types import Generation
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
-from lipmotion.pipeline.generate.posteriors import (
+from lipmotion.pipeline.generate.explain import (
     COLOURS,
     LEFT_PX,
     MAX_COLUMNS,

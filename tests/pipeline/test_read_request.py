@@ -6,7 +6,7 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.analysis.read_request import read_text_or_file
-from lipmotion.pipeline.analysis.recordings import is_for_several, list_recordings, plan_outputs
+from lipmotion.pipeline.job import is_for_several, list_recordings, plan_outputs
 from lipmotion.types import TimedTranscript
 
 

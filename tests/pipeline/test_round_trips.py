@@ -12,7 +12,7 @@ from lipmotion import Model, animate, cues, read_motion, speak, write
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.outputs.cues import cue_text
-from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.testing.toy import ToySentence

@@ -19,7 +19,7 @@ from lipmotion.meshes.model.scene import Scene, Thinning
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Pin, StateTrace, Timeline
-from lipmotion.types.moods import parse_moods
+from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh

@@ -1,4 +1,4 @@
-"""``pipeline.outputs.write``: one result, several files, all or none."""
+"""``pipeline.outputs.output``: one result, several files, all or none."""
 
 from __future__ import annotations
 

@@ -8,8 +8,7 @@ import pytest
 
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices import installed
-from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
-from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
+from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSentence, Synthesiser, SyntheticVoice
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Span, Timeline
 from lipmotion.units import Lexicon, split_words

@@ -12,11 +12,10 @@ from lipmotion.errors import InputError
 from lipmotion.speech.features import analysed_audio as module
 from lipmotion.speech.features import mfcc as front_end
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc
+from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc, spectrum
 from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS
-from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.agreement import agreement_score
-from lipmotion.speech.recognition.general.front_end import general_features
+from lipmotion.speech.recognition.general import general_features
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.voice_activity import find_passages
 from lipmotion.testing.toy import ToySentence, toy_sentences

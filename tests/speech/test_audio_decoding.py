@@ -12,8 +12,7 @@ from PIL import Image
 
 from children import run_child
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.audio_decoding import _TrackDecoder
-from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import _TrackDecoder, read_audio
 from lipmotion.storage.media import open_media
 from speech.opened import opened_in
 from speech.sounds import babble, late_by, write_constant_flac, write_pictures, write_sound, write_stamped, write_wave

@@ -5,8 +5,7 @@ from scipy.signal import butter, lfilter
 
 from lipmotion.speech.features import f0 as module
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0
-from lipmotion.speech.features.prosody import prosody_of
+from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0, prosody_of
 from lipmotion.testing.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.types import Audio
 from speech import f0_oracle

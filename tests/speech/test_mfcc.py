@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.speech.features import mfcc as module
 from lipmotion.speech.features.f0 import log_f0
-from lipmotion.speech.features.lip_speed import (
+from lipmotion.speech.features.mfcc import ROUNDING_SHARE, mfcc, normalised, regression_delta
+from lipmotion.speech.sound.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     measured_opening_speed,
     predicted_opening_speed,
 )
-from lipmotion.speech.features.mfcc import ROUNDING_SHARE, mfcc, normalised, regression_delta
 from lipmotion.types import Audio, Features
 from speech.mfcc_oracle import features as slow_features
 

@@ -7,12 +7,20 @@ from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
 from lipmotion.errors import InputError
-from lipmotion.speech.features.spectrum import spectrum
-from lipmotion.speech.sound import decimation
-from lipmotion.speech.sound.acoustic_conditions import condition_spectra, in_condition
-from lipmotion.speech.sound.decimation import decimated
-from lipmotion.speech.sound.noise import NOISE_KINDS, add_noise, babble_noise, noisy_audio, spoken_samples, white_noise
+from lipmotion.speech.features.mfcc import spectrum
+from lipmotion.speech.sound import resampling
+from lipmotion.speech.sound.acoustic_conditions import (
+    NOISE_KINDS,
+    add_noise,
+    babble_noise,
+    condition_spectra,
+    in_condition,
+    noisy_audio,
+    spoken_samples,
+    white_noise,
+)
 from lipmotion.speech.sound.overlap_add import REACH_S, overlapped
+from lipmotion.speech.sound.resampling import decimated
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import SPECTRUM_BANDS, Audio
@@ -196,5 +204,5 @@ def test_fewer_samples_are_what_scipy_computes_and_a_sound_at_the_same_rate_stay
 def test_blocks_make_no_difference(length: int, monkeypatch: pytest.MonkeyPatch) -> None:
     sound = np.random.default_rng(7).normal(0, 0.1, length).astype(np.float32)
     whole = decimated(sound, 3)
-    monkeypatch.setattr(decimation, "BLOCK", 50)
+    monkeypatch.setattr(resampling, "KEPT_BLOCK", 50)
     assert decimated(sound, 3) == pytest.approx(whole, abs=1e-7)

@@ -10,13 +10,20 @@ from lipmotion import load_model
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.hmm.network import wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.network import network_search, posteriors
-from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
-from lipmotion.speech.recognition.network.hama import Hama
-from lipmotion.speech.recognition.network.network_search import phones_without_words, spoken_items
+from lipmotion.speech.recognition import word_search
+from lipmotion.speech.recognition.network import posteriors
+from lipmotion.speech.recognition.network.beam_search import (
+    SOUNDS,
+    EnglishWords,
+    LanguageModel,
+    decoded_words,
+    scored,
+    word_tree,
+)
 from lipmotion.speech.recognition.network.posteriors import (
     BLANK,
     WORD_BOUNDARY,
+    Hama,
     PhonePosteriors,
     PhoneRecogniser,
     PosteriorStretch,
@@ -26,8 +33,8 @@ from lipmotion.speech.recognition.network.posteriors import (
     recording_posteriors,
     token_posteriors,
 )
-from lipmotion.speech.recognition.network.word_tree import SOUNDS, EnglishWords, LanguageModel, word_tree
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.recognition.word_search import phones_without_words, spoken_items
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import Audio
@@ -112,7 +119,7 @@ def test_posteriors_draw_phones_that_models_do_not_tell_apart(frames: int) -> No
 
 
 def test_a_sure_word_is_believed_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(network_search, "english_words", lambda: WORDS)
+    monkeypatch.setattr(word_search, "english_words", lambda: WORDS)
     sure, unsure, other = (
         spoken_items(rows)[0].confidence
         for rows in (said("b", "l", "uː"), said("b", "l", "uː", sure=0.6), said("b", "l", "iː", sure=0.52))

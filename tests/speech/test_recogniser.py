@@ -9,12 +9,12 @@ import pytest
 from lipmotion import Model, load_model
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.pipeline.training.train import train_phone_models
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition import combined_phones, word_search
+from lipmotion.speech.recognition import general as general_module
 from lipmotion.speech.recognition import recogniser as module
-from lipmotion.speech.recognition.combined_phones import NOISES, combine_phones, combined_log_likelihoods
-from lipmotion.speech.recognition.general.acoustic import general_model
-from lipmotion.speech.recognition.phone_models import train_phone_models
+from lipmotion.speech.recognition import word_search
+from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.formant_synthesiser import synthesise
@@ -239,7 +239,7 @@ def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model
 def test_evidence_is_the_sum_of_both(
     toy_model: Model, trust: float, kept: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(combined_phones, "KEPT_FRAMES", kept)
+    monkeypatch.setattr(general_module, "KEPT_FRAMES", kept)
     draw = np.random.default_rng(0)
     own, general = draw.normal(size=(2, 9, 39)).astype(np.float32)
     combined = combine_phones(toy_model.phones)

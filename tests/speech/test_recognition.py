@@ -5,13 +5,13 @@ import pytest
 
 from lipmotion.speech.recognition.recognised_speech import (
     SLIVER_FRAMES,
+    AlignedWords,
     LabelledFrames,
     RecognisedWord,
     labels_of_words,
     recognition_of,
     spliced,
 )
-from lipmotion.speech.recognition.word_fit import AlignedWords
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import Span, Timeline, Unit
 

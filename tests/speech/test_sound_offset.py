@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.sound_marks import BEEP, CLAP, sound_marks
-from lipmotion.speech.sound.sound_offset import ALIKE, sound_offset
+from lipmotion.speech.sound.sound_offset import ALIKE, BEEP, CLAP, sound_marks, sound_offset
 from lipmotion.types import Audio
 from speech.recorded_twice import RATE_HZ, beep, clap, recorded_twice, speech_like
 

@@ -12,7 +12,7 @@ from lipmotion.speech.features.speaker_similarity import (
     speaker_vector,
     voice_knowledge,
 )
-from lipmotion.speech.sound.noise import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 

@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import Model, load_model
-from lipmotion.corpora.layouts import spell_name
+from lipmotion.corpora.folder import spell_name
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import transcript_evidence as module
 from lipmotion.speech.recognition.agreement import (
@@ -18,9 +18,8 @@ from lipmotion.speech.recognition.agreement import (
     agreement_score,
     transcript_fit,
 )
-from lipmotion.speech.recognition.general.acoustic import PHONES as GENERAL_PHONES
-from lipmotion.speech.recognition.general.acoustic import general_model
-from lipmotion.speech.recognition.general.front_end import general_features
+from lipmotion.speech.recognition.general import PHONES as GENERAL_PHONES
+from lipmotion.speech.recognition.general import general_features, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import (
     GAP_COST,
@@ -31,7 +30,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
     transcript_evidence,
 )
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.installed import installed_voices, speak_sentence
+from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon, split_words
@@ -348,7 +347,7 @@ def test_synthetic_voices_are_believed() -> None:
     texts = "Loyal boys voice their choice to employers.", "Sharp knives belong in the upper drawer."
     phones = Recogniser(load_model().phones, "auto")
     for voice in installed_voices()[::2]:
-        audio, _ = speak_sentence(texts[0], voice)
+        audio, _ = next(speak_sentences([texts[0]], voice))
         right, wrong = (
             agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), split_words(text), Lexicon()))
             for text in texts

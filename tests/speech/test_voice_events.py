@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from lipmotion.speech.features.laughter import risen_peaks
-from lipmotion.speech.features.voice_events import voice_events, without_laughter
+from lipmotion.speech.features.voice_events import risen_peaks, voice_events, without_laughter
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from speech.made_voices import RATE_HZ, laugh, noise, pulses, recording, said, vowels

@@ -7,11 +7,10 @@ import pytest
 from lipmotion import load_model
 from lipmotion.errors import MissingDependencyError
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition import recogniser, word_decoder, word_search
+from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.recognition.word_decoder import FoundWord, is_filler, words_in
-from lipmotion.speech.recognition.word_search import score_words
+from lipmotion.speech.recognition.word_search import FoundWord, is_filler, score_words, words_in
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
 from lipmotion.types import Audio
@@ -184,10 +183,10 @@ def test_one_recording_does_not_change_the_next() -> None:
 
 
 def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(word_decoder, "find_english_data", lambda: tmp_path)
-    word_decoder._decoder.cache_clear()
+    monkeypatch.setattr(word_search, "find_english_data", lambda: tmp_path)
+    word_search._decoder.cache_clear()
     try:
         with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):
             words_in(b"")
     finally:
-        word_decoder._decoder.cache_clear()
+        word_search._decoder.cache_clear()

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.storage.archive import array_in, check_archive
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint, array_in, check_archive
 
 
 def saved(array: NDArray[Any]) -> bytes:

@@ -8,13 +8,13 @@ import pytest
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion.storage.coded_video import (
+    FrameGroups,
     decode_pictures,
     encode_pictures,
     encode_video,
     stored_video_from_arrays,
     stored_video_to_arrays,
 )
-from lipmotion.storage.frame_groups import FrameGroups
 
 
 def film(count: int = 21, size: tuple[int, int] = (48, 64)) -> np.ndarray:

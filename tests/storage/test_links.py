@@ -10,7 +10,7 @@ import pytest
 from lipmotion import Corpus
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.files import (
     LOCK,
     TEMPORARY,

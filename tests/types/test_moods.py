@@ -2,7 +2,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.types import Delivery
-from lipmotion.types.moods import MoodKey, format_moods, parse_moods, sort_moods
+from lipmotion.types.delivery import MoodKey, format_moods, parse_moods, sort_moods
 
 
 def test_a_text_of_moods_is_read_and_written():

@@ -1,7 +1,7 @@
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.types.moods import NEUTRAL, MoodKey, MoodTag
+from lipmotion.types.delivery import NEUTRAL, MoodKey, MoodTag
 from lipmotion.units import split_words
 from lipmotion.units.mood_tags import SYNONYMS, parse_tagged_text, remove_known_tags, time_moods
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.types import WEIGHT, Channel, Motion
-from lipmotion.types.moods import MOODS, MoodKey
+from lipmotion.types.delivery import MOODS, MoodKey
 
 Curve = NDArray[np.float64]
 

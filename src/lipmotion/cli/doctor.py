@@ -254,7 +254,7 @@ def _main_path() -> str:
     from lipmotion.pipeline.request import Outputs, Request
     from lipmotion.storage.files import temporary_folder
     from lipmotion.testing.formant_synthesiser import synthesise
-    from lipmotion.types.staging import Staging
+    from lipmotion.types.delivery import Staging
 
     with temporary_folder() as folder:
         sound = folder / "mama.wav"

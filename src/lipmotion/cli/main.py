@@ -56,7 +56,7 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
         is_exit = isinstance(error, SystemExit)
         if not is_exit:
             stopper.check()  # interrupted work may fail in any way
-        from lipmotion.cli.terminal.status import outcome
+        from lipmotion.cli.terminal.progress import outcome
 
         known = outcome(error)
         stopper.settle()

@@ -30,7 +30,6 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, 
 LOG = logging.getLogger("lipmotion")
 Array = NDArray[np.float64]
 About = Mapping[str, str]
-Json = Mapping[str, Any]
 LARGEST_MOTION_BYTES = 1 << 31
 """Most bytes of a motion file: four hours of a hundred channels."""
 
@@ -319,30 +318,26 @@ def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
             rounded = np.round(values[start : start + BLOCK_ROWS].astype(float), DECIMALS) + 0.0
         if not np.isfinite(rounded).all():
             raise ExportError("the motion has values that are not finite, or too large to be rounded")
-        if rounded.shape[1] and np.abs(rounded).max() < LARGEST_VALUE:
-            yield from _rows_of_digits(np.rint(rounded * 10**DECIMALS).astype(np.int64))
-        else:
+        if not rounded.shape[1] or np.abs(rounded).max() >= LARGEST_VALUE:
             form = ",".join([f"%.{DECIMALS}f"] * values.shape[1])
             yield from (form % tuple(row) for row in rounded.tolist())
-
-
-def _rows_of_digits(numbers: NDArray[np.int64]) -> list[str]:
-    """Return each row of numbers as text, with a point before the last ``DECIMALS`` digits."""
-    sizes = np.abs(numbers)
-    digits = max(len(str(sizes.max())), DECIMALS + 1)
-    if digits < 10:
-        sizes = sizes.astype(np.int32)
-    text = np.empty((*numbers.shape, digits + 3), np.uint8)  # sign, digits, point, comma
-    used = np.ones(text.shape, bool)
-    text[..., 0], used[..., 0] = ord("-"), numbers < 0
-    text[..., -2 - DECIMALS], text[..., -1] = ord("."), ord(",")
-    text[:, -1, -1] = ord("\n")
-    for place in range(digits):
-        if place > DECIMALS:
-            used[..., -3 - place] = sizes > 0
-        sizes, digit = np.divmod(sizes, 10)
-        text[..., -(2 if place < DECIMALS else 3) - place] = ord("0") + digit
-    return text[used].tobytes().decode("ascii").splitlines()
+            continue
+        numbers = np.rint(rounded * 10**DECIMALS).astype(np.int64)
+        sizes = np.abs(numbers)
+        digits = max(len(str(sizes.max())), DECIMALS + 1)
+        if digits < 10:
+            sizes = sizes.astype(np.int32)
+        text = np.empty((*numbers.shape, digits + 3), np.uint8)  # sign, digits, point, comma
+        used = np.ones(text.shape, bool)
+        text[..., 0], used[..., 0] = ord("-"), numbers < 0
+        text[..., -2 - DECIMALS], text[..., -1] = ord("."), ord(",")
+        text[:, -1, -1] = ord("\n")
+        for place in range(digits):
+            if place > DECIMALS:
+                used[..., -3 - place] = sizes > 0
+            sizes, digit = np.divmod(sizes, 10)
+            text[..., -(2 if place < DECIMALS else 3) - place] = ord("0") + digit
+        yield from text[used].tobytes().decode("ascii").splitlines()
 
 
 def write_json(

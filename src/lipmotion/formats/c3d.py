@@ -94,55 +94,51 @@ def read_c3d(path: Path) -> C3dFile:
     if size > LARGEST_FILE_BYTES:
         raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the capture into takes")
     try:
-        return _parse(path.read_bytes())
+        content = path.read_bytes()
+        if len(content) < 2 * BLOCK or content[1] != MARK:
+            raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
+        start = (content[0] - 1) * BLOCK
+        processor = content[start + 3]
+        if processor not in {INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR}:
+            raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
+        parameters = _read_parameters(content, start + 4, processor)
+        words: list[int] = _numbers(content, "u2", 10, 0, processor).astype(int).tolist()
+        _, points, analog, first, last, _, _, _, block, samples = words
+        rate_hz = _number(parameters, "POINT.RATE", _numbers(content, "f4", 1, 20, processor)[0])
+        scale = _number(parameters, "POINT.SCALE", _numbers(content, "f4", 1, 12, processor)[0])
+        if not (0 <= points <= MAX_POINTS and 0 <= analog <= MAX_ANALOG_CHANNELS and points + analog > 0):
+            raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
+        if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
+            raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
+        kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
+        data = content[(block - 1) * BLOCK :] if block > 1 else b""
+        held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
+        frames = _count_frames(parameters, last - first + 1, held, spare)
+        rows = _numbers(data, kind, frames * width, 0, processor).reshape(frames, width)
+        placed = rows[:, : points * 4].reshape(len(rows), points, 4)
+        places = placed[..., :3] * (1.0 if scale < 0 else scale)
+        unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
+        places[unseen] = np.nan
+        labels = [
+            label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(parameters, name)
+        ]
+        labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
+        curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
+        names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][
+            : curves.shape[1]
+        ]
+        units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
+        unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
+        exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
+        return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
     except InputError:
         raise
     except (struct.error, IndexError, ValueError, OverflowError) as error:
         raise InputError(f"not a C3D file ({error}); export the capture again") from error
 
 
-def _parse(content: bytes) -> C3dFile:
-    if len(content) < 2 * BLOCK or content[1] != MARK:
-        raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
-    start = (content[0] - 1) * BLOCK
-    processor = content[start + 3]
-    if processor not in {INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR}:
-        raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
-    parameters = _read_parameters(content, start + 4, processor)
-    words: list[int] = _numbers(content, "u2", 10, 0, processor).astype(int).tolist()
-    _, points, analog, first, last, _, _, _, block, samples = words
-    rate_hz = _number(parameters, "POINT.RATE", _numbers(content, "f4", 1, 20, processor)[0])
-    scale = _number(parameters, "POINT.SCALE", _numbers(content, "f4", 1, 12, processor)[0])
-    if not (0 <= points <= MAX_POINTS and 0 <= analog <= MAX_ANALOG_CHANNELS and points + analog > 0):
-        raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
-    if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
-        raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
-    kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
-    data = content[(block - 1) * BLOCK :] if block > 1 else b""
-    held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
-    frames = _count_frames(parameters, last - first + 1, held, spare)
-    rows = _numbers(data, kind, frames * width, 0, processor).reshape(frames, width)
-    placed = rows[:, : points * 4].reshape(len(rows), points, 4)
-    places = placed[..., :3] * (1.0 if scale < 0 else scale)
-    unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
-    places[unseen] = np.nan
-    labels = [
-        label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(parameters, name)
-    ]
-    labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
-    curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
-    names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][: curves.shape[1]]
-    units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
-    unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
-    exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
-    return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
-
-
 def _count_frames(parameters: dict[str, Values], numbered: int, held: int, spare: int) -> int:
-    """Return how many frames there are: the largest number that is stated and held.
-
-    numbered : by the header, which cannot count on from 65,535;  spare : of those held, what may fill the last block
-    """
+    """Return how many frames there are: the largest number that is stated and held."""
     start, end = _number(parameters, "TRIAL.ACTUAL_START_FIELD", 1), _number(parameters, "TRIAL.ACTUAL_END_FIELD", 0)
     counted, long = _number(parameters, "POINT.FRAMES", 0), _number(parameters, "POINT.LONG_FRAMES", 0)
     stated = sorted({int(each) for each in (numbered, counted % (1 << 31), long, end - start + 1) if each >= 1})
@@ -248,7 +244,6 @@ def write_c3d(path: Path, content: C3dFile) -> None:
 
 
 def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
-    """Return groups and parameters as bytes."""
     parts = []
     for number, (group, parameters) in enumerate(groups.items(), 1):
         parts.append(struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0))

@@ -7,7 +7,7 @@ parameters 1 (viseme) and 2 (expression) have four and six values; they are pass
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
@@ -99,39 +99,32 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             head = next(lines, "").split()
             if len(head) < 4 or not head[0].startswith("2."):
                 raise ValueError(f"it begins with {shorten(' '.join(head))!r}, required {VERSION} NAME FPS FRAMES")
-            rate, frames = head[-2:]
-            held, used = _read_frames(lines, int(frames))
+            rate, frames = head[-2], int(head[-1])
+            rows: list[NDArray[np.int32]] = []
+            current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
+            if not 0 < frames <= MAX_FRAMES:
+                raise ValueError(f"{frames} frames, required 1 to {MAX_FRAMES}")
+            for frame in range(frames):
+                marks, values = next(lines, "").split(), next(lines, "").split()[1:]
+                if len(marks) != COUNT or set(marks) - {"0", "1"}:
+                    raise ValueError(f"frame {frame} of {frames} has {len(marks)} marks, required {COUNT} of 0 or 1")
+                marked = [number for number, mark in enumerate(marks, 1) if mark == "1"]
+                needed = sum(MANY_VALUES.get(number, 1) for number in marked)
+                if len(values) != needed:
+                    raise ValueError(f"frame {frame} of {frames} has {len(values)} values, required {needed}")
+                skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
+                given = [int(value) for value in values[skipped:]]
+                if max(map(abs, given), default=0) > LARGEST_VALUE:
+                    raise ValueError(f"frame {frame} has a value over {LARGEST_VALUE}")
+                current = current.copy()
+                places = [number - 1 for number in marked if number not in MANY_VALUES]
+                current[places], used[places] = given, True
+                rows.append(current)
     except ValueError as error:
         raise InputError(f"not a file of facial animation parameters ({error}); export it again") from error
     numbers = np.flatnonzero(used) + 1
     channels = tuple(Channel(NAMES.get(int(number), f"fap{number}"), FAP) for number in numbers)
-    return Motion(held[:, numbers - 1].astype(np.float64), exact_rate(float(rate)), channels), Timeline(())
-
-
-def _read_frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Return the values of all parameters [shape=(T, 68)], and which of them are given in any frame [shape=(68,)]."""
-    rows: list[NDArray[np.int32]] = []
-    current, used = np.zeros(COUNT, np.int32), np.zeros(COUNT, bool)
-    if not 0 < count <= MAX_FRAMES:
-        raise ValueError(f"{count} frames, required 1 to {MAX_FRAMES}")
-    for frame in range(count):
-        marks, values = next(lines, "").split(), next(lines, "").split()[1:]
-        if len(marks) != COUNT or set(marks) - {"0", "1"}:
-            raise ValueError(f"frame {frame} of {count} has {len(marks)} marks, required {COUNT} of 0 or 1")
-        marked = [number for number, mark in enumerate(marks, 1) if mark == "1"]
-        needed = sum(MANY_VALUES.get(number, 1) for number in marked)
-        if len(values) != needed:
-            raise ValueError(f"frame {frame} of {count} has {len(values)} values, required {needed}")
-        skipped = sum(MANY_VALUES[number] for number in marked if number in MANY_VALUES)
-        places = [number - 1 for number in marked if number not in MANY_VALUES]
-        numbers = [int(value) for value in values[skipped:]]
-        if max(map(abs, numbers), default=0) > LARGEST_VALUE:
-            raise ValueError(f"frame {frame} has a value over {LARGEST_VALUE}")
-        current = current.copy()
-        current[places] = numbers
-        used[places] = True
-        rows.append(current)
-    return np.stack(rows), used
+    return Motion(np.stack(rows)[:, numbers - 1].astype(np.float64), exact_rate(float(rate)), channels), Timeline(())
 
 
 def _number(name: str) -> int | None:

@@ -10,8 +10,6 @@ from itertools import islice
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError, shorten
-from lipmotion.formats.base import motion_suffix
-from lipmotion.formats.base import read_units as read_units_of_motion
 from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, service_tiers
 from lipmotion.formats.label_tiers import (
     LINES,
@@ -37,7 +35,6 @@ from lipmotion.formats.timed_lines import line_tiers
 from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, xml_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.files import read_text_file
-from lipmotion.storage.sources import check_kind
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
 from lipmotion.units.mood_tags import parse_tagged_text, remove_known_tags
@@ -67,9 +64,6 @@ TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
 NAMED_TIERS = 12
 """Most names in a message."""
-READABLE = (".textgrid", ".eaf", ".lab", ".phn", ".txt", ".json", ".jsonl", ".marks", ".csv", ".tsv")
-"""Suffixes of files of phones in time, in lower case; their content decides which form they have. ``.json`` and
-``.csv`` may also be motion."""
 _WRITERS = {".TextGrid": write_textgrid, ".vtt": write_webvtt, ".srt": write_subrip}
 LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files that are written, as programs write them; capitals do not matter."""
@@ -322,7 +316,6 @@ def _choose_transcript(tiers: list[LabelTier], where: str, tier: str = "", speak
 
 
 def _name_speakers(tiers: list[LabelTier], where: str) -> None:
-    """Log a warning if tiers are of several speakers."""
     speakers = [tier.speaker for tier in tiers if tier.speaker]
     if len(speakers) > 1:
         names = ", ".join(map(shorten, speakers[:NAMED_TIERS]))
@@ -393,26 +386,6 @@ def _check_plain(text: str, path: Path) -> None:
 
 def _read_text(path: Path, kind: str = "label") -> str:
     return read_text_file(path, kind, LARGEST_LABELS, western=True)
-
-
-def read_units(path: str | Path, tier: str = "", speaker: str = "") -> Timeline[Unit]:
-    """Return the phones in time of a file.
-
-    path : a motion file (``.json``, ``.npz``); a ``.json`` with the member ``units`` alone; or any file of labels that
-           corpora may have (``READABLE``): a TextGrid with a tier of phones, Audacity's or HTK's labels, the
-           timings of a voice or an aligner
-    tier, speaker : of labels, which tier and whose phones (``read_phones``)
-    Raises InputError: no such file, not one of these, or without phones.
-    """
-    path = Path(path)
-    check_kind(path, "motion file", "units file")
-    is_label = path.suffix.lower() in READABLE
-    if motion_suffix(path) and not (is_label and holds_timings(path)):
-        return read_units_of_motion(path)
-    if is_label:
-        return read_phones(path, tier, speaker)
-    required = "use one of .json, .npz, .TextGrid, .eaf, .lab, .txt, .jsonl, .marks"
-    raise InputError(f"{path}: cannot read phones from {path.suffix!r}; {required}")
 
 
 def write_labels(path: Path, units: Timeline[Unit]) -> None:

@@ -210,10 +210,7 @@ def describe_json(text: str, where: str) -> str:
 
 
 def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
-    """Yield the values of a text, one after another, each with the number of its first line.
-
-    Names of members are in lower case, without underscores and JavaScript's ``priv``; those of tiers stay.
-    """
+    """Yield the values of a text, one after another, each with the number of its first line."""
 
     def plain(name: str) -> str:
         return name if " " in name else name.replace("_", "").lower().removeprefix("priv")

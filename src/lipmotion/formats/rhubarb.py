@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Sequence
 from html import escape
 from itertools import pairwise
 from typing import Any
@@ -62,9 +63,7 @@ def parse_tsv(text: str) -> CueSheet:
     if mark == "," and not follow and all(f"{a}{b}".isdecimal() for a, b, _ in spans):  # decimal commas
         cues = [(place, [",".join(fields[:-1]), fields[-1]]) for place, fields in cues]
     chart = choose_chart((fields[-1] for _, fields in cues), LETTERS)
-    rows = [(parse_cue_time(fields[0], place), parse_shape(fields[-1], chart, place)) for place, fields in cues]
-    end_s = parse_cue_time(cues[-1][1][-2], cues[-1][0]) if cues else 0.0
-    return build_cue_sheet(rows, end_s, CUES_FPS)
+    return _build_sheet([(place, fields[0], fields[-2], fields[-1]) for place, fields in cues], chart)
 
 
 def xml_text(sheet: CueSheet, sound_file: str) -> str:
@@ -84,11 +83,14 @@ def xml_text(sheet: CueSheet, sound_file: str) -> str:
 
 def parse_xml(text: str) -> CueSheet:
     """Return the cues of an ``.xml``. Raises InputError: there is none, or one is none, with its number."""
-    rows, end_s = [], 0.0
-    for number, (start, end, letter) in enumerate(_CUE.findall(text), 1):
-        rows.append((parse_cue_time(start, f"cue {number}"), parse_shape(letter, LETTERS, f"cue {number}")))
-        end_s = parse_cue_time(end, f"cue {number}")
-    return build_cue_sheet(rows, end_s, CUES_FPS)
+    cues = enumerate(_CUE.findall(text), 1)
+    return _build_sheet([(f"cue {number}", start, end, letter) for number, (start, end, letter) in cues], LETTERS)
+
+
+def _build_sheet(cues: Sequence[tuple[str, str, str, str]], chart: dict[str, str]) -> CueSheet:
+    """Return cues of place, start, end and shape."""
+    rows = [(parse_cue_time(start, place), parse_shape(shape, chart, place)) for place, start, _, shape in cues]
+    return build_cue_sheet(rows, parse_cue_time(cues[-1][2], cues[-1][0]) if cues else 0.0, CUES_FPS)
 
 
 def json_text(sheet: CueSheet, sound_file: str) -> str:
@@ -115,10 +117,7 @@ def parse_json(text: str) -> CueSheet:
         fields = cue if isinstance(cue, dict) else {}
         start, shape = (next((str(fields[n]) for n in names if n in fields), "None") for names in (STARTS, NAMES))
         items.append((f"cue {number}", start, str(fields.get("end", start)), shape))
-    chart = choose_chart((shape for *_, shape in items), LETTERS)
-    rows = [(parse_cue_time(start, place), parse_shape(shape, chart, place)) for place, start, _, shape in items]
-    end_s = parse_cue_time(items[-1][2], items[-1][0]) if items else 0.0
-    return build_cue_sheet(rows, end_s, CUES_FPS)
+    return _build_sheet(items, choose_chart((shape for *_, shape in items), LETTERS))
 
 
 def dat_text(sheet: CueSheet, _sound_file: str) -> str:

@@ -18,7 +18,6 @@ from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,17 +158,6 @@ def write_take(path: Path, generation: Generation, _source: Mapping[str, str], _
             file.write(f"{timecode(time_s)},{len(CURVES)},{form % tuple(row.tolist())}\n")
 
 
-class Timecode(NamedTuple):
-    """One timecode: whole seconds since midnight, frames (fractions included), and what stands before the frames.
-
-    mark : ``:``, ``;`` (drop-frame), ``.`` where not frames but parts of a second follow, or empty: nothing follows
-    """
-
-    seconds: int
-    frames: float
-    mark: str
-
-
 def is_live_link(names: Sequence[str]) -> bool:
     """Return whether the columns of a table are those of Live Link Face."""
     lower = [name.lower() for name in names[:2]]
@@ -187,10 +175,10 @@ def is_live_link_file(path: Path) -> bool:
 
 def speech_curves(motion: Motion) -> Motion:
     """Return the curves that speech moves, without those of eyes, brows and head. Raises InputError: there are none."""
-    columns = [column for column, name in enumerate(motion.names) if name in SPEECH_CURVES]
-    if not columns:
+    names = [name for name in motion.names if name in SPEECH_CURVES]
+    if not names:
         raise InputError("none of its curves is one of mouth or jaw, required jawOpen, mouthClose, ...")
-    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+    return motion.selected(names)
 
 
 def read_curve_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
@@ -299,26 +287,24 @@ def _read_single_scores(
     return [(line, time) for time, line in lines.items()], known, values
 
 
-def _parse_timecode(text: str, line: int) -> Timecode:
+def _parse_timecode(text: str, line: int) -> tuple[int, float, str]:
+    """Return whole seconds since midnight, frames (fractions included), and what stands before the frames."""
     code = _TIMECODE.fullmatch(text)
     if code is None or int(code[2]) > 59 or int(code[3]) > 59:
         raise ValueError(
             f"line {line} begins with {shorten(text)!r}, required a timecode as 12:30:59:29.500; spreadsheets "
             "shorten it: take the file as it was recorded"
         )
-    seconds = (int(code[1]) * 60 + int(code[2])) * 60 + int(code[3])
-    if code[4] is None:
-        return Timecode(seconds, 0.0, "")
-    if code[4] in ".,":
-        return Timecode(seconds, float("0." + re.sub("[.,]", "", code[5])), ".")
-    return Timecode(seconds, float(code[5].replace(",", ".")), code[4])
+    seconds, mark = (int(code[1]) * 60 + int(code[2])) * 60 + int(code[3]), code[4] or ""
+    if mark and mark in ".,":
+        return seconds, float("0." + re.sub("[.,]", "", code[5])), "."
+    return seconds, float(code[5].replace(",", ".")) if mark else 0.0, mark
 
 
-def _codes_to_seconds(codes: list[Timecode]) -> Array:
+def _codes_to_seconds(codes: list[tuple[int, float, str]]) -> Array:
     """Return timecodes as seconds since the midnight before the first [shape=(N,)]."""
-    seconds = np.array([code.seconds for code in codes], float)
-    frames = np.array([code.frames for code in codes])
-    day_s, mark = DAY_S, codes[0].mark
+    seconds, frames = (np.array([code[part] for code in codes], float) for part in (0, 1))
+    day_s, mark = DAY_S, codes[0][2]
     if mark == "." and len(codes) > MISREAD_ROWS and (frames == frames[0]).all():
         mark = ""
     if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(seconds)) == 1:

@@ -70,9 +70,9 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     first = next((line for _, line in _lines(text)), "")
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
-    columns = _find_columns(first)
-    if columns or LRS_TEXT.match(text):
-        return _read_table(text, columns, where) if columns else _read_lrs(text, where)
+    columns, spoken = _find_columns(first), LRS_TEXT.match(text)
+    if columns or spoken:
+        return _read_lrs(text, spoken[1], where) if spoken and not columns else _read_table(text, columns, where)
     span, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
     if SECONDS.fullmatch(first):
         return [_read_spans(text, SECONDS, where)]
@@ -159,11 +159,11 @@ def _read_nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
     ]
 
 
-def _read_lrs(text: str, where: str) -> list[LabelTier]:
+def _read_lrs(text: str, spoken: str, where: str) -> list[LabelTier]:
     """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds."""
-    heading, spoken = LRS_WORDS.search(text), LRS_TEXT.match(text)
+    heading = LRS_WORDS.search(text)
     if heading is None:
-        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, spoken[1] if spoken else "", "line 1"),), LINES)]
+        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, spoken, "line 1"),), LINES)]
     rows = re.split(r"\n\s*\n", text[heading.start() :], maxsplit=1)[0]
     padded = "\n" * text.count("\n", 0, heading.start()) + re.sub(r"[ \t]+", "\t", rows)
     return _read_table(padded, _find_columns("WORD\tSTART\tEND"), where)

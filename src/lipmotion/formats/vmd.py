@@ -154,10 +154,7 @@ def _encode_name(name: str, size: int) -> bytes:
 
 
 def _read_keys(path: Path, is_known: Callable[[str], bool]) -> tuple[Mapping[str, Keys], Mapping[str, Turns], int]:
-    """Return the keys of morphs and bones by their names, in order, and the number of the camera's.
-
-    Of several keys of one frame, the last counts. Names that mean something (``is_known``) show the encoding of all.
-    """
+    """Return the keys of morphs and bones by their names, in order, and the number of the camera's."""
     size = path.stat().st_size
     if size > LARGEST_FILE_BYTES:
         raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the motion")

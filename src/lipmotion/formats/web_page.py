@@ -53,7 +53,6 @@ def whole_page(title: str, style: str, *content: str, script: str = "") -> str:
     """Return a page that loads nothing but the pictures and videos in its own folder.
 
     style  : CSS, with ``SHARED_COLOURS`` in the place of the colours of all pages
-    script : JavaScript of the page
     Neither may hold the end of its element: both are the caller's own, nothing of a user's.
     """
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' file:; media-src 'self' file:"

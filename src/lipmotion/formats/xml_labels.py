@@ -107,10 +107,7 @@ def _read_captions(root: Element, where: str) -> LabelTier:
 def _read_times(
     element: Element, start_s: float, end_s: float, per_s: dict[str, float], where: str
 ) -> tuple[float, float]:
-    """Return the start and the end of an element within those of its owner, to which its times are relative.
-
-    Where they go beyond the owner's end, and would fit as times of the whole file, they are such.
-    """
+    """Return the start and the end of an element within those of its owner, to which its times are relative."""
     stated = {name: element.get(name) for name in ("begin", "end", "dur", "start", "t", "d")}
     ms = {name: f"{stated[name]}ms" for name in ("t", "d") if stated[name]}
     texts = (stated["begin"] or stated["start"] or ms.get("t"), stated["end"], stated["dur"] or ms.get("d"))

@@ -26,7 +26,7 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arra
 from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import make_equal_gaussians
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Monitor, ParallelMap, Progress
 
 _CHECKPOINT = "phones"

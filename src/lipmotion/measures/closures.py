@@ -65,7 +65,6 @@ def match_closings(
 ) -> list[tuple[int, int]]:
     """Return pairs of a generated and an original closing within ``reach`` frames: as many as possible, one to one.
 
-    generated, original : frames in rising order
     Of all matchings with most pairs, one with the smallest sum of distances; in the order of time. No pair crosses a
     gap of more than ``reach`` frames without closings, so that the parts between such gaps are solved one by one.
     """

@@ -7,6 +7,7 @@ A set of clips is a list of arrays at the frame rate of the video, generated and
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,10 +51,7 @@ def correlation(generated: Array, original: Array) -> Array:
 
 
 def select_moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
-    """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit.
-
-    units : of the channels
-    """
+    """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit."""
     values = np.concatenate(original)
     extents: Array = np.ptp(values, axis=0)
     widest = {unit: max(e for e, other in zip(extents, units, strict=True) if other == unit) for unit in set(units)}
@@ -115,12 +113,16 @@ def lag_ms(generated: Clips, original: Clips, rate_hz: float, reach_s: float = 0
     """
     reach = round(reach_s * rate_hz)
     shifts = range(-reach, reach + 1)
-    scores = np.array([_shifted_correlation(generated, original, shift) for shift in shifts])
+    position, _ = _refine_peak(np.array([_shifted_correlation(generated, original, shift) for shift in shifts]))
+    return (position - reach) / rate_hz * 1000
+
+
+def _refine_peak(scores: Array) -> tuple[float, float]:
+    """Return the place of the highest score, by a parabola through it and those beside it, and the score."""
     best = int(np.clip(scores.argmax(), 1, len(scores) - 2))
-    before, peak, after = scores[best - 1 : best + 2]
+    before, peak, after = scores[best - 1 : best + 2].tolist()
     curvature = before - 2 * peak + after
-    refined = best + (0.5 * (before - after) / curvature if curvature < 0 else 0)
-    return float((refined - reach) / rate_hz * 1000)
+    return best + (0.5 * (before - after) / curvature if curvature < 0 else 0.0), peak
 
 
 def _shifted_correlation(generated: Clips, original: Clips, shift: int) -> float:
@@ -156,7 +158,6 @@ def bootstrap_interval(
 def lip_vertex_error(generated: Clips, original: Clips) -> float:
     """Return the mean over frames of the largest distance of any lip vertex, in the unit of the places.
 
-    generated, original : places of the lip vertices
     Source: Richard et al. 2021 (MeshTalk), Fan et al. 2022 (FaceFormer, on VOCASET).
     """
     return float(np.concatenate([each.max(axis=1) for each in _distances(generated, original)]).mean())
@@ -188,3 +189,85 @@ def _distances(generated: Clips, original: Clips) -> list[Array]:
 
 def _variation(clips: Clips, rest: Array) -> Array:
     return np.linalg.norm(np.concatenate(clips) - rest, axis=2).std(axis=0)
+
+
+MIN_SCORE = 0.5
+"""Least correlation at which the offset of one clip is known."""
+MIN_MARGIN = 0.15
+"""Least difference between the best and the second maximum at which an offset is known."""
+MIN_CLIPS, WIDEST_S = 5, 0.06
+"""An offset of so many clips together is known at any correlation if its interval is as narrow: curves of a voice that
+the prediction has not learned correlate less, and agree on the offset all the same (docs/robustness.md)."""
+PEAK_S = 0.12
+"""Maxima further from the best than this, in seconds, are other ones."""
+MIN_SHARE = 0.5
+"""Least share of the frames that can be compared at a shift."""
+OFFSET_DRAWS = 500
+"""Bootstrap samples of an interval."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """Offset of the sound from the video.
+
+    late_s : seconds by which the sound is late; negative: early
+    score  : correlation of the two curves at this offset
+    margin : difference to the highest correlation further than ``PEAK_S`` away
+    low_s, high_s : 95 % interval where several clips were pooled, else both ``late_s``
+    clips  : how many clips were pooled
+    """
+
+    late_s: float
+    score: float
+    margin: float
+    low_s: float
+    high_s: float
+    clips: int = 1
+
+    @property
+    def known(self) -> bool:
+        """Whether the correlation has one maximum only, and is high enough or agreed on by enough clips."""
+        agreed = self.clips >= MIN_CLIPS and self.high_s - self.low_s <= WIDEST_S
+        return self.margin > MIN_MARGIN and (self.score > MIN_SCORE or agreed)
+
+
+def shift_scores(predicted: Array, measured: Array, valid: NDArray[np.bool_], reach: int) -> Array:
+    """Return the correlation of predicted[t + k] with measured[t] for k = -reach … reach [shape=(2·reach + 1,)].
+
+    predicted, measured : curves [shape=(T,)] at one rate;  valid : where ``measured`` is known [shape=(T,)]
+    It is 0 where too few frames overlap, or one curve is constant.
+    """
+    scores = np.zeros(2 * reach + 1)
+    for shift in range(-reach, reach + 1):
+        count, first = min(len(predicted) - shift, len(measured)), max(-shift, 0)
+        compared = valid[first : max(count, first)]
+        if compared.sum() >= max(MIN_SHARE * len(measured), 2):
+            a, b = predicted[first + shift : count + shift][compared], measured[first:count][compared]
+            scores[shift + reach] = correlation(a[:, None], b[:, None])[0]
+    return scores
+
+
+def best_offset(scores: Array, rate_hz: float) -> Offset:
+    """Return the offset of the highest score [shape=(2·reach + 1,)], refined by a parabola."""
+    late_s, score, margin = _find_highest(scores, rate_hz)
+    return Offset(late_s, score, margin, late_s, late_s)
+
+
+def pooled_offset(scores: Sequence[Array], rate_hz: float) -> Offset:
+    """Return the common offset of clips: that of the highest mean score, with a bootstrap interval over clips."""
+    clips = np.stack(scores)
+    late_s, score, margin = _find_highest(clips.mean(axis=0), rate_hz)
+    draw = np.random.default_rng(0)
+    draws = [
+        _find_highest(clips[draw.integers(len(clips), size=len(clips))].mean(axis=0), rate_hz)[0]
+        for _ in range(OFFSET_DRAWS)
+    ]
+    low_s, high_s = np.percentile(draws, [2.5, 97.5])
+    return Offset(late_s, score, margin, float(low_s), float(high_s), len(clips))
+
+
+def _find_highest(scores: Array, rate_hz: float) -> tuple[float, float, float]:
+    """Return offset in seconds, score and margin of the highest score (see ``Offset``)."""
+    position, peak = _refine_peak(scores)
+    elsewhere = np.abs(np.arange(len(scores)) - position) > PEAK_S * rate_hz
+    return (position - len(scores) // 2) / rate_hz, peak, float(peak - scores[elsewhere].max(initial=-1.0))

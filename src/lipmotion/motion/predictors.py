@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import Registry
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, silent_monitor
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
-from typing import Any, ClassVar, get_type_hints
+from typing import Any, get_type_hints
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
-from lipmotion.types.delivery import Delivery
-from lipmotion.types.moods import MoodKey, format_moods, parse_moods, sort_moods
-from lipmotion.types.staging import Staging
+from lipmotion.types.delivery import Delivery, MoodKey, Staging, format_moods, parse_moods, sort_moods
 from lipmotion.types.values import describe_value, parse_number, parse_whole
 from lipmotion.units import PHONES, describe_unknown_phone, is_silent
 
@@ -41,19 +39,28 @@ _READ: dict[Any, tuple[str, Any]] = {
 
 @dataclass(frozen=True)
 class Step:
-    """An edit that one sentence states; ``form`` is the sentence, with the names of the fields."""
+    """An edit that one sentence states (``STEPS``)."""
 
-    form: ClassVar[str]
+    @property
+    def stated(self) -> Any:
+        """The value whose fields the sentence has."""
+        return self
+
+    @property
+    def form(self) -> str:
+        """The sentence, with the names of the fields."""
+        forms = [form for form, kind in STEPS.items() if kind is type(self.stated)]
+        return forms[-1 if getattr(self.stated, "channel", "") else 0]
 
     def __str__(self) -> str:
-        return self.form.format(**{field.name: _written(getattr(self, field.name)) for field in fields(self)})
+        return self.form.format(**{name: _written(value) for name, value in vars(self.stated).items()})
 
 
 @lru_cache
-def _read_form(kind: Any) -> tuple[re.Pattern[str], dict[str, Any]]:
-    """Return the pattern of a kind of command, and what reads its values, by the names of the fields."""
-    types, names = get_type_hints(kind), re.findall(r"{(\w+)}", kind.form)
-    pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(kind.form))
+def _read_form(form: str, kind: Any) -> tuple[re.Pattern[str], dict[str, Any]]:
+    """Return the pattern of a kind of sentence, and what reads its values, by the names of the fields."""
+    types, names = get_type_hints(kind), re.findall(r"{(\w+)}", form)
+    pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(form))
     return re.compile(pattern.replace(r"\ ", r"\s+")), {name: _READ[types[name]][1] for name in names}
 
 
@@ -88,7 +95,6 @@ def _unit_of(phone: str, word: str = "") -> Unit:
 class PhoneIs(PhoneStep):
     """Another phone is said in the same time."""
 
-    form: ClassVar[str] = "phone {number} is {phone}"
     number: int
     phone: str
 
@@ -100,11 +106,11 @@ class PhoneIs(PhoneStep):
 
 
 def _move_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
-    """Return phones with another time between the phone at place ``before`` and the next one.
-
-    Raises InputError: one of both would last less than ``MIN_PHONE_S``, or there is no such border.
-    """
+    """Return phones with another time between the phone at place ``before`` and the next one."""
     spans = list(units)
+    if not 0 <= before < len(spans) - 1:
+        end = "first phone begins" if before < 0 else "last phone ends"
+        raise InputError(f"{str(step)!r}: the {end} with the recording")
     first_s, last_s = spans[before].start_s, spans[before + 1].end_s
     if not first_s + MIN_PHONE_S - 1e-9 <= time_s <= last_s - MIN_PHONE_S + 1e-9:
         required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s"
@@ -119,37 +125,28 @@ def _move_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: fl
 class PhoneBegins(PhoneStep):
     """A phone begins at another time, and the one before it ends there."""
 
-    form: ClassVar[str] = "phone {number} begins {time_s}"
     number: int
     time_s: float
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        place = self._index(units, self.number)
-        if place == 0:
-            raise InputError(f"{str(self)!r}: the first phone begins with the recording")
-        return _move_border(self, units, place - 1, self.time_s)
+        return _move_border(self, units, self._index(units, self.number) - 1, self.time_s)
 
 
 @dataclass(frozen=True)
 class PhoneEnds(PhoneStep):
     """A phone ends at another time, and the one after it begins there."""
 
-    form: ClassVar[str] = "phone {number} ends {time_s}"
     number: int
     time_s: float
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        place = self._index(units, self.number)
-        if place == len(units) - 1:
-            raise InputError(f"{str(self)!r}: the last phone ends with the recording")
-        return _move_border(self, units, place, self.time_s)
+        return _move_border(self, units, self._index(units, self.number), self.time_s)
 
 
 @dataclass(frozen=True)
 class PhoneRemoved(PhoneStep):
     """A phone is not said; the one before it, or else the one after it, takes its time."""
 
-    form: ClassVar[str] = "remove phone {number}"
     number: int
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
@@ -168,7 +165,6 @@ class PhoneRemoved(PhoneStep):
 class PhoneInserted(PhoneStep):
     """A phone is said from one time to another; what was said there is cut, or gone."""
 
-    form: ClassVar[str] = "insert {phone} from {start_s} to {end_s}"
     phone: str
     start_s: float
     end_s: float
@@ -184,7 +180,6 @@ class PhoneInserted(PhoneStep):
 class PhoneSplit(PhoneStep):
     """A phone becomes two of the same kind; either can then be another one."""
 
-    form: ClassVar[str] = "split phone {number} at {time_s}"
     number: int
     time_s: float
 
@@ -213,7 +208,6 @@ def with_span(units: Timeline[Unit], spans: Sequence[Span[Unit]]) -> Timeline[Un
 class WordIs(Step):
     """Another word is said in the same time; words are numbered from 1. Its phones are aligned with the sound there."""
 
-    form: ClassVar[str] = "word {number} is {word}"
     number: int
     word: str
 
@@ -222,7 +216,6 @@ class WordIs(Step):
 class WordSaid(Step):
     """Another word is said in the same time, with these phones, which are aligned with the sound there."""
 
-    form: ClassVar[str] = "word {number} is {word} said {phones}"
     number: int
     word: str
     phones: Text
@@ -247,7 +240,6 @@ def _check_said(step: Step, phones: Sequence[str]) -> None:
 class WordsSaid(Step):
     """Other words are said from one time to another; their phones are aligned with the sound there."""
 
-    form: ClassVar[str] = "say {words} from {start_s} to {end_s}"
     words: Text
     start_s: float
     end_s: float
@@ -261,7 +253,6 @@ class WordsSaid(Step):
 class WordsSaidSo(WordsSaid):
     """Other words are said from one time to another, some of them with these phones: ``zoe z ow iy, qi k iy``."""
 
-    form: ClassVar[str] = "say {words} from {start_s} to {end_s} with {pronunciations}"
     pronunciations: Text
 
     def __post_init__(self) -> None:
@@ -282,94 +273,21 @@ WordStep = WordIs | WordSaid | WordsSaid
 """Edits of words, whose phones are aligned with the sound."""
 
 
+@dataclass(frozen=True)
 class CurveStep(Step):
     """An edit of values: a pin, a gain, what is drawn or held."""
 
-    def __post_init__(self) -> None:
-        self.edit  # noqa: B018 # checks the values
+    edit: CurveEdit | Hold
 
     @property
-    @abstractmethod
-    def edit(self) -> CurveEdit | Hold:
-        """The edit as a value."""
-
-
-@dataclass(frozen=True)
-class PinStep(CurveStep):
-    """A channel or a curve takes a value at a time."""
-
-    form: ClassVar[str] = "pin {channel} {value} at {time_s}"
-    channel: str
-    value: float
-    time_s: float
-
-    @property
-    def edit(self) -> Pin:  # noqa: D102
-        return Pin(self.time_s, self.channel, self.value)
-
-
-@dataclass(frozen=True)
-class GainStep(CurveStep):
-    """The whole mouth moves more, or less, for a time."""
-
-    form: ClassVar[str] = "gain {factor} from {start_s} to {end_s}"
-    factor: float
-    start_s: float
-    end_s: float
-
-    @property
-    def edit(self) -> Gain:  # noqa: D102
-        return Gain(self.start_s, self.end_s, self.factor)
-
-
-@dataclass(frozen=True)
-class CurveGainStep(CurveStep):
-    """A channel or a curve moves more, or less, for a time."""
-
-    form: ClassVar[str] = "gain {channel} {factor} from {start_s} to {end_s}"
-    channel: str
-    factor: float
-    start_s: float
-    end_s: float
-
-    @property
-    def edit(self) -> Gain:  # noqa: D102
-        return Gain(self.start_s, self.end_s, self.factor, self.channel)
-
-
-@dataclass(frozen=True)
-class DrawStep(CurveStep):
-    """A channel or a curve takes values at equal distances from one time to another, as they were drawn."""
-
-    form: ClassVar[str] = "draw {channel} {values} from {start_s} to {end_s}"
-    channel: str
-    values: Numbers
-    start_s: float
-    end_s: float
-
-    @property
-    def edit(self) -> DrawnCurve:  # noqa: D102
-        return DrawnCurve(self.start_s, self.end_s, self.channel, self.values)
-
-
-@dataclass(frozen=True)
-class HoldStep(CurveStep):
-    """The whole mouth stays for a time as it is at the start of it."""
-
-    form: ClassVar[str] = "hold from {start_s} to {end_s}"
-    start_s: float
-    end_s: float
-
-    @property
-    def edit(self) -> Hold:  # noqa: D102
-        return Hold(self.start_s, self.end_s)
+    def stated(self) -> CurveEdit | Hold:  # noqa: D102
+        return self.edit
 
 
 @dataclass(frozen=True)
 class LockStep(Step):
     """The motion in a span stays as it is with the edits before this one, whatever comes after."""
 
-    form: ClassVar[str] = "lock from {start_s} to {end_s}"
     start_s: float
     end_s: float
 
@@ -392,7 +310,6 @@ class LockStep(Step):
 class UnlockStep(Step):
     """A lock of the same times holds no longer, and holds nothing of what it held."""
 
-    form: ClassVar[str] = "unlock from {start_s} to {end_s}"
     start_s: float
     end_s: float
 
@@ -419,7 +336,6 @@ def find_locks(steps: Sequence[Step]) -> dict[int, LockStep]:
 class SetStep(Step):
     """How the motion is delivered, or how a drawn face is shown (docs/controls.md, docs/faces.md)."""
 
-    form: ClassVar[str] = "set {name} {value}"
     name: str
     value: str
 
@@ -453,7 +369,6 @@ class SetStep(Step):
 class MoodStep(Step):
     """The face goes over to a mood, and keeps it until the next one (docs/expression.md)."""
 
-    form: ClassVar[str] = "mood {mood} at {time_s}"
     mood: str
     time_s: float
 
@@ -476,13 +391,30 @@ def _names(kind: type[Any]) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind))
 
 
-STEPS: tuple[type[Step], ...] = (
-    WordIs, WordSaid, WordsSaid, WordsSaidSo, PhoneIs, PhoneBegins, PhoneEnds, PhoneSplit, PhoneRemoved, PhoneInserted,
-    PinStep, GainStep, CurveGainStep, DrawStep, HoldStep, LockStep, UnlockStep, MoodStep, SetStep,
-)  # fmt: skip
-"""All edits that a sentence can state."""
-FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form) for step in STEPS)
-"""Their sentences, for messages and help; times are in seconds."""
+STEPS: dict[str, Any] = {
+    "word {number} is {word}": WordIs,
+    "word {number} is {word} said {phones}": WordSaid,
+    "say {words} from {start_s} to {end_s}": WordsSaid,
+    "say {words} from {start_s} to {end_s} with {pronunciations}": WordsSaidSo,
+    "phone {number} is {phone}": PhoneIs,
+    "phone {number} begins {time_s}": PhoneBegins,
+    "phone {number} ends {time_s}": PhoneEnds,
+    "split phone {number} at {time_s}": PhoneSplit,
+    "remove phone {number}": PhoneRemoved,
+    "insert {phone} from {start_s} to {end_s}": PhoneInserted,
+    "pin {channel} {value} at {time_s}": Pin,
+    "gain {factor} from {start_s} to {end_s}": Gain,
+    "gain {channel} {factor} from {start_s} to {end_s}": Gain,
+    "draw {channel} {values} from {start_s} to {end_s}": DrawnCurve,
+    "hold from {start_s} to {end_s}": Hold,
+    "lock from {start_s} to {end_s}": LockStep,
+    "unlock from {start_s} to {end_s}": UnlockStep,
+    "mood {mood} at {time_s}": MoodStep,
+    "set {name} {value}": SetStep,
+}
+"""All sentences that state an edit, with the names of its fields, and what each makes."""
+FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), form) for form in STEPS)
+"""The sentences, for messages and help; times are in seconds."""
 
 
 def parse_step(sentence: str) -> Step:
@@ -495,11 +427,12 @@ def parse_step(sentence: str) -> Step:
     """
     if not isinstance(sentence, str):
         raise InputError(f"an edit is {describe_value(sentence)}, required a sentence: {FORMS[0]!r}")
-    for kind in STEPS:
-        pattern, readers = _read_form(kind)  # type: ignore[arg-type] # a class can be hashed
+    for form, kind in STEPS.items():
+        pattern, readers = _read_form(form, kind)
         if match := pattern.fullmatch(sentence.strip()):
             values = zip(readers.items(), match.groups(), strict=True)
-            return kind(**{name: read(text) for (name, read), text in values})
+            stated = kind(**{name: read(text) for (name, read), text in values})
+            return stated if isinstance(stated, Step) else CurveStep(stated)
     first = sentence.split()[:1]
     near = [form for form in FORMS if form.split()[:1] == first] or FORMS
     required = f"required {'one of: ' if len(near) > 1 else ''}{'; '.join(near)}"
@@ -523,11 +456,6 @@ class Edits:
     def then(self, *edits: str | Step) -> Edits:
         """Return these edits and some more, sentences or values. Raises InputError: a sentence states no edit."""
         return Edits(self.steps + tuple(edit if isinstance(edit, Step) else parse_step(edit) for edit in edits))
-
-    @classmethod
-    def of_pins(cls, pins: Iterable[Pin]) -> Edits:
-        """Return edits that are pins alone."""
-        return cls(tuple(PinStep(pin.channel, pin.value, pin.time_s) for pin in pins))
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -120,7 +120,6 @@ def apply_excerpt(
     """Return motion with what an excerpt changes.
 
     full, before, after : the motion before the change; in the excerpt alone, before and after it
-    units : the phones in time after the change
     What differs between excerpt and recording, as the mean pose at rest, is in both motions of the excerpt and cancels.
     Deviations and states stay as they were.
     """

@@ -29,7 +29,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB, joined_units, placed_units
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
-from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE
+from lipmotion.speech.voices.espeak import MAPPED_CONFIDENCE
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChannelValue,
@@ -167,7 +167,6 @@ def _generate_one(
     speech: Speech,
     constraints: Constraints | None,
 ) -> Generation:
-    """Return the motion of one passage."""
     if person is None:
         return engine.generate(learned, speech, constraints)
     restful = measure_restfulness(speech.units, len(speech.features.values))
@@ -233,12 +232,20 @@ def map_explanation(person: SpeakerMap | None, explanation: Explanation, speech:
 
 def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     """Return what to expect of the motion of some speech."""
-    recognition, speech, fit, advice = analysis.recognition, analysis.speech, analysis.fit, _advise(analysis)
+    recognition, speech, fit = analysis.recognition, analysis.speech, analysis.fit
+    similarity = recognition.similarity if recognition is not None else None
+    needs = (  # the most helpful first: before all else the words, where they are not sure
+        (WHOLE_TRANSCRIPT, fit is not None and fit.share < LEAST_FITTING_SHARE),
+        (TRANSCRIPT, recognition is not None and weigh_words(recognition) < SURE_CONFIDENCE),
+        (LESS_NOISE, analysis.range_db < NOISY_DB),
+        (OWN_MODEL, recognition is not None and (similarity is None or similarity < FULL_WEIGHT_SCORE)),
+    )
+    advice = tuple(what for what, is_needed in needs if is_needed)
     if analysis.is_without_speech:
         return Outlook("no speech", 0.0, None, analysis.range_db, ())
     if recognition is not None:
         words = "words" if recognition.word_s > recognition.phone_s else "phones"
-        voice = own_model_weight(recognition.similarity) if recognition.similarity is not None else None
+        voice = own_model_weight(similarity) if similarity is not None else None
         return Outlook(words, weigh_words(recognition), voice, analysis.range_db, advice)
     is_used = speech.units_known if fit is None else not fit.is_doubtful
     words = "given units" if request.units is not None else "transcript" if is_used else "own model"
@@ -251,20 +258,6 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     if known < 1:
         words, share = "mapped transcript", share * known
     return Outlook(words, share, 1.0 if words == "own model" else None, analysis.range_db, advice)
-
-
-def _advise(analysis: SpeechAnalysis) -> tuple[str, ...]:
-    """Return what would help, the most helpful first: before all else the words, where they are not sure."""
-    recognition, advice = analysis.recognition, []
-    if analysis.fit is not None and analysis.fit.share < LEAST_FITTING_SHARE:
-        advice.append(WHOLE_TRANSCRIPT)
-    if recognition is not None and weigh_words(recognition) < SURE_CONFIDENCE:
-        advice.append(TRANSCRIPT)
-    if analysis.range_db < NOISY_DB:
-        advice.append(LESS_NOISE)
-    if recognition is not None and (recognition.similarity is None or recognition.similarity < FULL_WEIGHT_SCORE):
-        advice.append(OWN_MODEL)
-    return tuple(advice)
 
 
 def generate_passages(
@@ -281,7 +274,19 @@ def generate_passages(
     Raises InputError: as ``generate``, with the time of the passage.
     """
     frames, parts = len(speech.features.values), speech.parts or ()
-    rest, made = finish(generate(_silent_speech(speech), Constraints()), -NOWHERE_S), []
+    silence = Features(
+        np.zeros((REST_FRAMES, speech.features.values.shape[1]), np.float32), REST_FRAMES / FRAME_RATE_HZ
+    )
+    heard = speech.posteriors
+    silent_speech = Speech(
+        silence,
+        Timeline((Span(0.0, silence.duration_s, Unit(SILENCE)),)),
+        None if speech.log_f0 is None else np.full(REST_FRAMES, np.nan, np.float32),
+        spectrum=None if speech.spectrum is None else np.zeros((REST_FRAMES, speech.spectrum.shape[1]), np.float32),
+        posteriors=heard and replace(heard, values=np.repeat(heard.values[:1], REST_FRAMES // 2, axis=0)),
+        encoding=None if speech.encoding is None else np.zeros((REST_FRAMES, speech.encoding.shape[1]), np.float16),
+    )
+    rest, made = finish(generate(silent_speech, Constraints()), -NOWHERE_S), []
     for part in parts:
         start_s = part.first / FRAME_RATE_HZ
         inside = [pin for pin in pins if part.inside.start <= round(pin.time_s * FRAME_RATE_HZ) < part.inside.stop]
@@ -314,20 +319,6 @@ def generate_passages(
             spread.reduced[frame, spread.mixing[:, column] > 0] = 0
     units, trace = _join_units(speech, parts, made, rest.units[0].label), _join_traces(parts, made, rest, frames)
     return replace(rest, motion=motion, spread=spread, units=units, trace=trace)
-
-
-def _silent_speech(speech: Speech) -> Speech:
-    """Return ``REST_FRAMES`` of silence, with everything that some speech has."""
-    silent = Features(np.zeros((REST_FRAMES, speech.features.values.shape[1]), np.float32), REST_FRAMES / FRAME_RATE_HZ)
-    said = speech.posteriors
-    return Speech(
-        silent,
-        Timeline((Span(0.0, silent.duration_s, Unit(SILENCE)),)),
-        None if speech.log_f0 is None else np.full(REST_FRAMES, np.nan, np.float32),
-        spectrum=None if speech.spectrum is None else np.zeros((REST_FRAMES, speech.spectrum.shape[1]), np.float32),
-        posteriors=None if said is None else replace(said, values=np.repeat(said.values[:1], REST_FRAMES // 2, axis=0)),
-        encoding=None if speech.encoding is None else np.zeros((REST_FRAMES, speech.encoding.shape[1]), np.float16),
-    )
 
 
 def _join_rows(

@@ -39,7 +39,6 @@ class Model:
 
     phones     : phone models for recognition and alignment
     engine     : the engine, with its configuration
-    learned    : the engine's model of motion
     about      : corpus, split, seed, versions, licence, attribution, by name: the information for users
     adaptation : adaptation of the phone models to a speaker (None: not adapted)
     eigenlips  : principal components of mouth pictures (None: the channels do not contain their coefficients)

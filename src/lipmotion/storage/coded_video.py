@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from bisect import bisect_right
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -13,9 +15,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.storage.frame_groups import FrameGroups
 from lipmotion.storage.media import MAX_PIXELS, bound_allocations, x264_instructions
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
+
+Frame = NDArray[np.uint8]
+ReadFrames = Callable[[int, int], Iterable[Frame]]
+
+MAX_DECODED_BYTES = 160 * 2**20
+"""Decoded frames that are kept, bytes; those of two groups are kept however large they are."""
+
+
+class FrameGroups:
+    """Any frame of a video that is decoded group by group; the groups used last are kept.
+
+    read   : returns the frames of a group, from the first (included) to the last (excluded), in order
+    starts : first frame of each group, rising from 0, and the number of all frames at the end
+    most_bytes : decoded frames that are kept, beside those of the last two groups
+    Not for several threads.
+    """
+
+    def __init__(self, read: ReadFrames, starts: Sequence[int], most_bytes: int = MAX_DECODED_BYTES) -> None:
+        self._read = read
+        self._starts = list(starts)
+        self._most_bytes = most_bytes
+        self._groups: OrderedDict[int, list[Frame]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return self._starts[-1]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the decoded frames that are kept."""
+        return sum(frame.nbytes for group in self._groups.values() for frame in group)
+
+    def frame(self, index: int) -> Frame:
+        """Return a frame: uint8 array [shape=(H, W, 3)], which is not to be changed.
+
+        Raises IndexError: there is no such frame. Raises the errors of reading.
+        """
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        group = bisect_right(self._starts, index) - 1
+        if group in self._groups:
+            self._groups.move_to_end(group)
+        else:
+            self._decode(group)
+        return self._groups[group][index - self._starts[group]]
+
+    def _decode(self, group: int) -> None:
+        while len(self._groups) > 1 and (len(self._groups) + 1) * self._largest() > self._most_bytes:
+            self._groups.popitem(last=False)
+        self._groups[group] = list(self._read(self._starts[group], self._starts[group + 1]))
+
+    def _largest(self) -> int:
+        """Return the bytes of the largest group that is kept."""
+        return max(sum(frame.nbytes for frame in group) for group in self._groups.values())
+
 
 Pictures = NDArray[np.uint8]
 Stream = NDArray[np.uint8]
@@ -96,7 +151,6 @@ def encode_video(
     """Return a video whose frames can be read in any order.
 
     frames  : uint8 RGB [shape=(H, W, 3)], all of one size, at least one; taken one at a time
-    rate_hz : frame rate
     crf     : quality, 0 (best) to 51
     group   : frames that are decoded together; fewer take more bytes and less time to reach one of them
     Colours are stored at half the resolution (4:2:0), as in almost every video that a camera wrote.
@@ -182,7 +236,6 @@ _REMEDY = "build the file again, or download it again"
 
 
 def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: str) -> Iterator[bytes]:
-    """Yield the bytes of every frame."""
     import av
 
     if not 0 <= crf <= 51 or group < 1:
@@ -227,10 +280,7 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
 
 
 def _layout(data: Stream) -> tuple[list[int], list[int]]:
-    """Return where each frame begins, and the end; and the first frame of each group, and the number of frames.
-
-    Raises ValueError: not a stream of such frames.
-    """
+    """Return where each frame begins, and the end; and the first frame of each group, and the number of frames."""
     if data.ndim != 1 or data.dtype != np.uint8 or len(data) < 8:
         raise ValueError(f"a stream of shape {data.shape} and type {data.dtype}, required bytes")
     starts = np.flatnonzero((data[:-3] == 0) & (data[1:-2] == 0) & (data[2:-1] == 1))

@@ -95,7 +95,6 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
     """Return the text of a file in UTF-8, UTF-16 or UTF-32, without a byte order mark.
 
     UTF-16 may be without its mark, where every other byte of most letters is 0.
-    kind    : what it should be, for messages
     western : what is none of these is in the code page of Windows in western Europe and America; a warning says so
     Raises InputError: no such file, not a file, larger than ``largest`` bytes, or no such text.
     """
@@ -127,10 +126,7 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:
-    """Raise ExportError unless a file can be written at ``target``; called before the work that leads to it.
-
-    source : a recording that must not be overwritten
-    """
+    """Raise ExportError unless a file can be written at ``target``; called before the work that leads to it."""
     try:
         is_folder = target.is_dir()
         _check_parent(_place(target))
@@ -215,10 +211,7 @@ def is_link(path: Path) -> bool:
 
 @contextmanager
 def _reached(folder: Path, *, create: bool = False) -> Iterator[int | None]:
-    """Give a handle of a folder in a confined one; None: it is in none, or the system has no handles of folders.
-
-    Raises ExportError: a link is on the way. OSError: there is no such folder, or it cannot be created.
-    """
+    """Give a handle of a folder in a confined one; None: it is in none, or the system has no handles of folders."""
     inside = _confined_names(folder / "name")
     if inside is None:
         if create:
@@ -330,10 +323,7 @@ def _temporary(target: Path, suffix: str) -> Path:
 
 
 def _prefix(target: Path) -> str:
-    """Return the prefix of temporary names for a target on this machine; for a temporary target, its own name first.
-
-    Who sweeps up a temporary target by its name then also finds what was written towards it.
-    """
+    """Return the prefix of temporary names for a target on this machine; for a temporary target, its own name first."""
     name = f"{platform.node()}/{target.name}".encode(errors="surrogatepass")
     first = f"{target.stem}-" if target.name.startswith(TEMPORARY) else TEMPORARY
     return f"{first}{hashlib.sha256(name).hexdigest()[:8]}-"
@@ -360,10 +350,7 @@ def _sweep(target: Path) -> None:
 
 
 def _place(target: Path) -> Path:
-    """Return the path that an output is written to; for a link, that of its target, so that the link remains.
-
-    In a confined folder no link is followed.
-    """
+    """Return the path that an output is written to; for a link, that of its target, so that the link remains."""
     if _confined_names(target):
         return target
     try:
@@ -487,36 +474,27 @@ def _open_lock(path: Path) -> IO[bytes]:
         try:
             file = open_own(path, buffering=0)
             _lock(file)
-            if _is_there(path, file):
-                with suppress(OSError):  # a full disk
-                    file.truncate(0)
-                    file.write(str(os.getpid()).encode())
-                return file
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(file.fileno()), path.stat()):  # it is still the one of that name
+                    with suppress(OSError):  # a full disk
+                        file.truncate(0)
+                        file.write(str(os.getpid()).encode())
+                    return file
             file.close()  # the process that held it has just deleted it
         except BlockingIOError as error:
-            raise _busy(path, file) from error
+            owner = b""
+            if file is not None:
+                with file:
+                    file.seek(0)
+                    owner = file.read()
+            who = owner.decode(errors="replace") or "unknown"
+            raise ExportError(
+                f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it, or stop it"
+            ) from error
         except BaseException:
             if file is not None:
                 file.close()
             raise
-
-
-def _is_there(path: Path, file: IO[bytes]) -> bool:
-    """Return whether the open file is still the one at a path."""
-    try:
-        return os.path.samestat(os.fstat(file.fileno()), path.stat())
-    except FileNotFoundError:
-        return False
-
-
-def _busy(path: Path, file: IO[bytes] | None) -> ExportError:
-    owner = b""
-    if file is not None:
-        with file:
-            file.seek(0)
-            owner = file.read()
-    who = owner.decode(errors="replace") or "unknown"
-    return ExportError(f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it, or stop it")
 
 
 if sys.platform == "win32":

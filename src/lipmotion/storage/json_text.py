@@ -144,7 +144,6 @@ def finite(text: str) -> float:
 def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
     """Return the content of a TOML file.
 
-    kind    : what the file is, in messages
     instead : what to use with Python 3.10, which cannot read TOML
     Raises InputError: no such file, no TOML, or Python 3.10.
     """

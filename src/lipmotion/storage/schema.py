@@ -98,23 +98,18 @@ def check_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) ->
             array = arrays[name]
             if array.dtype.kind not in member.kinds or (array.dtype.kind != "U" and array.dtype.itemsize > 8):
                 raise ValueError(f"{name} holds {array.dtype}, required {_KINDS[np.dtype(member.dtype).kind]}")
-            sizes |= _check_shape(name, array, member, sizes)
+            letters = member.shape.split()
+            known = dict(zip(letters, array.shape, strict=False))
+            known |= {letter: size for letter, size in sizes.items() if letter in known}
+            known |= {letter: int(letter) for letter in letters if letter.isdigit()}
+            if array.shape != tuple(known.get(letter, 0) for letter in letters):
+                required = ", ".join(str(sizes.get(letter, letter)) for letter in letters) + "," * (len(letters) == 1)
+                raise ValueError(f"{name} of shape {array.shape}, required ({required})")
+            if any(not size and letter.isupper() for letter, size in known.items()):
+                raise ValueError(f"{name} of shape {array.shape}, required at least one of each")
+            sizes |= {letter: size for letter, size in known.items() if not letter.isdigit()}
             _check_range(name, array, member)
     return sizes
-
-
-def _check_shape(name: str, array: NDArray[Any], member: ArraySpec, sizes: Mapping[str, int]) -> dict[str, int]:
-    """Return the size of each letter of an array."""
-    letters = member.shape.split()
-    known = dict(zip(letters, array.shape, strict=False))
-    known |= {letter: size for letter, size in sizes.items() if letter in known}
-    known |= {letter: int(letter) for letter in letters if letter.isdigit()}
-    if array.shape != tuple(known.get(letter, 0) for letter in letters):
-        required = ", ".join(str(sizes.get(letter, letter)) for letter in letters) + "," * (len(letters) == 1)
-        raise ValueError(f"{name} of shape {array.shape}, required ({required})")
-    if any(not size and letter.isupper() for letter, size in known.items()):
-        raise ValueError(f"{name} of shape {array.shape}, required at least one of each")
-    return {letter: size for letter, size in known.items() if not letter.isdigit()}
 
 
 def _check_range(name: str, array: NDArray[Any], member: ArraySpec) -> None:

@@ -31,9 +31,7 @@ def check_apart(
 ) -> None:
     """Raise ExportError if writing would overwrite what the same call reads.
 
-    targets : files to be written
     folders : folders to be filled or emptied
-    force   : allow a file to replace a replaceable source
     Files are compared by device and inode, whatever their names, through links of both kinds. No output may lie in a
     folder that is read, and no input in a folder that is written.
     """
@@ -50,10 +48,7 @@ def check_apart(
 
 
 def _find_clash(target: Path, source: Path, *, holds: bool) -> str:
-    """Return how an output and an input clash: ``is``, ``lies in``, ``belongs to`` or ``holds``; "" where they do not.
-
-    holds : whether the output is a folder, which may contain the input
-    """
+    """Return how an output and an input clash: ``is``, ``lies in``, ``belongs to``, ``holds``; "": they do not."""
     place = Path(os.path.realpath(target))
     if is_same(place, source):
         return "is"

@@ -192,7 +192,23 @@ def synthesise(
     _check(phones, pitch_hz, rate_hz)
     edges_s = np.concatenate([[0.0], np.cumsum([duration_s for _, duration_s in phones])])
     noise = np.random.default_rng(seed).standard_normal((3, round(float(edges_s[-1]) * rate_hz)))
-    speech = _speech(_tracks([PHONE_TARGETS[phone] for phone, _ in phones], edges_s, rate_hz), noise, pitch_hz, rate_hz)
+    tracks = _tracks([PHONE_TARGETS[phone] for phone, _ in phones], edges_s, rate_hz)
+    count, hop = noise.shape[1], rate_hz // CONTROL_HZ
+    centres = (np.arange(len(tracks.levels)) + 0.5) * hop
+    voicing, aspiration, frication = (np.interp(np.arange(count), centres, level) for level in tracks.levels.T)
+    pitch = pitch_hz * np.linspace(1 + _DECLINATION, 1 - _DECLINATION, count)
+    opened = np.cumsum(pitch / rate_hz) % 1.0 / _OPEN_SHARE
+    source = (
+        voicing * lfilter([1 - _TILT], [1.0, -_TILT], np.where(opened < 1, opened * (2 - 3 * opened), 0.0))
+        + aspiration * noise[0]
+    )
+    high = np.ones((len(tracks.formants), 1))
+    centre = np.concatenate([high * _HIGH_HZ, tracks.formants[:, ::-1]], axis=1)
+    width = np.concatenate([high * _HIGH_WIDTHS_HZ, tracks.widths[:, ::-1]], axis=1)
+    a1, a2 = _poles(centre, width, rate_hz)
+    zero, one = np.zeros_like(a1), np.ones_like(a1)
+    voiced = _filtered(source, np.stack([1 + a1 + a2, zero, zero, one, a1, a2], axis=-1), hop)
+    speech = voiced + _filtered(frication * noise[1], _frication_sections(tracks, rate_hz), hop)
     samples = _GAIN * speech + 10 ** (FLOOR_DB / 20) * noise[2]
     spans = (Span(float(a), float(b), Unit(p)) for (p, _), a, b in zip(phones, edges_s, edges_s[1:], strict=False))
     return Audio(samples.astype(np.float32), rate_hz), Timeline(tuple(spans))
@@ -256,39 +272,6 @@ def _with_formants(segments: Sequence[TargetSegment]) -> list[TargetSegment]:
 
 def _smooth(frames: Array, deviation_s: float) -> Array:
     return gaussian_filter1d(frames, deviation_s * CONTROL_HZ, axis=0, mode="nearest")
-
-
-def _speech(tracks: _Tracks, noise: Array, pitch_hz: float, rate_hz: int) -> Array:
-    """Return the speech signal [shape=(samples,)].
-
-    noise : excites aspiration and frication [shape=(≥ 2, samples)]
-    """
-    count, hop = noise.shape[1], rate_hz // CONTROL_HZ
-    centres = (np.arange(len(tracks.levels)) + 0.5) * hop
-    voicing, aspiration, frication = (np.interp(np.arange(count), centres, level) for level in tracks.levels.T)
-    source = voicing * _pulses(count, pitch_hz, rate_hz) + aspiration * noise[0]
-    voiced = _filtered(source, _formant_sections(tracks, rate_hz), hop)
-    return voiced + _filtered(frication * noise[1], _frication_sections(tracks, rate_hz), hop)
-
-
-def _pulses(count: int, pitch_hz: float, rate_hz: int) -> Array:
-    """Return the derivative of the glottal flow, peak −1 [shape=(count,)]."""
-    pitch = pitch_hz * np.linspace(1 + _DECLINATION, 1 - _DECLINATION, count)
-    opened = np.cumsum(pitch / rate_hz) % 1.0 / _OPEN_SHARE
-    return lfilter([1 - _TILT], [1.0, -_TILT], np.where(opened < 1, opened * (2 - 3 * opened), 0.0))
-
-
-def _formant_sections(tracks: _Tracks, rate_hz: int) -> Array:
-    """Return F5–F1 as second-order sections of unit gain at 0 Hz [shape=(frames, 5, 6)].
-
-    F1 comes last: it damps the clicks that the changes of the others make.
-    """
-    high = np.ones((len(tracks.formants), 1))
-    centre = np.concatenate([high * _HIGH_HZ, tracks.formants[:, ::-1]], axis=1)
-    width = np.concatenate([high * _HIGH_WIDTHS_HZ, tracks.widths[:, ::-1]], axis=1)
-    a1, a2 = _poles(centre, width, rate_hz)
-    zero, one = np.zeros_like(a1), np.ones_like(a1)
-    return np.stack([1 + a1 + a2, zero, zero, one, a1, a2], axis=-1)
 
 
 def _frication_sections(tracks: _Tracks, rate_hz: int) -> Array:

@@ -28,23 +28,6 @@ SHADE = 0.15
 THINNEST_PX = 0.2
 
 
-def toy_mouths(motion: Motion) -> NDArray[np.uint8]:
-    """Return the mouth pictures [shape=(T, 56, 72, 3)] of the channels ``opening``, ``width`` and ``outer``."""
-    opening, width, outer = (
-        motion[name][:, None, None] * EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
-    )
-    x = np.arange(WIDTH)[None, None, :] + 0.5 - WIDTH / 2
-    y = np.arange(HEIGHT)[None, :, None] + 0.5 - HEIGHT / 2
-    shade = 1 - SHADE * np.arange(HEIGHT)[:, None, None] / HEIGHT
-    picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), HEIGHT, WIDTH, 3))
-    for colour, across, down in ((LIPS, width, outer), (INSIDE, INNER_WIDTH * width, opening)):
-        across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)  # noqa: PLW2901
-        radius = np.hypot(x / across, y / down)
-        share = np.clip(0.5 + (1 - radius) * np.minimum(across, down), 0, 1)[..., None]  # of the pixel in the ellipse
-        picture = (1 - share) * picture + share * np.array(colour)
-    return np.rint(picture).astype(np.uint8)
-
-
 WORDS: dict[str, tuple[str, ...]] = {
     "baby": ("b", "ey", "b", "iy"),
     "blue": ("b", "l", "uw"),
@@ -214,7 +197,19 @@ def _speak_sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.ra
 @lru_cache(maxsize=32)
 def _utterance(sentence: ToySentence) -> Utterance:
     motion = toy_motion(sentence.units, CAMERA_HZ)
-    track = Track(motion, np.ones(len(motion.values), dtype=bool), toy_mouths(motion))
+    opening, width, outer = (
+        motion[name][:, None, None] * EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
+    )
+    x = np.arange(WIDTH)[None, None, :] + 0.5 - WIDTH / 2
+    y = np.arange(HEIGHT)[None, :, None] + 0.5 - HEIGHT / 2
+    shade = 1 - SHADE * np.arange(HEIGHT)[:, None, None] / HEIGHT
+    picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), HEIGHT, WIDTH, 3))
+    for colour, across, down in ((LIPS, width, outer), (INSIDE, INNER_WIDTH * width, opening)):
+        across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)  # noqa: PLW2901
+        radius = np.hypot(x / across, y / down)
+        share = np.clip(0.5 + (1 - radius) * np.minimum(across, down), 0, 1)[..., None]  # of the pixel in the ellipse
+        picture = (1 - share) * picture + share * np.array(colour)
+    track = Track(motion, np.ones(len(motion.values), dtype=bool), np.rint(picture).astype(np.uint8))
     source = {"file": "", "licence": "synthesised by lipmotion"}
     return Utterance(
         sentence.name, sentence.audio, analysed(sentence.audio).mfcc(), track, sentence.words, sentence.split, source

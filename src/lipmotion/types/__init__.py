@@ -7,10 +7,24 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from lipmotion.types.audio import Audio, Prosody, VoiceEvent, from_sixteen_bits, to_sixteen_bits
+    from lipmotion.types.audio import (
+        ENERGY_FEATURE,
+        FRAME_RATE_HZ,
+        SPECTRUM_BANDS,
+        Audio,
+        Features,
+        JoinedRows,
+        Prosody,
+        TokenPosteriors,
+        VoiceEvent,
+        frame_of,
+        frames_of,
+        from_sixteen_bits,
+        to_sixteen_bits,
+    )
     from lipmotion.types.confidence import SpeechKnowledge
     from lipmotion.types.configuration import Configuration, Rule, option
-    from lipmotion.types.delivery import Delivery
+    from lipmotion.types.delivery import Delivery, Staging
     from lipmotion.types.explanation import (
         ChainPosteriors,
         ChainStates,
@@ -19,16 +33,6 @@ if TYPE_CHECKING:
         Explanation,
         NamedProbability,
         RegressedMean,
-    )
-    from lipmotion.types.features import (
-        ENERGY_FEATURE,
-        FRAME_RATE_HZ,
-        SPECTRUM_BANDS,
-        Features,
-        JoinedRows,
-        TokenPosteriors,
-        frame_of,
-        frames_of,
     )
     from lipmotion.types.generation import (
         ConditionSpectrum,
@@ -58,80 +62,23 @@ if TYPE_CHECKING:
         sub_monitor,
         with_progress,
     )
-    from lipmotion.types.staging import Staging
     from lipmotion.types.timeline import Span, Timeline, Unit
     from lipmotion.types.utterance import TimedTranscript, TimedWord, Track, TranscriptLine, Utterance, sort_lines
 
 __all__ = [
-    "ENERGY_FEATURE",
-    "EYE_DISTANCE",
-    "FRAME_RATE_HZ",
-    "GREY",
-    "SPECTRUM_BANDS",
-    "WEIGHT",
-    "Audio",
-    "ChainPosteriors",
-    "ChainStates",
-    "Channel",
-    "ChannelValue",
-    "ConditionSpectrum",
-    "Configuration",
-    "Constraints",
-    "CurveEdit",
-    "Delivery",
-    "DominantGaussian",
-    "DrawnCurve",
-    "Example",
-    "Explanation",
-    "Features",
-    "Gain",
-    "Generation",
-    "Hold",
-    "Item",
-    "JoinedRows",
-    "Monitor",
-    "Motion",
-    "NamedProbability",
-    "Outlook",
-    "ParallelMap",
-    "Pin",
-    "PriorOutput",
-    "Progress",
-    "Prosody",
-    "ReducedVariance",
-    "RegressedMean",
-    "Rule",
-    "Span",
-    "Speech",
-    "SpeechKnowledge",
-    "SpeechPart",
-    "SpokenText",
-    "Staging",
-    "StateTrace",
-    "TimedTranscript",
-    "TimedWord",
-    "Timeline",
-    "TokenPosteriors",
-    "Track",
-    "TranscriptLine",
-    "Unit",
-    "Utterance",
-    "VoiceEvent",
-    "check_curves",
-    "check_magnitude",
-    "frame_of",
-    "frames_of",
-    "from_sixteen_bits",
-    "option",
-    "silent_monitor",
-    "sort_lines",
-    "sub_monitor",
-    "to_sixteen_bits",
-    "with_progress",
-]
+    "ENERGY_FEATURE", "EYE_DISTANCE", "FRAME_RATE_HZ", "GREY", "SPECTRUM_BANDS", "WEIGHT", "Audio", "ChainPosteriors",
+    "ChainStates", "Channel", "ChannelValue", "ConditionSpectrum", "Configuration", "Constraints", "CurveEdit",
+    "Delivery", "DominantGaussian", "DrawnCurve", "Example", "Explanation", "Features", "Gain", "Generation", "Hold",
+    "Item", "JoinedRows", "Monitor", "Motion", "NamedProbability", "Outlook", "ParallelMap", "Pin", "PriorOutput",
+    "Progress", "Prosody", "ReducedVariance", "RegressedMean", "Rule", "Span", "Speech", "SpeechKnowledge",
+    "SpeechPart", "SpokenText", "Staging", "StateTrace", "TimedTranscript", "TimedWord", "Timeline",
+    "TokenPosteriors", "Track", "TranscriptLine", "Unit", "Utterance", "VoiceEvent", "check_curves",
+    "check_magnitude", "frame_of", "frames_of", "from_sixteen_bits", "option", "silent_monitor", "sort_lines",
+    "sub_monitor", "to_sixteen_bits", "with_progress",
+]  # fmt: skip
 
 _MODULES = (
-    *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "confidence"),
+    *("configuration", "delivery", "audio", "timeline", "motion", "confidence"),
     *("generation", "progress", "explanation", "utterance"),
 )
 """Where the names are looked for, in this order."""

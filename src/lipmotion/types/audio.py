@@ -1,12 +1,16 @@
-"""Sampled sound, how loud and how high a voice is, and its events beside words: laughter, breath and effort."""
+"""Sampled sound, its acoustic features, how loud and how high a voice is, and its events beside words."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lipmotion.types.timeline import Span
 
 FULL_SCALE = 32_768
 """The 16-bit value of a sample of 1, which is one more than there is."""
@@ -78,3 +82,86 @@ class VoiceEvent:
         """Return the event with ``offset_s`` seconds added to all times."""
         calls = tuple((time_s + offset_s, loudness) for time_s, loudness in self.calls)
         return replace(self, start_s=self.start_s + offset_s, end_s=self.end_s + offset_s, calls=calls)
+
+
+FRAME_RATE_HZ = 100.0
+"""Frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds."""
+ENERGY_FEATURE = 12
+"""The acoustic feature that is the log energy."""
+SPECTRUM_BANDS = 40
+"""Mel bands of a spectrum, the input of acoustic networks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """Acoustic features of one recording: mel-frequency cepstral coefficients with Δ and Δ².
+
+    values     : float32 array [shape=(T, 39)], normalised per recording; frame n is centred at n / 100 seconds
+    duration_s : duration of the recording in seconds; T = floor(duration_s * 100) + 1
+    """
+
+    values: NDArray[np.float32]
+    duration_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class TokenPosteriors:
+    """Posteriors of the tokens of a phone recogniser in a recording.
+
+    values : float16 array [shape=(ceil(T / 2), K)], natural logarithms; row n is centred at n / 50 seconds
+    source : name, version and digest of the recogniser
+    mean   : the mean posterior of the phones that it finds, 0 to 1: how sure it is of them
+    """
+
+    values: NDArray[np.float16]
+    source: str
+    mean: float
+
+
+class JoinedRows:
+    """Rows of a whole recording, some of which are one row in memory, as those of hours of silence.
+
+    It is used as an array, which takes the memory of all rows: ``np.asarray(rows)``, or of some: ``rows[first:stop]``.
+    """
+
+    def __init__(self, parts: Sequence[NDArray[Any]]) -> None:
+        self._parts = parts
+        self.shape = (sum(map(len, parts)), *parts[0].shape[1:])
+        self.dtype = parts[0].dtype
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, rows: slice) -> NDArray[Any]:
+        first, stop, _ = rows.indices(len(self))
+        starts = np.cumsum([0, *map(len, self._parts)]).tolist()
+        pairs = zip(self._parts, starts, strict=False)
+        return np.concatenate([part[max(first - start, 0) : max(stop - start, 0)] for part, start in pairs])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return self[:].astype(dtype or self.dtype, copy=False)
+
+    def any(self) -> bool:
+        """Return whether a value is not 0."""
+        return any(part.any() for part in self._parts)
+
+
+def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
+    """Return the frame nearest to a time, or None if the time is outside the recording.
+
+    frames : length of the recording, at ``rate_hz``
+    """
+    frame = np.floor(time_s * rate_hz + 0.5)
+    return int(frame) if 0 <= frame < frames else None
+
+
+def frames_of(span: Span[Any], frames: int) -> tuple[int, int]:
+    """Return the first frame of a span at 100 Hz, and the one after its last.
+
+    frames : length of the recording; both are cut to it
+    """
+    return _frame_after(span.start_s, frames), _frame_after(span.end_s, frames)
+
+
+def _frame_after(time_s: float, frames: int) -> int:
+    return ceil(min(max(time_s * FRAME_RATE_HZ - 1e-6, 0), frames))

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.types.audio import Audio, VoiceEvent
+from lipmotion.types.audio import FRAME_RATE_HZ, Audio, Features, TokenPosteriors, VoiceEvent
 from lipmotion.types.confidence import SpeechKnowledge
-from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
-from lipmotion.types.moods import MoodKey
+from lipmotion.types.delivery import MoodKey
 from lipmotion.types.motion import Motion, interpolate_rows
 from lipmotion.types.timeline import Span, Timeline, Unit
 
@@ -44,7 +43,6 @@ class Speech:
     """Speech of one recording: the input of an engine.
 
     features    : acoustic features [T frames]
-    units       : the phones in time
     log_f0      : float32 array [shape=(T,)], natural logarithm of F0 in Hz, NaN in unvoiced frames (None: the engine
                   does not use F0)
     units_known : whether the units are given, labelled, or aligned to known words; False: they were recognised
@@ -435,9 +433,8 @@ class Generation:
     def selected(self, names: Sequence[str]) -> Generation:
         """Return the generation with some channels only, in the given order. Raises InputError: no such channel."""
         columns = [self.motion.column(name) for name in names]
-        channels = tuple(self.motion.channels[column] for column in columns)
-        motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
-        return replace(self, motion=motion, spread=self._change_channels(lambda rows: rows[:, columns]))
+        spread = self._change_channels(lambda rows: rows[:, columns])
+        return replace(self, motion=self.motion.selected(names), spread=spread)
 
     def with_motion(self, motion: Motion) -> Generation:
         """Return the generation with other motion; channels after its own have the variance 0."""

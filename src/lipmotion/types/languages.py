@@ -17,34 +17,16 @@ class Language(NamedTuple):
 
 
 LANGUAGES: dict[str, Language] = {
-    ENGLISH: Language("English", voice="en-us"),
-    "es": Language("Spanish"),
-    "fr": Language("French"),
-    "de": Language("German"),
-    "it": Language("Italian"),
-    "pt": Language("Portuguese"),
-    "nl": Language("Dutch"),
-    "ja": Language("Japanese", ("HIRAGANA", "KATAKANA")),
-    "ko": Language("Korean", ("HANGUL",)),
-    "zh": Language("Mandarin", ("CJK",), "cmn"),
-    "ca": Language("Catalan"),
-    "cs": Language("Czech"),
-    "da": Language("Danish"),
-    "el": Language("Greek", ("GREEK",)),
-    "fi": Language("Finnish"),
-    "hr": Language("Croatian"),
-    "hu": Language("Hungarian"),
-    "id": Language("Indonesian"),
-    "nb": Language("Norwegian"),
-    "pl": Language("Polish"),
-    "ro": Language("Romanian"),
-    "ru": Language("Russian", ("CYRILLIC",)),
-    "sk": Language("Slovak"),
-    "sv": Language("Swedish"),
-    "tr": Language("Turkish"),
-    "uk": Language("Ukrainian", ("CYRILLIC",)),
-    "vi": Language("Vietnamese"),
-}
+    ENGLISH: Language("English", voice="en-us"), "es": Language("Spanish"), "fr": Language("French"),
+    "de": Language("German"), "it": Language("Italian"), "pt": Language("Portuguese"), "nl": Language("Dutch"),
+    "ja": Language("Japanese", ("HIRAGANA", "KATAKANA")), "ko": Language("Korean", ("HANGUL",)),
+    "zh": Language("Mandarin", ("CJK",), "cmn"), "ca": Language("Catalan"), "cs": Language("Czech"),
+    "da": Language("Danish"), "el": Language("Greek", ("GREEK",)), "fi": Language("Finnish"),
+    "hr": Language("Croatian"), "hu": Language("Hungarian"), "id": Language("Indonesian"),
+    "nb": Language("Norwegian"), "pl": Language("Polish"), "ro": Language("Romanian"),
+    "ru": Language("Russian", ("CYRILLIC",)), "sk": Language("Slovak"), "sv": Language("Swedish"),
+    "tr": Language("Turkish"), "uk": Language("Ukrainian", ("CYRILLIC",)), "vi": Language("Vietnamese"),
+}  # fmt: skip
 """By their code of ISO 639-1. Not in it: languages whose script espeak-ng was not tried on."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -93,6 +94,11 @@ class Motion:
             some = ", ".join(self.names[:6]) + (", ..." if len(self.names) > 6 else "")
             raise InputError(f"no motion channel {name!r} among {len(self.names)}: {some}")
         return self.names.index(name)
+
+    def selected(self, names: Sequence[str]) -> Motion:
+        """Return the motion of some channels, in the given order. Raises InputError: no such channel."""
+        columns = [self.column(name) for name in names]
+        return Motion(self.values[:, columns], self.rate_hz, tuple(self.channels[column] for column in columns))
 
     def at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values at some times in seconds [shape=(len(time_s), P)].

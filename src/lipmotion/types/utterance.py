@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.types.audio import Audio
-from lipmotion.types.features import Features
-from lipmotion.types.moods import MoodTag
+from lipmotion.types.audio import Audio, Features
+from lipmotion.types.delivery import MoodTag
 from lipmotion.types.motion import Motion
 from lipmotion.types.timeline import Timeline, Unit
 

@@ -85,16 +85,21 @@ def is_path(text: str) -> bool:
     return bool(sizes) and max(sizes) <= NAME_BYTES and sum(sizes) + len(sizes) <= PATH_BYTES
 
 
-def whole(least: int, most: int) -> Schema:
-    """Return the schema of a whole number in a range, limits included."""
-    required = f"a whole number from {least} to {most}"
+def _fitting(fits: Callable[[Any], bool], required: str) -> Schema:
+    """Return the schema of a value that stays as it is, if it fits."""
 
-    def checked(value: Any) -> int:
-        if type(value) is not int or not least <= value <= most:
+    def checked(value: Any) -> Any:
+        if not fits(value):
             raise SchemaError(describe_value(value), required)
         return value
 
     return checked
+
+
+def whole(least: int, most: int) -> Schema:
+    """Return the schema of a whole number in a range, limits included."""
+    required = f"a whole number from {least} to {most}"
+    return _fitting(lambda value: type(value) is int and least <= value <= most, required)
 
 
 def number(least: float = -math.inf, most: float = math.inf) -> Schema:
@@ -113,29 +118,18 @@ def number(least: float = -math.inf, most: float = math.inf) -> Schema:
     return checked
 
 
-def truth(value: Any) -> bool:
-    """Return a truth value. Raises SchemaError: another one."""
-    if type(value) is not bool:
-        raise SchemaError(describe_value(value), "true or false")
-    return value
+truth = _fitting(lambda value: type(value) is bool, "true or false")
+"""The schema of a truth value."""
 
 
 def text(most: int) -> Schema:
     """Return the schema of a text of at most so many letters, none of them half a character."""
-
-    def checked(value: Any) -> str:
-        if type(value) is not str or len(value) > most or _HALVES.search(value):
-            raise SchemaError(describe_value(value), f"a text of at most {most} letters")
-        return value
-
-    return checked
+    required = f"a text of at most {most} letters"
+    return _fitting(lambda value: type(value) is str and len(value) <= most and not _HALVES.search(value), required)
 
 
-def path(value: Any) -> str:
-    """Return the text of a path; an empty one is none. Raises SchemaError: no file can have it."""
-    if type(value) is not str or not is_path(value):
-        raise SchemaError(describe_value(value), f"a path, of names of at most {NAME_BYTES} bytes")
-    return value
+path = _fitting(lambda value: type(value) is str and is_path(value), f"a path, of names of at most {NAME_BYTES} bytes")
+"""The schema of the text of a path that a file can have; an empty one is none."""
 
 
 def optional(schema: Schema) -> Schema:
@@ -146,13 +140,10 @@ def optional(schema: Schema) -> Schema:
 def one_of(values: Collection[int | str]) -> Schema:
     """Return the schema of a choice among numbers or texts."""
     known = {(type(value), value) for value in values}
-
-    def checked(value: Any) -> int | str:
-        if type(value) not in (int, str) or (type(value), value) not in known:
-            raise SchemaError(describe_value(value), f"one of {', '.join(map(str, values))}")
-        return value
-
-    return checked
+    return _fitting(
+        lambda value: type(value) in (int, str) and (type(value), value) in known,
+        f"one of {', '.join(map(str, values))}",
+    )
 
 
 def items(schema: Schema, least: int = 0, most: int | None = None) -> Schema:

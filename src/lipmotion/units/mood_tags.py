@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
-from lipmotion.types.moods import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
+from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
 from lipmotion.units.phone_timelines import group_words
 from lipmotion.units.spoken_text import find_speaker_names, remove_speakers
 from lipmotion.units.text_normalisation import find_words

@@ -77,7 +77,7 @@ def channel_values(motion: Motion, names: tuple[str, ...]) -> Array:
             f"the motion has no channel {missing[0]!r} ({len(missing)} of the {len(names)} that this face needs are "
             "missing); required: motion of tracked points, or eigenlips, of a model that was trained on videos"
         )
-    values = np.asarray(motion.values[:, [motion.column(name) for name in names]], np.float64)
+    values = np.asarray(motion.selected(names).values, np.float64)
     if not np.isfinite(values).all():
         raise InputError("the motion has values that are not finite; give whole curves")
     return values

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.folder import VIDEO_KINDS
-from lipmotion.corpora.layouts import LRS
+from lipmotion.corpora.folder import LRS, VIDEO_KINDS
 from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels

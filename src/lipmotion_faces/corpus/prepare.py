@@ -13,11 +13,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.entry import quantise, read_entry, write_utterance
 from lipmotion.corpora.folder import discover
-from lipmotion.corpora.separate_sounds import add_separate_sounds
-from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
-from lipmotion.corpora.store import UTTERANCES, Corpus
+from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording, add_separate_sounds
+from lipmotion.corpora.store import UTTERANCES, Corpus, quantise, read_entry, write_utterance
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.workers import process_count, worker_pool

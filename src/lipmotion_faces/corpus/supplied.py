@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lipmotion.corpora.facegood import read_bare_motion
+from lipmotion.corpora.captured_faces import MESH, mesh_files, read_bare_motion, read_mesh_motion
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
-from lipmotion.corpora.vocaset import MESH, mesh_files, read_mesh_motion
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
 from lipmotion.formats.tables import is_live_link_file, read_curve_table, speech_curves
-from lipmotion.pipeline.outputs.motion_input import correct_rate
+from lipmotion.pipeline.outputs.motion_files import correct_rate
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.sound_offset import sound_offset

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.entry import read_entry
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, read_entry
 from lipmotion.kernels.threads import one_thread
-from lipmotion.measures.offset import Offset, best_offset, pooled_offset, shift_scores
+from lipmotion.measures.curves import Offset, best_offset, pooled_offset, shift_scores
 from lipmotion.motion.space import resample_to_model
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.lip_speed import measured_opening_speed, predicted_opening_speed
 from lipmotion.speech.features.mfcc import WINDOW
+from lipmotion.speech.sound.sound_offset import measured_opening_speed, predicted_opening_speed
 from lipmotion.storage.files import lock_folder
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.coded_video import encode_video
-from lipmotion.storage.frame_groups import FrameGroups
+from lipmotion.storage.coded_video import FrameGroups, encode_video
 from lipmotion_faces.appearance.looping import (
     JUMP_LIMIT,
     LoopOrder,

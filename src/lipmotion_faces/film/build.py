@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
-from lipmotion.corpora.store import MANIFEST, Corpus
+from lipmotion.corpora.store import MANIFEST, Corpus, read_entry
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.workers import process_count, worker_pool

@@ -15,7 +15,7 @@ from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace, measure_prosody, shift_prosody
 from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
-from lipmotion.types.moods import MOODS
+from lipmotion.types.delivery import MOODS
 from lipmotion.types.progress import with_reports
 from lipmotion.units.visemes import OPTIONAL
 from lipmotion_faces.base import Face, Staging

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.frame_groups import MAX_DECODED_BYTES, FrameGroups
+from lipmotion.storage.coded_video import MAX_DECODED_BYTES, FrameGroups
 from lipmotion.types import Track
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan, nearest_indices, open_video, resample_to_constant_rate
 from lipmotion_faces.tracking.head_pose import face_to_image

@@ -26,8 +26,8 @@ from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.acoustic_conditions import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.speech.sound.noise import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
 from lipmotion.storage.files import check_listable
 from lipmotion.types import (
     GREY,

@@ -18,7 +18,7 @@ from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionErro
 from lipmotion.formats.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY
-from lipmotion.pipeline.training.fingerprint import fingerprint_training
+from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.storage.files import (
     TEMPORARY,
     atomic_file,

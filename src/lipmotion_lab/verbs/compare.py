@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.figures import add_figures_arguments, report_figures
+from lipmotion.cli.arguments.options import add_figures_arguments, report_figures
 from lipmotion.cli.arguments.paths import add_input
 
 

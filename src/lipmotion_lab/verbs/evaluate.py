@@ -6,8 +6,7 @@ import argparse
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.figures import add_figures_arguments, report_figures
-from lipmotion.cli.arguments.options import list_or_all
+from lipmotion.cli.arguments.options import add_figures_arguments, list_or_all, report_figures
 from lipmotion.cli.arguments.paths import add_input
 from lipmotion.pipeline.request import Request
 

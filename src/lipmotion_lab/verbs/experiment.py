@@ -10,8 +10,15 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.figures import add_figures_arguments, report_figures
-from lipmotion.cli.arguments.options import add_execution, add_workers, list_or_all, numbers, worker_count
+from lipmotion.cli.arguments.options import (
+    add_execution,
+    add_figures_arguments,
+    add_workers,
+    list_or_all,
+    numbers,
+    report_figures,
+    worker_count,
+)
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable

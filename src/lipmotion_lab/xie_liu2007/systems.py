@@ -19,7 +19,7 @@ from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
-from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
+from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
 from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, LoudnessRegression, MeanPose, import_torch
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic

@@ -15,11 +15,10 @@ from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import installed_version
 from lipmotion.formats.base import readable_suffixes
-from lipmotion.pipeline.analysis.recordings import list_recordings
-from lipmotion.pipeline.job import Job, run
+from lipmotion.pipeline.job import Job, list_recordings, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
-from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
-from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
+from lipmotion.pipeline.outputs.output import write
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import atomic_folder, read_text_file, sha256_of

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require, short_speech
 from lipmotion import Corpus, CueSheet
-from lipmotion.corpora.facegood import read_channels
+from lipmotion.corpora.captured_faces import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.formats.base import write_motion
 from lipmotion.formats.c3d import C3dFile, write_c3d

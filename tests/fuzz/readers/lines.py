@@ -12,8 +12,7 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch.ledger import LEDGER, Place, open_ledger, write_receipt
-from lipmotion.pipeline.batch.marks import MARKS, read_marks, write_marks
-from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.report import MARKS, read_marks, write_marks, write_reports
 
 TEXTS = {
     "list.txt": "a/one.wav\nb/two.flac\n\n../three, four.wav\n",

@@ -6,7 +6,7 @@ import pytest
 from lipmotion.engines import engine_named
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.multistream import phone_recogniser as module
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import Features, Timeline
 from lipmotion.types.progress import silent_monitor

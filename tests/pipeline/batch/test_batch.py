@@ -25,7 +25,7 @@ from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finish_line
-from lipmotion.pipeline.batch.pool import WorkerDied
+from lipmotion.pipeline.batch.run import WorkerDied
 from lipmotion.types import Item
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -93,7 +93,7 @@ def test_the_face_of_another_person_is_mapped_onto_once(
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
     monkeypatch.setattr(one_line, "run", lambda job, **_: requests.append(job.request))
     for model, line in ((other, lines[0]), (other, lines[1]), (toy_model, lines[0])):
-        shared = one_line._Shared(model, shown_face(filmed_face), None)
+        shared = (model, shown_face(filmed_face), None)
         monkeypatch.setattr(one_line, "_share", lambda *_, shared=shared: shared)
         one_line._write_line(LineWork(line, Job(), "", Place(str(tmp_path), "a run")))
     assert [request.onto for request in requests] == [Path("a map"), Path("a map"), None]
@@ -474,6 +474,6 @@ def test_a_worker_of_a_cluster_is_killed(
 @pytest.mark.filterwarnings("ignore")
 def test_no_cluster_answers(sounds: Path, settings: Job, tmp_path: Path, monkeypatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("lipmotion.pipeline.batch.pool.CONNECT_S", 1)
+    monkeypatch.setattr("lipmotion.pipeline.batch.run.CONNECT_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         batch(sounds, tmp_path / "out", settings, cluster="tcp://127.0.0.1:9")

@@ -15,7 +15,6 @@ from lipmotion.pipeline.batch.check import (
     FEWEST_LINES,
     CheckedLine,
     Finding,
-    LineToCheck,
     _find_problems,
     check_line,
     count_letters,
@@ -82,7 +81,7 @@ def test_every_kind_is_found(tmp_path: Path) -> None:
 def test_tags_are_no_words(tmp_path: Path) -> None:
     sound(tmp_path / "a.wav", 1.0, 1)
     line = BatchLine("a", str(tmp_path / "a.wav"), "[angry] Who is <smile> there?")
-    assert check_line(LineToCheck(line, Request())).words == ("who", "is", "there")
+    assert check_line(line, Request()).words == ("who", "is", "there")
 
 
 def test_a_folder_has_no_orphans(tmp_path: Path) -> None:

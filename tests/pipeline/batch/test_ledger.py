@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion import Job, Outputs, Request
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.batch import settings
+from lipmotion.pipeline.batch import ledger as settings
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     LARGEST_RECORD_BYTES,
@@ -21,13 +21,16 @@ from lipmotion.pipeline.batch.ledger import (
     WORK,
     Place,
     Record,
+    check_kinds,
+    fingerprint_job,
+    fingerprint_line,
+    input_files,
     open_ledger,
     read_receipt,
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.report import write_reports
-from lipmotion.pipeline.batch.settings import check_kinds, fingerprint_job, fingerprint_line, input_files
 from lipmotion.storage.files import LOCK
 
 CONTENT = b"motion"

@@ -11,8 +11,8 @@ import pytest
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch import lines as lines_module
+from lipmotion.pipeline.batch.ledger import input_files
 from lipmotion.pipeline.batch.lines import check_names
-from lipmotion.pipeline.batch.settings import input_files
 
 
 def listed(folder: Path, text: str, name: str = "list.txt", kinds: tuple[str, ...] = ("json",)) -> list[BatchLine]:

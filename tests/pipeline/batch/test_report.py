@@ -12,8 +12,16 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.pipeline.batch import BatchLine
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
-from lipmotion.pipeline.batch.marks import Mark, is_due, merge_marks, read_marks, write_marks
-from lipmotion.pipeline.batch.report import COLUMNS, rate_doubt, write_reports
+from lipmotion.pipeline.batch.report import (
+    COLUMNS,
+    Mark,
+    is_due,
+    merge_marks,
+    rate_doubt,
+    read_marks,
+    write_marks,
+    write_reports,
+)
 from lipmotion.printable import printable
 
 GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}

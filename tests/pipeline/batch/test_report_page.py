@@ -13,8 +13,7 @@ import pytest
 from children import wait_until
 from lipmotion.pipeline.batch import BatchLine
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
-from lipmotion.pipeline.batch.marks import Mark, read_marks
-from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.report import Mark, read_marks, write_reports
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
 from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, axe_script, browser

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lipmotion import Corpus, prepare
+from lipmotion.corpora.captured_faces import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
 from lipmotion.corpora.folder import discover
-from lipmotion.corpora.vocaset import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
 from lipmotion.errors import InputError
 from meshes.flame import head
 

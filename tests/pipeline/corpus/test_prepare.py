@@ -13,7 +13,7 @@ import pytest
 
 from children import NOWHERE, child
 from lipmotion import Corpus, prepare
-from lipmotion.corpora.entry import read_entry
+from lipmotion.corpora.store import read_entry
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.storage.files import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Track

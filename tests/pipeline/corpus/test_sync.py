@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lipmotion import Corpus
-from lipmotion.corpora.entry import read_entry
-from lipmotion.measures.offset import best_offset
+from lipmotion.corpora.store import read_entry
+from lipmotion.measures.curves import best_offset
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance
@@ -55,7 +55,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     """Two collections: one in step, one whose sound is 120 ms late; loudness is all that their lips follow."""
     energy = np.zeros((11, 13))
     energy[4, 12], energy[6, 12] = -1, 1
-    monkeypatch.setattr("lipmotion.speech.features.lip_speed._weights", energy.ravel)
+    monkeypatch.setattr("lipmotion.speech.sound.sound_offset._weights", energy.ravel)
     made = Corpus.create(tmp_path / "corpus")
     for seed in range(COUNT):
         made.add(utterance(seed, 0.0, "here"), {"recipe": "9"})

@@ -44,7 +44,7 @@ SENTENCES = (
 
 def test_every_kind_of_edit_is_a_sentence() -> None:
     steps = [parse_step(sentence) for sentence in SENTENCES]
-    assert {type(step) for step in steps} == set(STEPS)
+    assert {step.form for step in steps} == set(STEPS)
     assert tuple(map(str, steps)) == SENTENCES
     assert [parse_step(str(step)) for step in steps] == steps
 

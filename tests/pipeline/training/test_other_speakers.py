@@ -23,7 +23,7 @@ from lipmotion.pipeline.training.other_speakers import (
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.noise import spoken_samples
+from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.formant_synthesiser import synthesise

@@ -17,10 +17,10 @@ from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.pipeline.model import BOTH, GEOMETRY
-from lipmotion.pipeline.training import fingerprint as fingerprints
 from lipmotion.pipeline.training import labels
+from lipmotion.pipeline.training import labels as fingerprints
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.fingerprint import fingerprint_training
+from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 

@@ -3,16 +3,16 @@ import pytest
 from pocketsphinx import Decoder
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.speech.recognition.general import acoustic
-from lipmotion.speech.recognition.general.acoustic import (
+from lipmotion.speech.recognition import general as acoustic
+from lipmotion.speech.recognition.general import (
     PHONES,
     STATES,
     STREAMS,
     density_column,
+    english_bigram,
+    general_features,
     general_model,
 )
-from lipmotion.speech.recognition.general.front_end import general_features
-from lipmotion.speech.recognition.general.language import english_bigram
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio
@@ -88,7 +88,7 @@ def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
     """Its decoder, with its own features and search, puts the phones of a sentence where our densities do."""
     from lipmotion import load_model
     from lipmotion.hmm.align import align_units
-    from lipmotion.speech.recognition.combined_phones import combine_phones, combined_log_likelihoods
+    from lipmotion.speech.recognition.general import combine_phones, combined_log_likelihoods
 
     sample = (toy_sentence.audio.samples * 32767).astype("<i2").tobytes()
     decoder = Decoder(lm=None, loglevel="FATAL", beam=1e-80, wbeam=1e-60, pbeam=1e-80)

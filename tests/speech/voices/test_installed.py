@@ -13,15 +13,14 @@ from lipmotion import Model
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.noise import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.voices import espeak_events, programs
-from lipmotion.speech.voices.flite import parse_phone_ends
 from lipmotion.speech.voices.installed import (
     SYNTHESISERS,
     all_voices,
     default_voice,
     installed_voices,
-    speak_sentence,
+    parse_phone_ends,
     speak_sentences,
     voice_named,
     voiced_sentences,
@@ -50,7 +49,7 @@ def test_voices_are_listed() -> None:
 @pytest.mark.usefixtures("faked")
 def test_a_voice_says_phones_in_time() -> None:
     for voice in EACH:
-        audio, units = speak_sentence("Hello", voice)
+        audio, units = next(speak_sentences(["Hello"], voice))
         assert audio.rate_hz == 16_000
         assert audio.duration_s == pytest.approx(1.0)
         found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
@@ -71,14 +70,14 @@ def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice) -> None:
 def test_errors_are_clear_and_nothing_stays(faked: Path, voice: SyntheticVoice) -> None:
     for text, message in (("they crash", "failed with 1 .no such sound"), ("nonsense", "nonsense")):
         with pytest.raises(InputError, match=message):
-            speak_sentence(text, voice)
+            next(speak_sentences([text], voice))
         assert list(faked.iterdir()) == []
 
 
 def test_bytes_that_are_no_text_and_texts_without_words_are_refused(faked: Path) -> None:
     for text, message in (("no bytes", "cannot be run|nonsense"), ("... ", "holds no word")):
         with pytest.raises(InputError, match=message):
-            speak_sentence(text, FAKED[0])
+            next(speak_sentences([text], FAKED[0]))
     assert list(faked.iterdir()) == []
 
 
@@ -115,7 +114,7 @@ def test_voices_by_name() -> None:
         with pytest.raises(InputError, match=message):
             voice_named(name)
     with pytest.raises(InputError, match="no voice 'rms' here; it has: kal16, slt"):
-        speak_sentence("Hello", SyntheticVoice("rms", "flite", "rms"))
+        next(speak_sentences(["Hello"], SyntheticVoice("rms", "flite", "rms")))
 
 
 @pytest.mark.usefixtures("bare")
@@ -123,7 +122,7 @@ def test_without_synthesisers_it_says_what_to_install() -> None:
     assert installed_voices() == ()
     for voice in EACH:
         with pytest.raises(MissingDependencyError, match=f"apt install {voice.synthesiser}"):
-            speak_sentence("Hello", voice)
+            next(speak_sentences(["Hello"], voice))
     for find in (default_voice, lambda: voice_named("slt")):
         with pytest.raises(MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
             find()

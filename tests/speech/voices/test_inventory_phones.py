@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.speech.voices import inventory_phones as module
 from lipmotion.speech.voices.inventory_phones import inventory_timeline, matches, with_words
-from lipmotion.speech.voices.phone_maps import ARPABET_PHONES, ESPEAK_PHONES, complete_map
+from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, ESPEAK_PHONES, complete_map
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from oracles.edits import least_cost

@@ -13,8 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.job import DETAILS, Job
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types.configuration import Configuration, kind_of
-from lipmotion.types.delivery import Delivery
-from lipmotion.types.staging import Staging
+from lipmotion.types.delivery import Delivery, Staging
 
 PartT = TypeVar("PartT", bound=Configuration)
 OF_ANIMATE = ("posteriors", "kinds")
@@ -97,7 +96,6 @@ def _moves(each: Field[Any], still: str) -> bool:
 
 
 def _flags(each: Field[Any]) -> tuple[str, ...]:
-    """Return the names of an option on the command line."""
     usual = each.metadata.get("still", "--" + each.name.replace("_", "-"))
     flags: tuple[str, ...] = each.metadata.get("flags", (usual,))
     return flags

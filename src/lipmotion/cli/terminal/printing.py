@@ -94,7 +94,6 @@ def print_error_json(document: Any, *, spaced: bool = False) -> None:
 
 
 def _spaced(document: Any) -> str:
-    """Return a JSON document with a space within all braces."""
     if not isinstance(document, dict):
         return as_json(document)
     return f"{{ {', '.join(f'{as_json(name)}: {_spaced(value)}' for name, value in document.items())} }}"

@@ -1,18 +1,24 @@
-"""Progress of long work, shown on a terminal or written as events for a program (docs/long-work.md)."""
+"""Progress and warnings of commands: on a terminal, as events (docs/long-work.md), or as Rhubarb has them."""
 
 from __future__ import annotations
 
 import argparse
+import errno
 import logging
+import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Protocol
 
-from lipmotion.cli.terminal.events import JsonLines
+from lipmotion.cli.terminal.events import Events, JsonLines, RhubarbStatus
 from lipmotion.cli.terminal.printing import print_error, print_lines, with_program_name
 from lipmotion.cli.terminal.stop import Stopper
+from lipmotion.errors import ExportError, InputError, LipMotionError
+from lipmotion.extensions import describe_failed_extension
 from lipmotion.printable import printable
+from lipmotion.storage.files import as_text
 from lipmotion.types.progress import Item, Progress
 
 
@@ -130,3 +136,104 @@ class _MachineReport:
 
     def close(self) -> None:
         """Do nothing: there is no progress bar to remove."""
+
+
+GONE = "the current folder has been deleted; go to one that exists"
+HEAD_CHARACTERS, TAIL_CHARACTERS = 700, 300
+"""Characters of a long line that are shown from its beginning and from its end."""
+
+
+def outcome(error: BaseException) -> tuple[int, str] | None:
+    """Return the exit code and the one-line message of an expected error, or one of an extension; None: a bug."""
+    if isinstance(error, LipMotionError):
+        return error.exit_code, one_line(error)
+    if isinstance(error, MemoryError):
+        return InputError.exit_code, f"not enough memory ({error}); give a shorter recording or a smaller file"
+    if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
+        nameless = (error.errno, error.strerror, error.filename) == (errno.ENOENT, os.strerror(errno.ENOENT), None)
+        return InputError.exit_code, one_line(GONE if nameless else error)  # the current folder
+    failed = describe_failed_extension(error)
+    return None if failed is None else (InputError.exit_code, one_line(failed))
+
+
+def one_line(message: object) -> str:
+    """Return a message as a printable line of limited length; the middle of a longer one is left out, for its end says
+    what to do."""
+    line = printable(message)
+    return (
+        line
+        if len(line) <= HEAD_CHARACTERS + TAIL_CHARACTERS
+        else f"{line[:HEAD_CHARACTERS]} ... {line[-TAIL_CHARACTERS:]}"
+    )
+
+
+LEVELS = {"trace": 5, "debug": 10, "info": 20, "warning": 30, "error": 40, "fatal": 50}
+"""Rhubarb's levels of messages, as numbers of ``logging``."""
+_NAMES = {number: name.capitalize() for name, number in LEVELS.items()}
+
+
+@contextmanager
+def status_lines(options: argparse.Namespace) -> Iterator[Callable[[float], None]]:
+    """Yield a function that reports progress, 0 to 1; report success at the end.
+
+    Warnings become events, too, where events are asked for, and go to the log file, where there is one, which is told
+    how it ended as well. Raises ExportError: that file cannot be written.
+    """
+    events: Events = options.events
+    root = logging.getLogger()
+    handlers, log = root.handlers, _log_file(options)
+    console = [_StatusHandler(events)] if isinstance(events, RhubarbStatus) else handlers
+    root.handlers = [*(console if LEVELS[options.console_level] <= logging.WARNING else ()), log]
+
+    def note(level: str, message: str) -> None:
+        if LEVELS[level] >= log.level:
+            log.handle(logging.LogRecord("", LEVELS[level], "", 0, message, None, None))
+
+    def progress(done: float) -> None:
+        note("trace", f"Progress: {done:.0%}")
+        if isinstance(events, RhubarbStatus):
+            events.emit("progress", "Trace", f"Progress: {done:.0%}", value=done)
+
+    try:
+        note("info", f"Application startup. Input file: {as_text(options.speech)}.")
+        yield progress
+        options.stopper.settle()
+        note("info", "Application terminating normally.")
+        if isinstance(events, RhubarbStatus):
+            events.succeed()
+    except Exception as error:
+        known = outcome(error)
+        note("fatal", f"Application terminating with error: {known[1] if known else error!r}")
+        raise
+    finally:
+        root.handlers = handlers
+        log.close()
+
+
+def _log_file(options: argparse.Namespace) -> logging.Handler:
+    """Return what writes the log file; without one, what writes nothing."""
+    path: Path | None = options.log_file
+    if path is None:
+        return logging.NullHandler(LEVELS["fatal"] + 1)
+    try:
+        handler = logging.FileHandler(path, mode="w", encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        raise ExportError(f"{path}: the log cannot be written: {error.strerror or error}") from error
+    handler.setLevel(LEVELS[options.log_level])
+    handler.setFormatter(_LogFormatter(datefmt="%Y-%m-%d %H:%M:%S"))
+    return handler
+
+
+class _LogFormatter(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        name = _NAMES.get(record.levelno, record.levelname.capitalize())
+        return f"[{self.formatTime(record, self.datefmt)}] 1 [{name}] {record.getMessage()}"
+
+
+class _StatusHandler(logging.Handler):
+    def __init__(self, events: RhubarbStatus) -> None:
+        super().__init__()
+        self._events = events
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._events.emit("log", _NAMES.get(record.levelno, record.levelname.capitalize()), record.getMessage())

@@ -10,8 +10,7 @@ from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
-from lipmotion.types.delivery import Delivery
-from lipmotion.types.staging import Staging
+from lipmotion.types.delivery import Delivery, Staging
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

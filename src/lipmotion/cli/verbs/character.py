@@ -97,7 +97,7 @@ def _write_table(
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
     from lipmotion.meshes.files.rig_tables import write_rig_table
-    from lipmotion.pipeline.outputs.calibration import calibrate_rows, pose_sources
+    from lipmotion.pipeline.outputs.curve_sets import calibrate_rows, pose_sources
 
     changed = calibrate_rows(rows, pose_sources(curves, rows), stated) if stated else rows
     for row in changed:

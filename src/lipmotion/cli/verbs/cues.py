@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_options, part_of
-from lipmotion.cli.arguments.options import Version
-from lipmotion.cli.arguments.paths import add_output, check_paths
-from lipmotion.cli.arguments.pipes import is_pipe, read_pipe
-from lipmotion.cli.arguments.several import place_outputs
+from lipmotion.cli.arguments.options import Version, place_outputs
+from lipmotion.cli.arguments.paths import add_output, check_paths, is_pipe, read_pipe
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
-from lipmotion.cli.terminal.status import LEVELS, status_lines
+from lipmotion.cli.terminal.progress import LEVELS, status_lines
 from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import is_file
@@ -30,29 +28,6 @@ NO_WORDS = re.compile(rb"\[[^\[\]]*\]|[^\w\x80-\xff]")
 """Sounds in brackets, and what is no letter."""
 
 
-def add_rhubarb_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of Rhubarb to the parser of ``cues``, which has those that take their place."""
-    group = parser.add_argument_group("options of Rhubarb")
-    add = group.add_argument
-    unset: dict[str, Any] = {"default": argparse.SUPPRESS}
-    add("-d", "--dialogFile", metavar="FILE", dest="transcript", type=_dialogue, help="--transcript FILE", **unset)
-    told = "--recogniser: pocketSphinx is auto, phonetic is fast"
-    kinds = "pocketSphinx|phonetic"
-    add("-r", "--recognizer", metavar=kinds, dest="recogniser", type=_recogniser, help=told, **unset)
-    add("--extendedShapes", metavar="GHX", dest="shapes", help="--shapes", **unset)
-    told = "--fps, for every format; in .dat shapes have their letters then"
-    add("--datFrameRate", metavar="FPS", dest="fps", action=_DatFrameRate, type=float, help=told, **unset)
-    told = "Preston Blair's names in .dat, as without --datFrameRate"
-    add("--datUsePrestonBlair", action="store_true", dest="blair", help=told)
-    add_output(parser, "--logFile", metavar="FILE", dest="log_file", help="a file for warnings and errors")
-    level: dict[str, Any] = {"type": str.lower, "choices": tuple(LEVELS), "metavar": "LEVEL"}
-    add("--logLevel", dest="log_level", default="debug", help=f"of --logFile, from: {', '.join(LEVELS)}", **level)
-    add("--consoleLevel", dest="console_level", default="warning", help="of messages on standard error", **level)
-    add("--threads", metavar="N", type=_threads, help="without effect: one recording needs one")
-    add("-q", "--quiet", action="store_true", help="without effect: warnings and errors alone are printed")
-    add("-v", "--version", action=Version, nargs=0, const=VERSION, help="print the version")
-
-
 class _DatFrameRate(argparse.Action):
     """Sets the frame rate, and that shapes have their letters."""
 
@@ -61,10 +36,7 @@ class _DatFrameRate(argparse.Action):
 
 
 def _dialogue(path: str) -> str | None:
-    """Return the path of a dialogue, which is never taken for the words; None: the file holds none.
-
-    Raises ArgumentTypeError: no such file.
-    """
+    """Return the path of a dialogue, which is never taken for the words; None: the file holds none."""
     if not is_file(Path(path)):
         raise argparse.ArgumentTypeError(f"no such file: {shorten(path)!r}; the words themselves: --transcript TEXT")
     with Path(path).open("rb") as file:
@@ -102,7 +74,25 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--machine-readable", "--machineReadable", action="store_true", help="progress as JSON lines on standard error")
     hold = "hold every shape for at least N ms, as --hold FRAMES"
     add_options(parser, Delivery, but=("stepped", "key_tolerance"), min_hold_ms={"help": hold})
-    add_rhubarb_options(parser)
+    group = parser.add_argument_group("options of Rhubarb")
+    add = group.add_argument
+    unset: dict[str, Any] = {"default": argparse.SUPPRESS}
+    add("-d", "--dialogFile", metavar="FILE", dest="transcript", type=_dialogue, help="--transcript FILE", **unset)
+    told = "--recogniser: pocketSphinx is auto, phonetic is fast"
+    recognisers = "pocketSphinx|phonetic"
+    add("-r", "--recognizer", metavar=recognisers, dest="recogniser", type=_recogniser, help=told, **unset)
+    add("--extendedShapes", metavar="GHX", dest="shapes", help="--shapes", **unset)
+    told = "--fps, for every format; in .dat shapes have their letters then"
+    add("--datFrameRate", metavar="FPS", dest="fps", action=_DatFrameRate, type=float, help=told, **unset)
+    told = "Preston Blair's names in .dat, as without --datFrameRate"
+    add("--datUsePrestonBlair", action="store_true", dest="blair", help=told)
+    add_output(parser, "--logFile", metavar="FILE", dest="log_file", help="a file for warnings and errors")
+    level: dict[str, Any] = {"type": str.lower, "choices": tuple(LEVELS), "metavar": "LEVEL"}
+    add("--logLevel", dest="log_level", default="debug", help=f"of --logFile, from: {', '.join(LEVELS)}", **level)
+    add("--consoleLevel", dest="console_level", default="warning", help="of messages on standard error", **level)
+    add("--threads", metavar="N", type=_threads, help="without effect: one recording needs one")
+    add("-q", "--quiet", action="store_true", help="without effect: warnings and errors alone are printed")
+    add("-v", "--version", action=Version, nargs=0, const=VERSION, help="print the version")
     parser.set_defaults(run=run, letters=False)
 
 

@@ -45,7 +45,6 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _plain(value: object) -> str:
-    """Return a value of the header as text."""
     if isinstance(value, dict):
         return ", ".join(f"{key}={item}" for key, item in value.items())
     return "; ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -6,19 +6,14 @@ import argparse
 import logging
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
-from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.pipes import add_pipe_format, write_pipe
+from lipmotion.cli.arguments.paths import add_input, add_pipe_format, write_pipe
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
-
-if TYPE_CHECKING:
-    from lipmotion.types import Monitor
 
 LOG = logging.getLogger("lipmotion")
 
@@ -61,27 +56,25 @@ def run(options: argparse.Namespace) -> None:
                 run_job(replace(job, request=replace(edits.named, edits=path)), monitor=report.receive)
             else:
                 job = part_of(options, Job()).of(options.sound or _find_sound(path), files)
-                _render(job, path, options.motion_rate, report.receive)
+                import numpy as np
+
+                from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
+                from lipmotion.speech.sound.audio_files import read_audio
+                from lipmotion.types import Audio
+
+                sound, face = job.request.recording, open_face(job.outputs)
+                planned = check_outputs(job, face, sound)
+                generation = read_generation(path, job.request.units, options.motion_rate)
+                if isinstance(sound, Path):
+                    generation = match_duration(
+                        generation, read_audio(sound).duration_s, keeps_rate=options.motion_rate is not None
+                    )
+                elif any(output.draws for output in planned):
+                    samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
+                    sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
+                write_outputs(job, face, generation, sound, monitor=report.receive)
         written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
-
-
-def _render(job: Job, path: Path, rate_hz: float | None, monitor: Monitor) -> None:
-    import numpy as np
-
-    from lipmotion.pipeline.outputs.motion_input import match_duration, read_generation
-    from lipmotion.speech.sound.audio_files import read_audio
-    from lipmotion.types import Audio
-
-    sound, face = job.request.recording, open_face(job.outputs)
-    planned = check_outputs(job, face, sound)
-    generation = read_generation(path, job.request.units, rate_hz)
-    if isinstance(sound, Path):
-        generation = match_duration(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
-    elif any(output.draws for output in planned):
-        samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
-        sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
-    write_outputs(job, face, generation, sound, monitor=monitor)
 
 
 def _find_sound(motion: Path) -> Path | None:

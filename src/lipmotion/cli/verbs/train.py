@@ -18,13 +18,6 @@ FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-m
 NONE = "none"
 
 
-def add_start_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--from``; default: the model that ships with the package, for engines whose models stand on others."""
-    add_input(
-        parser, "--from", what="model to start from", dest="start", default="", type=str, metavar="MODEL", help=FROM
-    )
-
-
 def model_to_start_from(name: str, engine: Engine[Any]) -> Model | None:
     """Return the model of ``--from``: a file, the one that ships (nothing given), or none.
 
@@ -67,7 +60,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--visual", metavar="KIND", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
-    add_start_argument(parser)
+    add_input(
+        parser, "--from", what="model to start from", dest="start", default="", type=str, metavar="MODEL", help=FROM
+    )
     add_execution(parser)
     parser.set_defaults(run=run)
 

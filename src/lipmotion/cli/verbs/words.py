@@ -28,7 +28,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``recognise_words`` and ``write_words``; print the words or the paths that were written."""
     from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.pipeline.analysis.words import (
+    from lipmotion.pipeline.analysis.language import (
         check_word_outputs,
         describe_word,
         format_words,

@@ -23,7 +23,7 @@ from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.generation import Statistics, split_into_blocks
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     ChainPosteriors,
     Configuration,

@@ -45,7 +45,7 @@ from lipmotion.motion.modulation_filter import (
 )
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.motion.variance_scaling import VarianceScaling, fit_scaling_factors
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
 from lipmotion.types import (
     FRAME_RATE_HZ,

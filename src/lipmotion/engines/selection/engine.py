@@ -24,7 +24,7 @@ from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows
 from lipmotion.errors import InputError
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ from lipmotion.motion.predictors import PredictorTraining, choose_predictor, loa
 from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals, rate_phones
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Span, Speech, Timeline, Unit, sub_monitor
 from lipmotion.units import SILENCE, is_silent
 

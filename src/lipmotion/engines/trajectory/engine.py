@@ -19,7 +19,7 @@ from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor, count_conditions
 from lipmotion.motion.rest import find_digital_silence
 from lipmotion.printable import printable
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     Configuration,
     Constraints,

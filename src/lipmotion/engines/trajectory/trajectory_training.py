@@ -39,7 +39,7 @@ from lipmotion.stats.trees import (
     ridge,
     zero_statistics,
 )
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
 
 

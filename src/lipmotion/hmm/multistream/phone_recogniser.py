@@ -15,7 +15,7 @@ from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, tr
 from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
 from lipmotion.units import UNIT_SETS, is_silent

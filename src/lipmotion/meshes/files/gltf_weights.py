@@ -24,7 +24,7 @@ from lipmotion.meshes.files.steady_rate import choose_columns, exact_rate
 from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, bone_kind, head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
-from lipmotion.types.moods import MOODS
+from lipmotion.types.delivery import MOODS
 from lipmotion.types.motion import RADIAN
 
 Array = NDArray[np.float64]

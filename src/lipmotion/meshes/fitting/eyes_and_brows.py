@@ -17,8 +17,8 @@ from lipmotion.meshes.fitting.blendshape_motion import arkit_weights
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, SIDES
 from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
+from lipmotion.types.delivery import Staging
 from lipmotion.types.motion import RADIAN, WEIGHT
-from lipmotion.types.staging import Staging
 
 Array = NDArray[np.float64]
 

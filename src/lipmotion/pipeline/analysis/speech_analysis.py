@@ -34,8 +34,8 @@ from lipmotion.speech.features.speaker_similarity import voice_knowledge
 from lipmotion.speech.features.voice_events import voice_events, without_laughter
 from lipmotion.speech.recognition.agreement import TranscriptFit, label_fit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
+from lipmotion.speech.recognition.network.beam_search import english_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
-from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     Recognition,
@@ -72,8 +72,8 @@ from lipmotion.types import (
     frames_of,
     silent_monitor,
 )
+from lipmotion.types.delivery import MoodTag
 from lipmotion.types.languages import ENGLISH
-from lipmotion.types.moods import MoodTag
 from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import require_tokens
@@ -132,7 +132,6 @@ class SpeechAnalysis:
 def analyse(model: Model, request: Request, each: ParallelMap = map) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
-    each : applies a function to many items, perhaps in several processes
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
@@ -217,7 +216,6 @@ def align_between(
 ) -> list[Span[Unit]]:
     """Return the phones in time of words that are said from ``start_s`` to ``end_s``, by forced alignment there.
 
-    audio  : the recording of the request
     pauses : whether silence before and after the words stays; else the first and the last phone take its time
     Raises AlignmentError: the words do not fit in there.
     """
@@ -263,7 +261,6 @@ def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> 
 
 
 def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: ParallelMap) -> SpeechAnalysis:
-    """Return the speech of a request with phones that are given, aligned or recognised."""
     kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
     if request.recogniser not in kinds:
         raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
@@ -309,13 +306,15 @@ def build_speech(
     """Return speech of features and phones in time, and what else of the recording the engine needs.
 
     kind : of the recognition; of all but ``auto``, a phone recogniser has no part in it
-    each : applies a function to many items, perhaps in several processes
     """
     inputs, audio = engine.inputs(), analysed(audio, features)
+
+    def rows(of: Callable[[AnalysedAudio], Any]) -> Any:
+        return of(audio) if audio.is_passage else audio.joined_rows(of)
+
     f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
-    spectrum: Any = None
-    if inputs.conditions:
-        spectrum = audio.spectrum if audio.is_passage else audio.joined_rows(lambda sound: sound.spectrum)
+    spectrum = rows(lambda sound: sound.spectrum) if inputs.conditions else None
+    encoding = rows(lambda sound: sound.encoding) if inputs.encoding else None
     network = network_of(kind) if inputs.posteriors else None
     posteriors = token_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
     parts = None
@@ -324,9 +323,6 @@ def build_speech(
             SpeechPart(first, own, build_speech(engine, sound, sound.mfcc(), Timeline(()), kind, each))
             for first, own, sound in audio.passages
         )
-    encoding: Any = None
-    if inputs.encoding:
-        encoding = audio.encoding if audio.is_passage else audio.joined_rows(lambda sound: sound.encoding)
     speech = Speech(
         features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, encoding=encoding, parts=parts
     )
@@ -387,10 +383,7 @@ def recognise_speech(
 ) -> Speech:
     """Return the speech of a recording whose words are not known, with recognised phones in time.
 
-    learned   : the engine's model of motion
-    phones    : the recogniser
     recognise : recognises phones in time, for speakers that the engine does not recognise itself
-    each      : applies a function to many items, perhaps in several processes
     If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
     training were; else the result of ``recognise`` is used.
     """
@@ -438,7 +431,6 @@ def _follow_units(
 ) -> tuple[Timeline[Unit], TranscriptFit | None]:
     """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
 
-    kind : of the recogniser
     Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
     else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
     """

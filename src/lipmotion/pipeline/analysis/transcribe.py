@@ -36,7 +36,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
     WordEvidence,
     transcript_evidence,
 )
-from lipmotion.speech.voices.pronunciations import LanguageLexicon
+from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.phones import count_phone_edits
@@ -77,7 +77,6 @@ def transcribe(
 ) -> Transcription:
     """Return the phones in time of a recording, with warnings for the user.
 
-    phones     : the recogniser
     features   : of the audio, from ``mfcc``
     words      : the spoken words in lower case, also with times, within which they are aligned; or None
     recognised : recognises phones in time with their confidence; None: nothing is corrected
@@ -174,10 +173,7 @@ def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Transc
 
 
 def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
-    """Return the words of ``_compare``, those that are found with the times that they have there, and their phones.
-
-    spans : recognised phones; those of the words that are found are returned by their numbers
-    """
+    """Return the words of ``_compare``, those that are found with the times that they have there, and their phones."""
     words, phones = list(evidence.words), [span.label.phone for span in spans]
     wanted = [(number, phone) for number, word in enumerate(words) for phone in word.phones]
     matcher = SequenceMatcher(None, [phone for _, phone in wanted], phones, autojunk=False)

@@ -7,6 +7,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -15,7 +16,7 @@ from lipmotion.pipeline.analysis.language import detect_english
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
-from lipmotion.pipeline.batch.pool import WorkerDied, local_pool
+from lipmotion.pipeline.batch.run import WorkerDied, local_pool
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
@@ -35,14 +36,6 @@ SHORTEST_TOLD_S, FEWEST_TOLD_WORDS = 8.0, 5
 """The language of shorter speech, or of fewer words, is not told: it takes a dozen long words to be sure."""
 LETTERS_OF = {"CJK": 4.0, "HANGUL": 3.0, "HIRAGANA": 2.0, "KATAKANA": 2.0}
 """How many Latin letters take as long to say as one of a script."""
-
-
-@dataclass(frozen=True)
-class LineToCheck:
-    """A line, and how it would be understood."""
-
-    line: BatchLine
-    request: Request
 
 
 @dataclass(frozen=True)
@@ -66,14 +59,14 @@ class CheckedLine:
     words: tuple[str, ...] = ()
 
 
-def check_line(work: LineToCheck) -> CheckedLine:
-    """Return what is found in the recording of a line, and what is to be said in it."""
-    line, path = work.line, Path(work.line.recording)
+def check_line(line: BatchLine, request: Request) -> CheckedLine:
+    """Return what is found in the recording of a line, and what is to be said in it, as a request understands it."""
+    path = Path(line.recording)
     if not path.exists():
         return CheckedLine(line.name, "missing", f"{path}: no such file")
     try:
         audio = read_audio(path, warn=False)
-        words = _read_words(work)
+        words = _read_words(line, request)
     except (LipMotionError, OSError) as error:
         return CheckedLine(line.name, "unreadable", str(error))
     levels = levels_db(audio)
@@ -84,7 +77,7 @@ def check_line(work: LineToCheck) -> CheckedLine:
     if spoken_s < MIN_SPOKEN_S:
         return CheckedLine(line.name, "silent", "no sound longer than a click")
     detected = detect_language(words) if len(words) >= FEWEST_TOLD_WORDS else ""
-    required, reason = work.request.language if work.request.language != AUTO else detected, ""
+    required, reason = request.language if request.language != AUTO else detected, ""
     if detected and required in COMMON_WORDS and detected != required:
         reason = f"the words are in {detected}, required {required}"
     elif required and spoken_s >= SHORTEST_TOLD_S:
@@ -104,10 +97,10 @@ def count_letters(words: Sequence[str]) -> float:
     return sum((LETTERS_OF.get(script_of(letter), 1.0) for word in words for letter in word), 0.0)
 
 
-def _read_words(work: LineToCheck) -> tuple[str, ...]:
+def _read_words(line: BatchLine, request: Request) -> tuple[str, ...]:
     """Return the words of a line without tags, numbers spelled out where they are English; none: they are not known."""
-    request = replace(work.request, recording=Path(work.line.recording), lexicon=None)
-    transcript = work.line.transcript or read_request(request, words_beside=True).transcript
+    request = replace(request, recording=Path(line.recording), lexicon=None)
+    transcript = line.transcript or read_request(request, words_beside=True).transcript
     if transcript is None or isinstance(transcript, TimedTranscript):
         return transcript.words if transcript else ()
     text = parse_tagged_text(str(transcript)).text
@@ -173,7 +166,6 @@ def check(
     source  : as of ``batch``
     job     : as of ``batch``: the language that is required, and the names of outputs; None: English
     jobs    : number of processes; None: one a core
-    monitor : receives the progress
     Recordings of no line are those in the folder of all recordings of a list, with its sub-folders, where that lies in
     the list's own folder; else those beside the recordings. Outputs of batches do not count.
     Raises InputError: there are no lines, or too many. ExportError: two lines have the same output.
@@ -185,7 +177,7 @@ def check(
     checked: dict[str, CheckedLine] = {}
     try:
         with local_pool(jobs or os.cpu_count() or 1) as pool:
-            for each in pool(check_line, [LineToCheck(line, job.request) for line in lines]):
+            for each in pool(partial(check_line, request=job.request), lines):
                 checked[each.name] = each
                 monitor(Progress(STAGE, len(checked), len(lines), len(checked) / len(lines)))
     except WorkerDied as error:

@@ -61,7 +61,15 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     Raises ExportError: two lines would have the same output, or one would lie outside the folder of the outputs.
     """
     if source.is_dir():
-        lines = _list_folder(source)
+        check_listable(source)
+        found = []
+        for root, folders, names in os.walk(source):
+            folders[:] = sorted(name for name in folders if not name.startswith("."))
+            for path in (Path(root) / name for name in sorted(names) if not name.startswith(".")):
+                if is_recording(path) and path.is_file():
+                    inner = path.relative_to(source).with_suffix("").as_posix()
+                    found.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
+        lines = sorted(found, key=lambda line: line.name)
     elif source.exists():
         lines = _read_list(source, kinds)
     else:
@@ -133,18 +141,6 @@ def _key(name: str) -> str:
     return unicodedata.normalize("NFD", unicodedata.normalize("NFD", name).casefold())
 
 
-def _list_folder(folder: Path) -> list[BatchLine]:
-    check_listable(folder)
-    lines = []
-    for root, folders, names in os.walk(folder):
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
-        for path in (Path(root) / name for name in sorted(names) if not name.startswith(".")):
-            if is_recording(path) and path.is_file():
-                inner = path.relative_to(folder).with_suffix("").as_posix()
-                lines.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
-    return sorted(lines, key=lambda line: line.name)
-
-
 def is_recording(path: Path) -> bool:
     """Return whether a file is a recording, by its name."""
     return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
@@ -183,10 +179,7 @@ def _check_count(source: Path, count: int) -> None:
 
 
 def _read_table(source: Path, text: str) -> list[dict[str, str]] | None:
-    """Return the rows of a table with a header by the names of its columns; None: it has no header.
-
-    Raises InputError: a row without a recording, or one that is longer than the header.
-    """
+    """Return the rows of a table with a header by the names of its columns; None: it has no header."""
     try:
         table = read_table(io.StringIO(text, newline=""))
         header = [name.lower() for name in table.plain_names]

@@ -25,17 +25,19 @@ from lipmotion.motion.rest import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.batch.ledger import (
+    CUES,
     DONE,
     FAILED,
     Place,
     Record,
     are_in_place,
+    fingerprint_line,
+    input_files,
     is_in_place,
     read_receipt,
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.batch.settings import CUES, fingerprint_line, input_files
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
@@ -143,25 +145,21 @@ def _describe_work(start_s: float, warnings: list[str]) -> Record:
 
 
 def _write_line(work: LineWork) -> Generation:
-    """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``.
-
-    The labels beside the recording are used where the row has no words. Where a filmed face of another person is shown,
-    the motion is mapped onto it, as ``lipmotion animate`` does.
-    """
+    """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
     line, kinds, given = work.line, work.job.outputs.kinds, work.job.request
     make_folder((Path(work.place.out) / line.name).parent)
     staged = tuple(str(work.place.staged(line.name, kind)) for kind in kinds)
     for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
-    shared, speaker = _share(work.job, work.place.run), line.speaker or given.speaker
-    request = replace(given, recording=Path(line.recording), speaker=speaker, lexicon=shared.lexicon)
+    (model, face, lexicon), speaker = _share(work.job, work.place.run), line.speaker or given.speaker
+    request = replace(given, recording=Path(line.recording), speaker=speaker, lexicon=lexicon)
     request = read_request(request, words_beside=not line.transcript)
     request = replace(request, transcript=line.transcript or request.transcript)
-    face = shared.face.other_person(shared.model, speaker) if given.onto is None else None
-    if face is not None:
-        request = replace(request, onto=_map_onto(shared.model, face, speaker))
+    other = face.other_person(model, speaker) if given.onto is None else None
+    if other is not None:
+        request = replace(request, onto=_map_onto(model, other, speaker))
     job = replace(work.job.of(None, staged), request=request)
-    return run(job, face=shared.face, model=shared.model, is_typed=False)
+    return run(job, face=face, model=model, is_typed=False)
 
 
 def _describe_motion(generation: Generation) -> Record:
@@ -203,10 +201,7 @@ _WARNINGS: ContextVar[list[str] | None] = ContextVar("warnings of the line that 
 
 @contextmanager
 def _capture_warnings() -> Iterator[list[str]]:
-    """Give a list that receives this thread's warnings of the package inside the block, instead of the terminal.
-
-    Each is kept once. What other threads log goes where it went before.
-    """
+    """Give a list that receives this thread's warnings of the package inside the block, instead of the terminal."""
     warnings: list[str] = []
     LOG.addFilter(_capture)  # which a logger has once, however often it is added
     before = _WARNINGS.set(warnings)
@@ -227,20 +222,11 @@ def _capture(record: logging.LogRecord) -> bool:
     return False
 
 
-@dataclass(frozen=True, eq=False)
-class _Shared:
-    """What all lines of a batch share: it is loaded once a run."""
-
-    model: Model
-    face: ShownFace
-    lexicon: Lexicon | None
-
-
 @lru_cache(maxsize=1)
-def _share(job: Job, of_run: str) -> _Shared:  # noqa: ARG001 (files may change between two runs)
-    """Return what the lines of a run share. Raises as ``open_face``, ``Lexicon.from_file`` and ``load_model``."""
+def _share(job: Job, of_run: str) -> tuple[Model, ShownFace, Lexicon | None]:  # noqa: ARG001 (files may change between two runs)
+    """Return model, face and lexicon, which the lines of a run share."""
     lexicon = None if job.request.lexicon is None else read_lexicon(job.request)
-    return _Shared(load_model(job.request.model), open_face(job.outputs), lexicon)
+    return load_model(job.request.model), open_face(job.outputs), lexicon
 
 
 @lru_cache(maxsize=8)
@@ -255,11 +241,11 @@ def check_line_job(job: Job, of_run: str) -> None:
     Motion files of a moment of silence are made and deleted, so that channels, curves and formats are tried out.
     Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``open_face``.
     """
-    shared, anywhere = _share(job, of_run), Path(tempfile.gettempdir())
+    (model, face, _), anywhere = _share(job, of_run), Path(tempfile.gettempdir())
     files = tuple(str(anywhere / f"line.{kind}") for kind in job.outputs.kinds)
-    check_outputs(job.of(anywhere, files), shared.face)
+    check_outputs(job.of(anywhere, files), face)
     kinds = [kind for kind in job.outputs.kinds if motion_suffix(Path(f"line.{kind}")) and not kind.startswith(CUES)]
-    if not kinds or shared.face.other_person(shared.model, job.request.speaker) is not None:
+    if not kinds or face.other_person(model, job.request.speaker) is not None:
         return
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
     units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))
@@ -267,4 +253,4 @@ def check_line_job(job: Job, of_run: str) -> None:
     with temporary_folder() as folder:
         files = tuple(str(folder / f"line.{kind}") for kind in kinds)
         early = replace(job, delivery=replace(job.delivery, offset_ms=0.0), outputs=replace(job.outputs, files=files))
-        write_outputs(early, shared.face, animate(request, model=shared.model), silence)
+        write_outputs(early, face, animate(request, model=model), silence)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.edits import Edits
+from lipmotion.pipeline.edits import CurveStep, Edits
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import Session
@@ -68,5 +68,5 @@ def animate(  # noqa: PLR0913
         file = edit_file(edits)
         session = file.session(request, model=model, workers=workers, monitor=monitor, background=background)
         edits = file.edits
-    pins = Edits.of_pins(constraints.pins if constraints else ())
-    return session.generate((edits or Edits()).then(*pins.steps))
+    pins = constraints.pins if constraints else ()
+    return session.generate((edits or Edits()).then(*map(CurveStep, pins)))

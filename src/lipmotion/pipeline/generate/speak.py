@@ -11,27 +11,138 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.entry import quantise
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, quantise
+from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
 from lipmotion.formats.subtitles import is_subtitles, subtitle_words
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.pipeline.generation import speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.sound.overlap_add import JoinedPieces, overlapped
 from lipmotion.speech.sound.resampling import at_speech_rate
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
-from lipmotion.types.moods import MoodTag
-from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
+from lipmotion.types.delivery import MoodTag
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, split_words
 from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
 from lipmotion.units.text_normalisation import MAX_CHARACTERS, split_sentences
+
+BETWEEN_S = 0.35
+"""Silence between two sentences that a corpus says."""
+FEATURES = 13
+"""The static acoustic features, whose differences joins cost."""
+
+
+@one_thread()
+def speak_from_corpus(  # noqa: PLR0913
+    text: str,
+    corpus: Corpus,
+    model: Model,
+    *,
+    constraints: Constraints | None = None,
+    lexicon: Lexicon | None = None,
+    speaker: str = "",
+    pauses: Pauses = "rest",
+    asymmetry: float = 0.0,
+) -> SpokenText:
+    """Return a text as the joined sound of recordings, and the motion that was recorded with it.
+
+    text    : one sentence or several, in English words that the dictionary or ``lexicon`` pronounces
+    corpus  : the corpus that the model was trained on
+    model   : of an engine that ``SelectsRecordings`` (``selection``)
+    constraints, speaker, pauses, asymmetry : as of ``speak``
+    The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
+    fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
+    ones, with a warning.
+    Raises InputError: another engine, another corpus, recordings of several people, a text without words, or a word
+    that nobody can pronounce.
+    Source: Minnis & Breen 2000, §2 and §3.
+    """
+    engine = model.engine
+    if not isinstance(engine, SelectsRecordings):
+        raise InputError(
+            f"a model of the engine {engine.name!r} has no recordings to speak with; train one: --engine selection"
+        )
+    names = engine.recordings(model.learned)
+    known = set(corpus.names())
+    missing = [name for name in names if name not in known]
+    if missing:
+        raise InputError(
+            f"the corpus {corpus.path} lacks {len(missing)} of {len(names)} recordings of the model, {missing[0]} "
+            "among them; give the corpus that it was trained on"
+        )
+    target = _plan_phones(text, lexicon or Lexicon(), engine, model)
+    utterances = {name: corpus.utterance(name) for name in names}
+    people = sorted({utterance.speaker for utterance in utterances.values()})
+    if len(people) > 1:
+        raise InputError(
+            f"the model has recordings of {len(people)} people ({', '.join(people)}), whose voices cannot be joined; "
+            "train one on the recordings of a single person"
+        )
+    recorded_features = {
+        name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()
+    }
+    stand_ins = engine.stand_ins(model.learned)
+    absent = dict.fromkeys(span.label.phone for span in target if span.label.phone in stand_ins)
+    if absent:
+        LOG.warning(
+            "phones that the recordings do not have, and what is said instead: %s; see lipmotion corpus coverage",
+            ", ".join(f"{phone} ({stand_ins[phone]})" for phone in absent),
+        )
+    pieces, units = engine.source_pieces(model.learned, target, recorded_features)
+    sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
+    rate_hz = utterances[names[0]].audio.rate_hz
+    joined = overlapped(sounds, [(piece.start_s, piece.end_s) for piece in pieces], rate_hz)
+    begin_s = _find_starts(len(units), pieces, joined, rate_hz)
+    first, last = (round(begin_s[number] * rate_hz) for number in (0, -1))
+    audio = Audio(joined.samples[first:last], rate_hz)
+    edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
+    spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
+    request = Request(audio, units=spoken, speaker=speaker, pauses=pauses, asymmetry=asymmetry, spoken_so=True)
+    return SpokenText(audio, animate(request, model=model, constraints=constraints))
+
+
+def _plan_phones(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:
+    """Return the phones of a text, each as long as it typically is."""
+    spans: list[Span[Unit]] = []
+    now_s = 0.0
+
+    def add(phone: str, word: str, duration_s: float) -> None:
+        nonlocal now_s
+        spans.append(Span(now_s, now_s + duration_s, Unit(phone, word=word)))
+        now_s += duration_s
+
+    for number, sentence in enumerate(split_sentences(text)):
+        add(SILENCE, "", BETWEEN_S if number else REST_S)
+        for word in split_words(sentence):
+            for phone in lexicon.pronunciations(word)[0]:
+                add(phone, word, engine.typical_duration_s(model.learned, phone))
+    add(SILENCE, "", REST_S)
+    return Timeline(tuple(spans))
+
+
+def _find_starts(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:
+    """Return when each of some phones begins in the joined sound, and when the last one ends [shape=(count + 1,)]."""
+    duration_s = len(joined.samples) / rate_hz
+    begin_s = np.full(count + 1, np.nan)
+    begin_s[0], begin_s[-1] = 0.0, duration_s
+    for piece, start, shift in zip(pieces, joined.starts, joined.shifts, strict=True):
+        for number, time_s in piece.phones_s.items():
+            if number:
+                begin_s[number] = (start - shift) / rate_hz + (time_s - piece.start_s)
+    known = np.isfinite(begin_s)
+    begin_s = np.maximum.accumulate(np.interp(np.arange(count + 1), np.flatnonzero(known), begin_s[known]))
+    begin_s = np.minimum(begin_s, duration_s)
+    begin_s[0] = max(begin_s[1] - REST_S, 0.0)
+    begin_s[-1] = min(begin_s[-2] + REST_S, duration_s)
+    return begin_s
+
 
 LOG = logging.getLogger("lipmotion")
 CORPUS_VOICE = "corpus"
@@ -129,7 +240,6 @@ def speak(  # noqa: PLR0913
 
 
 def _with_moods(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
-    """Return a generation with the moods of tags in its text."""
     return replace(generation, moods=time_moods(tags, generation.units))
 
 

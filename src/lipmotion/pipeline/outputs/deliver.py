@@ -26,7 +26,7 @@ from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.types import Gain, Generation, VoiceEvent
 from lipmotion.types.audio import LAUGHTER, SHOUT, WHISPER
-from lipmotion.types.moods import NEUTRAL, PLAIN, MoodKey, sort_moods
+from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, sort_moods
 from lipmotion.types.motion import RADIAN
 
 FACTORS: Final = {PLAIN: 1.0, "whisper": 0.85, "shout": 1.5, "mumble": 0.5}

@@ -16,15 +16,25 @@ from lipmotion.articulation.delivery import close_on_frame_grid, find_closed_tim
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
-from lipmotion.errors import ExportError
-from lipmotion.formats.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
+from lipmotion.errors import ExportError, InputError
+from lipmotion.formats.base import (
+    check_motion,
+    motion_format,
+    motion_suffix,
+    motion_suffixes,
+    read_motion,
+    write_motion,
+)
+from lipmotion.formats.cues import read_cue_motion
 from lipmotion.formats.fap import FAP
 from lipmotion.meshes.files.rig_tables import CONTROL
+from lipmotion.meshes.files.steady_rate import match_sound_rate
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.model.scene import Thinning
-from lipmotion.meshes.model.shape_names import arkit_name
+from lipmotion.meshes.model.shape_names import arkit_name, is_known
+from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.outputs.curve_sets import (
     ARKIT,
     LIVING_SETS,
@@ -36,9 +46,9 @@ from lipmotion.pipeline.outputs.curve_sets import (
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import as_text, sound_reference
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
+from lipmotion.types.delivery import Staging
 from lipmotion.types.motion import RADIAN
-from lipmotion.types.staging import Staging
 
 LOG = logging.getLogger("lipmotion")
 CURVES = (WEIGHT, CONTROL, RADIAN)
@@ -220,12 +230,12 @@ def check_rate(path: Path, rate_hz: float | None) -> None:
 def _make_curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
     """Return a set of curves, with those that the motion has already."""
     motion, units, is_arkit = generation.motion, generation.units, name in (ARKIT, WHOLE_FACE)
-    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == name == FAP]
+    faps = [channel.name for channel in motion.channels if channel.unit == name == FAP]
     shapes = _blendshapes(motion) if is_arkit else None
-    if shapes is None and not columns:
+    if shapes is None and not faps:
         return make_curves(motion, units, name, staging=staging, prosody=prosody)
     if shapes is None:
-        return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+        return motion.selected(faps)
     moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
     shown = join_channels(shapes, generation.selected(moods).motion) if moods else shapes
     mouth = make_curves(shown, units, ARKIT)  # the same weights, but where lips close that would not, and more of them
@@ -237,16 +247,11 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
     if name != WHOLE_FACE:
         return face
     living = compute_living_curves(with_mouth(motion), units, staging, prosody)
-    columns = [column for column, name in enumerate(living.names) if name not in face.names]
-    channels = tuple(living.channels[column] for column in columns)
-    return join_channels(face, Motion(living.values[:, columns], motion.rate_hz, channels))
+    return join_channels(face, living.selected([name for name in living.names if name not in face.names]))
 
 
 def _blendshapes(motion: Motion) -> Motion | None:
-    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes.
-
-    None: it has no jawOpen.
-    """
+    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes."""
     angles = {channel.name: channel.name for channel in motion.channels if channel.unit == RADIAN}
     known = {angles.get(name) or arkit_name(name): n for n, name in reversed(list(enumerate(motion.names)))}
     columns = [(name, column) for name, column in sorted(known.items(), key=lambda each: each[1]) if name]
@@ -254,3 +259,86 @@ def _blendshapes(motion: Motion) -> Motion | None:
         return None
     channels = tuple(Channel(name, motion.channels[column].unit) for name, column in columns)
     return Motion(motion.values[:, [column for _, column in columns]], motion.rate_hz, channels)
+
+
+TOLERATED_S = 0.1
+"""Sound and motion may differ so much in length without a warning."""
+SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
+"""Smallest and largest frame rate of motion that is read: a mistyped one must not fill the memory."""
+LONGEST_S = 86_400.0
+"""Longest motion that is read."""
+CUE_SUFFIXES = (".dat", ".tsv", ".xml", ".pgo")
+STATE = "file"
+"""The state of every frame of motion that was read."""
+
+
+def read_generation(
+    path: str | Path, units: str | Path | Timeline[Unit] | None = None, rate_hz: float | None = None
+) -> Generation:
+    """Return the motion of a file as ``write`` takes it: with its phones, if it has them, and without variance.
+
+    path  : ``.json``, ``.csv``, ``.npz``, or another motion file that can be read
+    units : phones in time, or a file with them (``read_units``), for motion files that have none; None: those of the
+            motion file
+    rate_hz : frames a second, where the file states them wrong, or not at all, as Moho's ``.dat``; None: as it says
+    Blendshapes, visemes, vowels and moods count as weights, whatever unit the file gives them.
+    Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
+    """
+    if rate_hz is not None and Path(path).suffix.lower() in CUE_SUFFIXES:
+        motion, found = read_cue_motion(Path(path), rate_hz)
+    else:
+        motion, found = read_motion(path)
+        motion = motion if rate_hz is None else replace(motion, rate_hz=rate_hz)
+    if not len(motion.values):
+        raise InputError(f"{path}: the motion has no frames; export it again")
+    if not SLOWEST_HZ <= motion.rate_hz <= FASTEST_HZ:
+        required = f"required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f}; export it again"
+        raise InputError(f"{path}: {motion.rate_hz:g} frames a second, {required}")
+    lasts_s = (len(motion.values) - 1) / motion.rate_hz
+    if lasts_s > LONGEST_S:
+        raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
+    phones = found if units is None else read_units(units) if isinstance(units, str | Path) else units
+    channels = tuple(
+        Channel(each.name, WEIGHT)
+        if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))
+        else each
+        for each in motion.channels
+    )
+    states = np.zeros(len(motion.values), np.intp)
+    nothing = np.broadcast_to(0.0, motion.values.shape)
+    return Generation(replace(motion, channels=channels), nothing, phones, StateTrace((STATE,), states))
+
+
+def correct_rate(motion: Motion, duration_s: float, advice: str = "") -> Motion:
+    """Return motion at the rate of its sound, where it is off by 1001 / 1000 (``match_sound_rate``); a warning."""
+    rate_hz = match_sound_rate(motion.rate_hz, len(motion.values), duration_s)
+    if rate_hz != motion.rate_hz:
+        lasts_s = len(motion.values) / motion.rate_hz
+        what = (
+            f"the motion lasts {lasts_s:.2f} s, the sound {duration_s:.2f} s, {duration_s / lasts_s:.4f} times as long"
+        )
+        LOG.warning("%s: read at %.3f frames a second, not at %.3f%s", what, rate_hz, motion.rate_hz, advice)
+    return replace(motion, rate_hz=rate_hz)
+
+
+def match_duration(generation: Generation, duration_s: float, *, keeps_rate: bool = False) -> Generation:
+    """Return a generation that lasts as long as its sound: the last pose stays, or the rest is cut.
+
+    keeps_rate : whether its rate is right; otherwise one that is off by 1001 / 1000 is corrected, if it has no phones
+    A difference of more than ``TOLERATED_S`` is logged as a warning.
+    """
+    motion = generation.motion
+    if not keeps_rate and not len(generation.units):
+        motion = correct_rate(motion, duration_s, "; --motion-rate says another")
+    lasts_s = (len(motion.values) - 1) / motion.rate_hz
+    if abs(lasts_s - duration_s) > TOLERATED_S:
+        what = "the last pose stays" if lasts_s < duration_s else "what comes after the sound is left out"
+        LOG.warning("the motion lasts %.2f s, the sound %.2f s: %s", lasts_s, duration_s, what)
+    count = int(np.floor(duration_s * motion.rate_hz + 1e-6)) + 1
+    frames = np.minimum(np.arange(count), len(motion.values) - 1)
+    return replace(
+        generation,
+        motion=Motion(motion.values[frames], motion.rate_hz, motion.channels),
+        spread=np.broadcast_to(0.0, (count, len(motion.channels))),
+        trace=StateTrace(generation.trace.states, generation.trace.frames[frames]),
+    )

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import logging
+import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from importlib import metadata
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
+from lipmotion.extensions import installed_version
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.kernels.threads import blas_kernels
+from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE, transcript_fit
-from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
+from lipmotion.storage.archive import Checkpoint
+from lipmotion.storage.files import sha256_of
 from lipmotion.types import Item, Monitor, ParallelMap, Progress, Span, Timeline, Unit, Utterance
+from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
 MAX_NAMED_RECORDINGS = 10
@@ -69,7 +82,6 @@ def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return the first names, and how many more there are."""
     more = len(names) - MAX_NAMED_RECORDINGS
     return printable(", ".join(names[:MAX_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")
 
@@ -89,7 +101,6 @@ def label_utterances(
 
     monitor    : called with the progress, and with the utterances without phones
     checkpoint : stores the phones of every ``UTTERANCES_PER_CHECKPOINT`` utterances
-    each       : applies a function to many items, perhaps in several processes
     """
     starts = range(0, len(utterances), UTTERANCES_PER_CHECKPOINT)
     blocks = [utterances[start : start + UTTERANCES_PER_CHECKPOINT] for start in starts]
@@ -135,7 +146,6 @@ def _to_arrays(results: Sequence[PhonesOrReason]) -> dict[str, NDArray[Any]]:
 
 
 def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[PhonesOrReason]:
-    """Deserialise the labels of a block."""
     spans = iter(
         Span(start_s, end_s, Unit(*label))
         for (start_s, end_s), label in zip(arrays["times"].tolist(), arrays["labels"].tolist(), strict=True)
@@ -144,3 +154,58 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[PhonesOrReason]:
         reason if count < 0 else Timeline(tuple(next(spans) for _ in range(count)))
         for count, reason in zip(arrays["counts"].tolist(), arrays["problems"].tolist(), strict=True)
     ]
+
+
+PICTURES = "crops.npy"
+"""File of the mouth pictures of an utterance: large, and needed for eigenlips only."""
+
+
+def fingerprint_training(
+    corpus: Corpus,
+    names: Sequence[str],
+    engine: Engine[Any],
+    recogniser: HmmConfig,
+    lexicon: Lexicon,
+    visual: str,
+    prior: Model | None,
+) -> str:
+    """Return a digest of utterances, configurations, the user's lexicon, software, and the processor.
+
+    Software are versions, and the phone recogniser that is installed: without one another model comes out.
+
+    prior  : the model on which the new one stands, or None
+    visual : kind of the channels; without eigenlips, mouth pictures are not part of the digest
+    """
+    digest = hashlib.sha256()
+    job = {
+        "engine": [engine.name, engine.config.as_mapping()],
+        "recogniser": recogniser.as_mapping(),
+        "words": lexicon.user,
+        "visual": visual,
+        "versions": [installed_version(), *map(metadata.version, ("numpy", "scipy", "pocketsphinx"))],
+        "phone recogniser": installed_phone_recogniser(),
+        "machine": [platform.machine(), blas_kernels()],
+    }
+    if prior is not None:
+        for name, array in sorted(prior.engine.to_arrays(prior.learned).items()):
+            digest.update(f"{name} {array.dtype} {array.shape}\n".encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update(json.dumps(job, sort_keys=True).encode())
+    _add_utterances(digest, corpus, names, visual)
+    return digest.hexdigest()
+
+
+def digest_corpus(corpus: Corpus) -> str:
+    """Return a digest of all utterances of a corpus, without their mouth pictures."""
+    digest = hashlib.sha256()
+    _add_utterances(digest, corpus, corpus.names(), GEOMETRY)
+    return digest.hexdigest()
+
+
+def _add_utterances(digest: hashlib._Hash, corpus: Corpus, names: Sequence[str], visual: str) -> None:
+    for name in names:
+        digest.update(f"\n{name}\n".encode())
+        for path in sorted(corpus.folder(name).iterdir()):
+            if path.name != PICTURES or visual != GEOMETRY:
+                digest.update(f"{path.name}\n".encode())
+                digest.update(bytes.fromhex(sha256_of(path)))

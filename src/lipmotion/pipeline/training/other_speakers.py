@@ -24,8 +24,8 @@ from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import check_listable
@@ -89,7 +89,6 @@ def synthesise_sentences(
 
     texts   : None: the first 60 of ``prompts``, which contain every phone of the dictionary
     voices  : None: all that are installed
-    lexicon : pronunciations of words, ahead of those of the dictionary
     each    : applies a function to many items, here voices, perhaps in several processes
     Every sentence gets 0.25 s of silence before and after it, and white noise 50 dB under the speech. The same
     arguments give the same samples.
@@ -114,13 +113,11 @@ def align_recordings(
 ) -> Iterator[SpokenSentence]:
     """Yield the transcribed recordings of a folder and of its sub-folders, with aligned phones.
 
-    folder   : recordings with transcripts beside them
     phones   : the recogniser that aligns; of the kind ``general`` for speakers on whom its own models were not trained
     speakers : name of the speaker, by pattern of the name of a recording (``*`` stands for any text); the first that
                fits counts. For other recordings, the speaker is the name of the sub-folder, or of the recording if it
                is in no sub-folder. Name the speaker of several such recordings, or some of them may be held out
                (``is_held_out_speaker``) and others not
-    lexicon  : pronunciations of words, ahead of those of the dictionary
     monitor  : called with the recordings that cannot be used: damaged, or with a transcript that does not agree with
                the sound
     Raises CorpusError: no such folder, or no recording with a transcript in it.
@@ -177,8 +174,6 @@ def other_voices(
 
     synthetic  : include sentences of all installed synthetic voices but those of held-out speakers
     recordings : a folder of transcribed recordings, which are aligned by the general phone models
-    lexicon    : pronunciations of words, ahead of those of the dictionary
-    monitor    : called with the recordings that cannot be used
     Raises MissingDependencyError, CorpusError: as ``synthesise_sentences`` and ``align_recordings``.
     """
     if recordings is not None:

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.entry import read_entry
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, read_entry
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_plain_text
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, split_words
@@ -103,9 +102,7 @@ def cover_greedily(
     """Return the numbers of the sets to take, in order: each time the set that adds most weight for its cost.
 
     sets    : elements of each set, as indices into ``weights``
-    costs   : of each set
     weights : of each element [shape=(E,)]; set to 0 for the elements that are covered
-    count   : largest number of sets
     The gain of a set never increases, so a set that is still first after its gain was recomputed is the best of all.
     """
     queue = [
@@ -127,7 +124,6 @@ def cover_greedily(
 
 
 def _numbered(units: set[UnitName], index: dict[UnitName, int]) -> NDArray[np.intp]:
-    """Return the numbers of some units, adding new ones to the index."""
     return np.array([index.setdefault(unit, len(index)) for unit in sorted(units)], np.intp)
 
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import metadata
-from itertools import groupby
+from itertools import cycle, groupby
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
@@ -28,25 +29,25 @@ from lipmotion.pipeline.training.channels import (
     check_visual,
     train_eigenlips,
     with_common_channels,
+    with_sound_inputs,
     with_visual_channels,
 )
-from lipmotion.pipeline.training.fingerprint import fingerprint_training
 from lipmotion.pipeline.training.labels import (
+    fingerprint_training,
     label_utterances,
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
 from lipmotion.pipeline.training.other_speakers import VoiceExample
-from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, mean_speaker_vector
 from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
-from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -64,7 +65,37 @@ from lipmotion.types import (
     silent_monitor,
     sub_monitor,
 )
-from lipmotion.units import Lexicon, is_silent
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
+
+WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
+"""Warps of the frequencies, of one recording after the other."""
+FEWEST_WARPED_RECORDINGS = 60
+"""Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
+
+
+def train_phone_models(
+    spoken: Sequence[tuple[Audio, tuple[str, ...]]],
+    lexicon: Lexicon,
+    config: HmmConfig,
+    monitor: Monitor,
+    checkpoint: Checkpoint = NO_CHECKPOINT,
+    each: ParallelMap = map,
+) -> UnitHmm:
+    """Return phone models trained on recordings and their words.
+
+    spoken : recordings, each with its words, lower case
+    The frequencies of many recordings are warped as by vocal tracts of other lengths (``WARP_CYCLE``), so that the
+    models also fit other speakers.
+    Raises CorpusError: no transcript fits into its recording.
+    Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
+    """
+    turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED_RECORDINGS else (1.0,)
+    utterances = [
+        TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
+        for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
+    ]
+    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint, each)
+
 
 LOG = logging.getLogger("lipmotion")
 UTTERANCES_PER_WORKER = 32
@@ -217,7 +248,6 @@ def phones_and_examples(
 ) -> tuple[UnitHmm, list[Example], dict[str, str]]:
     """Return phone models, the examples for an engine, and the reason for every utterance that is not used.
 
-    each : applies a function to many items, perhaps in several processes
     Raises CorpusError: no utterance can be used.
     """
     learning, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
@@ -314,7 +344,6 @@ def _train_phone_models(
 def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
     """Return the part of the header of a model that is for users: corpus, licence, attribution, versions.
 
-    utterances : all that the training was given
     split      : name of their list, ``all``, or ``given names``
     used       : how many of them could be used
     """

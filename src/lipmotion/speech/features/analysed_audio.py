@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import average_power, find_sound_runs, find_spoken_frames, smooth_level
 from lipmotion.speech.features.encoding import WindowedEncoding
-from lipmotion.speech.features.mfcc import HOP, WINDOW, checked_samples, frame_count, log_energy, mfcc_of_warps
-from lipmotion.speech.features.spectrum import spectrum
-from lipmotion.speech.recognition.general.front_end import CEPSTRA, general_features
+from lipmotion.speech.features.mfcc import (
+    HOP,
+    WINDOW,
+    checked_samples,
+    frame_count,
+    log_energy,
+    mfcc_of_warps,
+    spectrum,
+)
+from lipmotion.speech.recognition.general import CEPSTRA, general_features
 from lipmotion.speech.sound.voice_activity import (
     SEPARATE_FRAMES,
     SOFTEST_DROP,
@@ -196,12 +203,12 @@ class AnalysedAudio(Audio):
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
-        """The features of the general models [shape=(T, 39)], as of ``speech.recognition.general.front_end``."""
+        """The features of the general models [shape=(T, 39)], as of ``speech.recognition.general``."""
         return self.joined(lambda audio: audio.general_features)
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
-        """The normalised log mel spectrum [shape=(T, 40)], as of ``speech.features.spectrum``."""
+        """The normalised log mel spectrum [shape=(T, 40)], as of ``speech.features.mfcc``."""
         return self.joined(lambda audio: audio.spectrum)
 
     @cached_property

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lipmotion.kernels.paths import cheapest_arrivals, trace_back
 from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio
+from lipmotion.types import Audio, Prosody
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
 """The range of F0 that is searched."""
@@ -118,11 +118,7 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
 
 
 def _refined(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return log F0 and cost at the tops of parabolas through three correlations [shapes=(CANDIDATES, n)].
-
-    peaks   : lag of the middle one [shape=(CANDIDATES, n)]
-    is_peak : False where a frame has fewer peaks [shape=(CANDIDATES, n)]
-    """
+    """Return log F0 and cost at the tops of parabolas through three correlations [shapes=(CANDIDATES, n)]."""
     rows = np.arange(len(correlation))
     left, top, right = (correlation[rows, peaks + side] for side in (-1, 0, 1))
     bend = np.where(is_peak, 2 * top - left - right, 1)
@@ -138,10 +134,7 @@ def _lag_weight(lag: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
-    """Return the costs from every candidate, the last being unvoiced, to those of the next frame [shape=(C, C, n)].
-
-    before : log F0 of the frame before the first [shape=(CANDIDATES,)]
-    """
+    """Return the costs from every candidate, the last being unvoiced, to those of the next frame [shape=(C, C, n)]."""
     earlier = np.concatenate([before[:, None], pitch[:, :-1]], axis=1)
     steps = np.full((CANDIDATES + 1, CANDIDATES + 1, pitch.shape[1]), VOICING_CHANGE_COST)
     steps[:-1, :-1] = JUMP_COST * np.abs(pitch - earlier[:, None])
@@ -224,7 +217,14 @@ def _tables() -> _Tables:
     fourier = np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * _window(time)
     inverse = np.cos(2 * np.pi / size * bins[:, None] * lags()) * np.where(bins == 0, 1, 2)[:, None] / size
     early, late = (_window(time) * _window(time + side * lags()) for side in (1, -1))
-    arrays = (_low_pass(), fourier, inverse, early, late, early.sum(axis=0))
+    at = np.arange(_TAPS) - _TAPS // 2
+    low, high = (2 * hertz / SPEECH_RATE_HZ * np.sinc(2 * hertz / SPEECH_RATE_HZ * at) for hertz in _PASSED_HZ)
+    taps = (high - low) * np.hamming(_TAPS)
+    taps -= np.hamming(_TAPS) * taps.sum() / np.hamming(_TAPS).sum()
+    table = np.zeros((3 * HOP, _HOP))
+    for output in range(_HOP):
+        table[_STEP * output : _STEP * output + _TAPS, output] = taps
+    arrays = (np.concatenate(np.split(table, 3), axis=1), fourier, inverse, early, late, early.sum(axis=0))
     return _Tables(*(array.astype(np.float32) for array in arrays))
 
 
@@ -232,13 +232,18 @@ def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.abs(time + 0.5 - _WINDOW / 2) < _WINDOW / 2, np.sin(np.pi * (time + 0.5) / _WINDOW) ** 2, 0)
 
 
-def _low_pass() -> NDArray[np.float64]:
-    """Return a windowed-sinc band pass with no gain at 0 Hz, once for every output [shape=(HOP, 3 · _HOP)]."""
-    time = np.arange(_TAPS) - _TAPS // 2
-    low, high = (2 * hertz / SPEECH_RATE_HZ * np.sinc(2 * hertz / SPEECH_RATE_HZ * time) for hertz in _PASSED_HZ)
-    taps = (high - low) * np.hamming(_TAPS)
-    taps -= np.hamming(_TAPS) * taps.sum() / np.hamming(_TAPS).sum()
-    table = np.zeros((3 * HOP, _HOP))
-    for output in range(_HOP):
-        table[_STEP * output : _STEP * output + _TAPS, output] = taps
-    return np.concatenate(np.split(table, 3), axis=1)
+LEAST_POWER = 1e-9
+"""Power that is added to every frame's: digital silence is at -90 dB."""
+
+
+def prosody_of(audio: Audio) -> Prosody:
+    """Return loudness and pitch of a sound at 16 kHz. Raises InputError: as ``speech.features.mfcc`` says."""
+    samples = checked_samples(audio)
+    frames = frame_count(samples)
+    hops = samples[: (frames - 1) * HOP].reshape(-1, HOP)
+    rest = samples[hops.size :].astype(np.float64)
+    energy = np.append(np.einsum("ij,ij->i", hops, hops, dtype=np.float64), rest @ rest)  # from frame to frame
+    centre = np.arange(frames) * HOP
+    length = np.minimum(centre + HOP, len(samples)) - np.maximum(centre - HOP, 0)
+    mean = (energy + np.concatenate([[0.0], energy[:-1]])) / np.maximum(length, 1)
+    return Prosody(10 * np.log10(mean + LEAST_POWER), log_f0(Audio(audio.samples, SPEECH_RATE_HZ)))

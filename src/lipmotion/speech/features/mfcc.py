@@ -1,4 +1,4 @@
-"""The acoustic front end of the papers: 12 MFCC and the log energy of every frame, their Δ and ΔΔ."""
+"""Acoustic features: 12 MFCC and log energy with Δ and ΔΔ, as in the papers; the log mel spectrum of networks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Audio, Features
+from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, Audio, Features
 
 WINDOW = 400  # 25 ms
 HOP = 160  # 10 ms
@@ -58,20 +58,22 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
     energy : ``log_energy`` of the recording [shape=(T,)]
     Raises InputError: as ``mfcc``.
     """
-    log_powers = log_mels(checked_samples(audio), [_filters(warp) for warp in warps])
+    log_powers = log_mels(checked_samples(audio), [mel_filters(warp) for warp in warps])
     features = []
     while log_powers:
         cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
         static = np.concatenate([cepstra, energy[:, None]], axis=1)
-        features.append(Features(normalised(_with_deltas(static), rounding), audio.duration_s))
+        width = static.shape[1]
+        values = np.empty((len(static), 3 * width), np.float32)
+        values[:, :width] = static
+        for first in (width, 2 * width):
+            values[:, first : first + width] = regression_delta(values[:, first - width : first])
+        features.append(Features(normalised(values, rounding), audio.duration_s))
     return features
 
 
 def _cepstra(log_powers: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
-    """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding.
-
-    log_powers : of the mel filters [shape=(T, 26)]
-    """
+    """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding."""
     rounding = ROUNDING_SHARE * max(float(log_powers.max()), -float(log_powers.min()))
     return log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1), rounding
 
@@ -86,16 +88,6 @@ def checked_samples(audio: Audio) -> NDArray[np.float32]:
     if not peak < LARGEST_SAMPLE:
         raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
     return audio.samples.astype(np.float32, copy=False)
-
-
-def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return static features [shape=(T, D)] with their Δ and ΔΔ [shape=(T, 3·D)]."""
-    width = static.shape[1]
-    values = np.empty((len(static), 3 * width), np.float32)
-    values[:, :width] = static
-    for first in (width, 2 * width):
-        values[:, first : first + width] = regression_delta(values[:, first - width : first])
-    return values
 
 
 def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
@@ -115,10 +107,7 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
 
 
 def normalised(values: NDArray[np.float32], rounding: float) -> NDArray[np.float32]:
-    """Return the columns with mean 0 and standard deviation 1 [shape=(T, D)]; a constant column becomes exactly 0.
-
-    rounding : the standard deviation up to which a column is constant but for rounding
-    """
+    """Return the columns with mean 0 and standard deviation 1 [shape=(T, D)]; a constant column becomes exactly 0."""
     scaled = values - values.mean(axis=0, dtype=np.float64).astype(np.float32)
     deviation = np.sqrt(np.square(scaled).mean(axis=0, dtype=np.float64))  # single precision loses count in an hour
     moves = deviation > rounding
@@ -172,7 +161,6 @@ def frame_count(samples: NDArray[np.float32]) -> int:
 
 
 def _blocks(frames: int) -> Iterator[slice]:
-    """Return slices of at most ``BLOCK`` frames that cover all frames in order."""
     return (slice(start, min(start + BLOCK, frames)) for start in range(0, frames, BLOCK))
 
 
@@ -188,11 +176,17 @@ def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @cache
-def _filters(warp: float) -> NDArray[np.float32]:
-    """Return triangular filters, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
+def mel_filters(
+    warp: float, count: int = FILTERS, lowest_hz: float = 0.0, highest_hz: float = SPEECH_RATE_HZ / 2
+) -> NDArray[np.float32]:
+    """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, count)]."""
     bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
-    edges = np.linspace(0, mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
-    return triangles(bins, edges).astype(np.float32)
+    return triangles(bins, _edges(count, lowest_hz, highest_hz)).astype(np.float32)
+
+
+def _edges(count: int, lowest_hz: float, highest_hz: float) -> NDArray[np.float64]:
+    """Return where bands begin, are most sensitive, and end, in mel [shape=(count + 2,)]."""
+    return np.linspace(mel(np.array(lowest_hz)), mel(np.array(highest_hz)), count + 2)
 
 
 def triangles(bins: NDArray[np.floating[Any]], edges: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
@@ -222,3 +216,38 @@ def liftered_cosine(filters: int, first: int, end: int) -> NDArray[np.float32]:
     basis = np.cos(np.pi * (np.arange(filters)[:, None] + 0.5) * order / filters) * np.sqrt(2 / filters)
     basis /= np.where(order == 0, np.sqrt(2), 1)
     return (basis * (1 + LIFTER / 2 * np.sin(np.pi * order / LIFTER))).astype(np.float32)
+
+
+BANDS = SPECTRUM_BANDS, 60.0, 7600.0
+"""The bands of spectra: their number, lowest and highest frequency in Hz."""
+DYNAMIC_RANGE_DB = 60.0
+"""Powers are floored this far below the loudest of the recording: what is under the noise of most rooms is the same."""
+LEAST_DEVIATION = 1e-3
+
+
+def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
+    """Return the log power in ``SPECTRUM_BANDS`` mel bands [shape=(T, 40)], frames as in ``mfcc``.
+
+    warp : factor by which frequencies are stretched, as in ``mfcc``
+    Each band has mean 0 over the recording; it is divided by the mean of its own standard deviation and that of the
+    whole spectrum, so that bands without speech stay small.
+    Raises InputError: as ``mfcc``.
+    """
+    powers = log_bands(checked_samples(audio), warp)
+    powers = np.maximum(powers, powers.max() - np.float32(DYNAMIC_RANGE_DB / 10 * np.log(10)))
+    powers -= powers.mean(axis=0, dtype=float).astype(np.float32)
+    squares = np.square(powers).mean(axis=0, dtype=float)
+    powers /= (np.sqrt(squares) / 2 + np.sqrt(squares.mean()) / 2 + LEAST_DEVIATION).astype(np.float32)
+    return powers
+
+
+def log_bands(samples: NDArray[np.float32], warp: float = 1.0) -> NDArray[np.float32]:
+    """Return the natural log power in ``SPECTRUM_BANDS`` mel bands, not normalised [shape=(T, 40)]; as ``spectrum``."""
+    return log_mel(samples, mel_filters(warp, *BANDS))
+
+
+@cache
+def band_centres() -> NDArray[np.float64]:
+    """Return the frequencies in Hz at which the bands of ``log_bands`` are most sensitive [shape=(40,)]."""
+    hertz = np.arange(SPEECH_RATE_HZ / 2 + 1)
+    return np.interp(_edges(*BANDS)[1:-1], mel(hertz), hertz)

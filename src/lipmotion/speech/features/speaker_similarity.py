@@ -93,8 +93,7 @@ def speaker_vector(audio: AnalysedAudio) -> NDArray[np.float64]:
     if not part.samples.any():
         return np.zeros(2 * COMPONENTS)
     rows = part.encoding[part.log_energy >= np.quantile(part.log_energy, QUIET_SHARE)].astype(float)
-    vector: NDArray[np.float64] = (np.concatenate([rows.mean(axis=0), rows.std(axis=0)]) - centre) @ whitening
-    return vector
+    return np.asarray((np.concatenate([rows.mean(axis=0), rows.std(axis=0)]) - centre) @ whitening, np.float64)
 
 
 def mean_speaker_vector(recordings: Iterable[AnalysedAudio]) -> NDArray[np.float32]:
@@ -119,8 +118,5 @@ def _densities(hmm: UnitHmm) -> QuadraticForm:
 
 
 def best_warp(fits: dict[float, float]) -> float:
-    """Return the warp with the highest fit; of equal ones, that which changes the frequencies least.
-
-    fits : the mean log density per frame at each warp
-    """
+    """Return the warp with the highest fit; of equal ones, that which changes the frequencies least."""
     return max(fits, key=lambda warp: (fits[warp], -abs(warp - 1)))

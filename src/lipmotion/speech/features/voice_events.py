@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -23,12 +25,117 @@ from numpy.typing import NDArray
 
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
-from lipmotion.speech.features.laughter import laughter
-from lipmotion.speech.features.mfcc import HOP
-from lipmotion.speech.features.spectrum import band_centres, log_bands
+from lipmotion.speech.features.mfcc import HOP, band_centres, log_bands
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from lipmotion.units import VOWELS, is_silent
+
+APART_FRAMES = (11, 40)
+"""Calls of one bout are so far apart, least and most."""
+LEAST_CALLS = 4
+RISE_DB, LOWEST_DB = 6.0, -35.0
+"""A call is so much louder than what is beside it, and its level beside the loudest one is at least the second."""
+EDGE_FRAMES = 5
+"""A bout begins and ends so many frames beside its first and its last call."""
+VOICED_SHARES = (0.15, 0.75)
+"""Share of the frames of a bout that is voiced; with less it is a cough, or clicks of tongue or teeth."""
+WEIGHTS = (14.8, 0.122, -7.09, -2.93, 3.85, -16.5)
+"""The log odds of laughter: the sum of these times likeness, depth, voiced share, voiced gaps, log calls, and 1."""
+MIN_PROBABILITY = 0.7
+
+
+class Bout(NamedTuple):
+    """A run of calls.
+
+    first, end  : frames
+    calls       : their loudest frames
+    levels_db   : the levels there
+    probability : that it is laughter, 0 to 1
+    """
+
+    first: int
+    end: int
+    calls: tuple[int, ...]
+    levels_db: tuple[float, ...]
+    probability: float
+
+
+def laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_]) -> Iterator[Bout]:
+    """Yield the bouts of a recording at 16 kHz that are probably laughter, in order.
+
+    level_db : smoothed level of every frame of 10 ms [shape=(T,)]
+    voiced   : whether it is voiced [shape=(T,)]
+    """
+    for calls in runs_of_calls(level_db):
+        figures = figures_of(samples, level_db, voiced, calls)
+        if figures is None:
+            continue
+        probability = float(1 / (1 + np.exp(-np.dot(WEIGHTS, [*figures, 1.0]))))
+        if probability >= MIN_PROBABILITY:
+            first, end = max(calls[0] - EDGE_FRAMES, 0), min(calls[-1] + EDGE_FRAMES + 1, len(level_db))
+            yield Bout(first, end, calls, tuple(level_db[[*calls]].tolist()), probability)
+
+
+def runs_of_calls(level_db: Curve) -> Iterator[tuple[int, ...]]:
+    """Yield the loudest frames of successive calls that are near enough to be of one bout."""
+    peaks = risen_peaks(level_db, RISE_DB)
+    peaks = peaks[level_db[peaks] >= level_db.max() + LOWEST_DB]
+    gaps = np.diff(peaks)
+    breaks = np.flatnonzero((gaps < APART_FRAMES[0]) | (gaps > APART_FRAMES[1])) + 1
+    for run in np.split(peaks, breaks):
+        if len(run) >= LEAST_CALLS:
+            yield tuple(run.tolist())
+
+
+def risen_peaks(curve: Curve, prominence: float) -> NDArray[np.intp]:
+    """Return the frames of peaks that are at least so far above the higher of the two levels beside them, ascending.
+
+    Beside a peak the curve falls to its lowest value before the next higher peak, or the end. Equal neighbours are no
+    peak. The same as ``scipy.signal.find_peaks``, whose import takes longer than recordings of some minutes.
+    """
+    peaks = np.flatnonzero((curve[1:-1] > curve[:-2]) & (curve[1:-1] > curve[2:])) + 1
+    if not len(peaks):
+        return peaks
+    lowest, heights = np.minimum.reduceat(curve, [0, *peaks]), curve[peaks]
+    before = _fallen_to(heights, lowest[:-1])
+    after = _fallen_to(heights[::-1], lowest[:0:-1])[::-1]
+    return peaks[heights - np.maximum(before, after) >= prominence]
+
+
+def _fallen_to(heights: Curve, lowest: Curve) -> Curve:
+    """Return how low the curve falls before each peak, back to the one before it that is higher [shape=(P,)]."""
+    found, higher = [], list[tuple[float, float]]()
+    for height, least in zip(heights.tolist(), lowest.tolist(), strict=True):
+        value = least
+        while higher and higher[-1][0] <= height:
+            value = min(value, higher.pop()[1])
+        found.append(value)
+        higher.append((height, value))
+    return np.array(found)
+
+
+def figures_of(
+    samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_], calls: tuple[int, ...]
+) -> tuple[float, ...] | None:
+    """Return the figures of a run that ``WEIGHTS`` weigh; None: its voiced share is not that of laughter.
+
+    They are the mean correlation of the spectra of successive calls; how far the level falls between them, in decibels;
+    the voiced share; the share of the gaps that are voiced where they are quietest; the log number of calls.
+    """
+    first, end = max(calls[0] - EDGE_FRAMES, 0), min(calls[-1] + EDGE_FRAMES + 1, len(level_db))
+    share = float(voiced[first:end].mean())
+    if not VOICED_SHARES[0] <= share <= VOICED_SHARES[1]:
+        return None
+    quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls)]
+    peaks = level_db[[*calls]]
+    depth = float(np.mean(np.minimum(peaks[1:], peaks[:-1]) - level_db[quietest]))
+    bands = log_bands(samples[first * HOP : (end - 1) * HOP])
+    spectra = bands[np.array(calls) - first].astype(np.float64)
+    spectra -= spectra.mean(axis=1, keepdims=True)
+    spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
+    likeness = float((spectra[1:] * spectra[:-1]).sum(axis=1).mean())
+    return likeness, depth, share, float(voiced[quietest].mean()), float(np.log(len(calls)))
+
 
 Curve = NDArray[np.float64]
 Voiced = NDArray[np.bool_]
@@ -81,14 +188,15 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     """Return what is detected in a recording beside words, in the order of time; events of a kind do not overlap.
 
     audio : at 16 kHz
-    units : the phones in time
     Raises InputError: as ``speech.features.mfcc`` says.
     """
     found, judged = list[VoiceEvent](), list[tuple[float, float, tuple[float, float, float]]]()
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
         said = units.between(at_s, at_s + sound.duration_s)
-        level_db, (voiced, pitch) = smoothed_level_db(sound), _voice(sound)
+        level_db = _smoothed(analysed(sound).log_energy.astype(np.float64) * DB)
+        pitch = log_f0(sound).astype(np.float64) * 12 / np.log(2)  # semitones
+        voiced = np.isfinite(pitch)
         laughs = tuple(_laughs(sound, level_db, voiced, said))
         phrases = [phrase for phrase in _phrases(said) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
         events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
@@ -113,26 +221,16 @@ DB = 10 / np.log(10)
 """Decibels of a natural logarithm of power."""
 
 
-def smoothed_level_db(audio: Audio) -> Curve:
-    """Return the smoothed level of every frame of a recording [shape=(T,)], decibels of any reference."""
-    return _smoothed(analysed(audio).log_energy.astype(np.float64) * DB)
-
-
 def _heard(level_db: Curve) -> Curve:
     """Return the levels within passages, over which levels are compared; all, where there is none."""
     heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]
     return heard if len(heard) else level_db
 
 
-def _voice(audio: AnalysedAudio) -> tuple[Voiced, Curve]:
-    """Return whether each frame is voiced, and its pitch in semitones, NaN where it is not [each shape=(T,)]."""
-    pitch = log_f0(audio).astype(np.float64) * 12 / np.log(2)
-    return np.isfinite(pitch), pitch
-
-
 def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
     """Yield laughter where hardly any words are known or confirmed."""
-    words = [span for span in units if not is_silent(span.label.phone) and _is_sure(span.label)]
+    sure = (span for span in units if span.label.confidence is None or span.label.confidence >= WORD_CONFIDENCE)
+    words = [span for span in sure if not is_silent(span.label.phone)]
     for bout in laughter(audio.samples, level_db, voiced):
         start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
         said_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for span in words)
@@ -140,10 +238,6 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
             loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
             calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
             yield VoiceEvent(start_s, end_s, LAUGHTER, bout.probability, tuple(calls))
-
-
-def _is_sure(unit: Unit) -> bool:
-    return unit.confidence is None or unit.confidence >= WORD_CONFIDENCE
 
 
 def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
@@ -162,7 +256,6 @@ def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
 
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
-    """Yield the phrases without a voice."""
     quiet_db, most_db = np.percentile(_heard(level_db), (10, 99))
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
@@ -206,9 +299,17 @@ def _shouts(judged: Sequence[tuple[float, float, tuple[float, float, float]]]) -
 
 
 def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
-    """Yield the breaths that are detected in pauses."""
     loud_db, spoken = float(np.percentile(_heard(level_db), 95)), np.flatnonzero(voiced)
-    for start_s, end_s in _silences(units):
+    ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
+    starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
+    starts_s.append(max((span.end_s for span in units), default=0.0))
+    silences = [
+        (first_s, min(first_s + PAUSE_PIECE_S, end_s))
+        for start_s, end_s in zip(ends_s, starts_s, strict=True)
+        if end_s - start_s >= BREATH_PAUSE_S
+        for first_s in np.arange(start_s, end_s, PAUSE_PIECE_S).tolist()
+    ]
+    for start_s, end_s in silences:
         pause, reach = _frames(start_s, end_s), round(QUIET_REACH_S * FRAME_RATE_HZ)
         around = slice(max(pause.start - reach, 0), min(pause.stop + reach, len(level_db)))
         for begin, end, rise_db in _noises(_bands(audio, around), voiced[around]):
@@ -223,20 +324,6 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
                 yield VoiceEvent(first / FRAME_RATE_HZ, stop / FRAME_RATE_HZ, BREATH, strength)
 
 
-def _silences(units: Timeline[Unit]) -> list[tuple[float, float]]:
-    """Return start and end, in seconds, of the stretches without phones that are long enough for a breath, cut."""
-    ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
-    starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
-    starts_s.append(max((span.end_s for span in units), default=0.0))
-    pairs = zip(ends_s, starts_s, strict=True)
-    return [
-        (first_s, min(first_s + PAUSE_PIECE_S, end_s))
-        for start_s, end_s in pairs
-        if end_s - start_s >= BREATH_PAUSE_S
-        for first_s in np.arange(start_s, end_s, PAUSE_PIECE_S).tolist()
-    ]
-
-
 def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
     """Yield first frame, the one after the last, and rise in decibels of noise that is as a breath's."""
     centres, starts = band_centres(), range(0, len(bands), BLOCK_FRAMES)
@@ -246,7 +333,11 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         for inside in [(centres >= least) & (centres < most)]
     )
     level = _smoothed(DB * np.log(bright))
-    quiet = _quiet(level)
+    reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
+    windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
+    rank = int(QUIET_SHARE * windows.shape[1])
+    blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
+    quiet = np.concatenate([np.partition(block, rank, axis=1)[:, rank].copy() for block in blocks])
     edges = np.flatnonzero(np.diff(np.r_[False, (level > quiet + BREATH_RISE_DB[0]) & ~voiced, False]))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if not BREATH_S[0] <= (stop - first) / FRAME_RATE_HZ <= BREATH_S[1]:
@@ -259,15 +350,6 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         shaped = BREATH_TILT_DB[0] <= tilt_db <= BREATH_TILT_DB[1] and low_db <= BREATH_LOW_DB
         if shaped and top_db - max(left, right) >= BREATH_EDGE_DB:
             yield first, stop, float(np.max(level[run] - quiet[run]))
-
-
-def _quiet(level: Curve) -> Curve:
-    """Return the level that ``QUIET_SHARE`` of the frames around each frame do not pass [shape=(T,)]."""
-    reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
-    windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
-    rank = int(QUIET_SHARE * windows.shape[1])
-    blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
-    return np.concatenate([np.partition(block, rank, axis=1)[:, rank].copy() for block in blocks])
 
 
 def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:

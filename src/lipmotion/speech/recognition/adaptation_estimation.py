@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.features.speaker_similarity import WARPS, SpeakerSimilarity, best_warp
 from lipmotion.speech.recognition.adaptation import Adaptation, identity_adaptation
-from lipmotion.speech.recognition.combined_phones import NOISES
-from lipmotion.speech.recognition.general.acoustic import STREAMS, general_model
+from lipmotion.speech.recognition.general import NOISES, STREAMS, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser, own_model_weight
 from lipmotion.stats.constrained_mllr import (
     AffineStatistics,
@@ -51,7 +50,6 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     """Return the adaptation of phone models to the speaker of some recordings.
 
     own        : the phone models of a corpus, not adapted
-    recordings : of one speaker
     All recordings are recognised with the own and the general models. The features of both then get the affine
     transform that makes the recognised states most probable, with the identity as prior mean. The frequencies are
     stretched first, by one factor for all recordings.
@@ -60,7 +58,11 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     Source: Gales 1998 (constrained MLLR); Lei, Hamaker & He 2006 (a prior for it; ours is the models' own statistics).
     """
     audios = [analysed(audio) for audio in recordings]
-    similarity = _common_similarity(own, audios)
+    scores = {
+        warp: own.fit(np.concatenate([audio.mfcc(warp).values for audio in audios])) - own.typical_fit for warp in WARPS
+    }
+    warp = best_warp(scores)
+    similarity = SpeakerSimilarity(warp, scores[warp])
     own_features = np.concatenate([audio.mfcc(similarity.warp).values for audio in audios])
     general_features = np.concatenate([audio.general_features for audio in audios])
     adaptation, speech_s = identity_adaptation(similarity.warp, own_model_weight(similarity.score)), 0.0
@@ -68,56 +70,28 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         recogniser = Recogniser(own, adaptation=adaptation)
         densities = np.concatenate([recogniser.best_path_densities(audio, audio.mfcc()) for audio in audios])
         combined = recogniser.combined
-        speech_s = _checked_speech_s(combined.hmm.table.names, densities)
-        prior, free = _own_prior(own, short=speech_s < SHORT_S)
+        units = [name.partition(".")[0] for name in combined.hmm.table.names]
+        silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
+        speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
+        if not speech_s:
+            raise InputError("no speech found in the recordings; give some of the voice to adapt to")
+        if speech_s < MIN_SPEECH_S:
+            raise InputError(
+                f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more of this voice"
+            )
+        short = speech_s < SHORT_S
+        group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
+        free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)
+        plain = np.arange(len(own.log_stay), dtype=np.intp)
+        prior = prior_statistics(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE)
         matrix = _improved(combined.hmm.mixtures, prior, own_features, densities, adaptation.own, free)
         streams = _general_improved(general_features, combined.columns[densities], adaptation.general)
         adaptation = replace(adaptation, own=matrix, general=streams)
     return EstimatedAdaptation(adaptation, speech_s)
 
 
-def _checked_speech_s(names: Sequence[str], densities: NDArray[np.intp]) -> float:
-    """Return how many seconds of speech some frames hold.
-
-    names     : of all densities: unit, point, state
-    densities : of the frames [shape=(T,)]
-    Raises InputError: less than ``MIN_SPEECH_S``.
-    """
-    units = [name.partition(".")[0] for name in names]
-    silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
-    speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
-    if not speech_s:
-        raise InputError("no speech found in the recordings; give some of the voice to adapt to")
-    if speech_s < MIN_SPEECH_S:
-        raise InputError(
-            f"found {speech_s:.1f} s of speech, required at least {MIN_SPEECH_S:.0f} s; give more of this voice"
-        )
-    return speech_s
-
-
-def _common_similarity(own: UnitHmm, audios: Sequence[AnalysedAudio]) -> SpeakerSimilarity:
-    """Return the speaker similarity of all recordings together, at one warp for all of them."""
-    scores = {
-        warp: own.fit(np.concatenate([audio.mfcc(warp).values for audio in audios])) - own.typical_fit for warp in WARPS
-    }
-    warp = best_warp(scores)
-    return SpeakerSimilarity(warp, scores[warp])
-
-
-def _own_prior(own: UnitHmm, *, short: bool) -> tuple[AffineStatistics, NDArray[np.bool_]]:
-    """Return the prior statistics of the own models' transform, and its entries that may change [shape=(39, 40)]."""
-    group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
-    free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)
-    plain = np.arange(len(own.log_stay), dtype=np.intp)
-    return prior_statistics(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE), free
-
-
 def _general_improved(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
-    """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved.
-
-    features  : not transformed [shape=(T, 39)]
-    densities : the state of the general models in each frame [shape=(T,)]
-    """
+    """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved."""
     streams = []
     for number, (stream, transform) in enumerate(zip(STREAMS, transforms, strict=True)):
         mixtures = general_model().mixtures(number)
@@ -137,7 +111,6 @@ def _improved(
 ) -> Array:
     """Return a transform [shape=(D, D + 1)] that makes frames more probable under the densities of their states.
 
-    prior     : statistics that are added to those of the frames
     features  : not transformed [shape=(T, D)]
     densities : of each frame [shape=(T,)]
     transform : to begin with [shape=(D, D + 1)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition.general.acoustic import STATES, density_column, general_model
+from lipmotion.speech.recognition.general import STATES, density_column, general_model
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
 from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, label_evidence
 from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
@@ -196,7 +196,12 @@ class _ScoredFrames(NamedTuple):
 
 
 def _scored_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
-    frames, phones, states = (rows[::FRAME_STEP] for rows in _spoken_frames(units))
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    each = [np.arange(of_span.start, of_span.stop) for of_span in map(_frames_of, spoken)]
+    phones = np.repeat(np.arange(len(spoken)), [len(of_span) for of_span in each])
+    first = np.array([density_column(span.label.phone, 0, STATES) for span in spoken], np.intp)[phones]
+    frames = np.concatenate([np.zeros(0, np.intp), *each])
+    frames, phones, states = (rows[::FRAME_STEP] for rows in (frames, phones, first))
     if not len(frames):
         return _ScoredFrames(frames, phones, np.zeros(0, np.float32))
     log_densities = general_model().log_density(audio.general_features[frames])
@@ -211,12 +216,3 @@ def _first_frame(time_s: float) -> int:
 
 def _frames_of(span: Span[Unit]) -> slice:
     return slice(_first_frame(span.start_s), _first_frame(span.end_s))
-
-
-def _spoken_frames(units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Return the frames of speech, and in each the number of its phone, and the general density of the first state."""
-    spoken = [span for span in units if not is_silent(span.label.phone)]
-    frames = [np.arange(of_span.start, of_span.stop) for of_span in map(_frames_of, spoken)]
-    first = [density_column(span.label.phone, 0, STATES) for span in spoken]
-    phones = np.repeat(np.arange(len(spoken)), [len(each) for each in frames])
-    return np.concatenate([np.zeros(0, np.intp), *frames]), phones, np.array(first, np.intp)[phones]

@@ -77,7 +77,6 @@ def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: flo
     If all are late or early they are corrected; lines that begin after the end of the recording are left out. Both are
     logged as warnings.
     loud       : which frames are loud [shape=(T,)]
-    duration_s : of the recording
     Raises InputError: all lines begin after the end.
     """
     late_s = lateness_s(transcript, loud)
@@ -124,16 +123,7 @@ def lateness_s(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
     edges = np.round(np.stack([anchors.start_s, anchors.end_s])[:, known] * FRAME_RATE_HZ) + most
     for first, end in np.unique(np.clip(edges, 0, len(spoken)).astype(np.intp), axis=1).T:
         spoken[first:end] = 1
-    correlation = _correlations(loud.astype(float), spoken)
-    best = int(correlation.argmax())
-    late_s = (best - most) / FRAME_RATE_HZ
-    gain = correlation[best] - max(correlation[most], 0.0)
-    is_sure = correlation[best] >= MIN_CORRELATION and gain >= LEAST_GAIN
-    return late_s if is_sure and abs(late_s) > LINE_TOLERANCE_S else 0.0
-
-
-def _correlations(loudness: NDArray[np.float64], spoken: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the correlation of ``loudness`` with every stretch of ``spoken`` as long [shape=(S - T + 1,)]."""
+    loudness = loud.astype(float)
     count = len(loudness)
     deviation = loudness - loudness.mean()
     size = 1 << (len(spoken) + count - 1).bit_length()
@@ -142,7 +132,12 @@ def _correlations(loudness: NDArray[np.float64], spoken: NDArray[np.float64]) ->
     mean = (total[count:] - total[:-count]) / count
     scale = count * loudness.std() * np.sqrt(np.maximum(mean - mean**2, 0.0))  # of zeros and ones
     product = product[: len(mean)]
-    return np.divide(product, scale, out=np.zeros_like(product), where=scale > 1e-6)
+    correlation = np.divide(product, scale, out=np.zeros_like(product), where=scale > 1e-6)
+    best = int(correlation.argmax())
+    late_s = (best - most) / FRAME_RATE_HZ
+    gain = correlation[best] - max(correlation[most], 0.0)
+    is_sure = correlation[best] >= MIN_CORRELATION and gain >= LEAST_GAIN
+    return late_s if is_sure and abs(late_s) > LINE_TOLERANCE_S else 0.0
 
 
 def windows_of(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int) -> Windows:
@@ -176,31 +171,22 @@ def feasible_windows(
     """
     for _ in range(MOST_WIDENINGS):
         windows = windows_of(anchors, tolerance_s, frames)
-        crowded = _crowded(windows, least, edge, frames)
+        crowded = np.zeros(len(least), bool)
+        earliest = edge
+        ends = np.minimum(windows.end, frames - edge).tolist()
+        for word, (first, end, count) in enumerate(zip(windows.first.tolist(), ends, least.tolist(), strict=True)):
+            begin = max(first, earliest)
+            crowded[word] = begin + count > end
+            earliest = min(begin + count, max(end, first))  # the words after it are judged as if it had room
         if not crowded.any():
             return windows, tolerance_s
-        tolerance_s = _widened(anchors, tolerance_s, crowded)
+        near = (
+            np.convolve(crowded, np.ones(2 * NEIGHBOURS + 1), "same") > 0 if len(crowded) > 2 * NEIGHBOURS else crowded
+        )
+        near = near | np.isin(anchors.groups, anchors.groups[crowded])
+        tolerance_s = np.where(near, 2 * tolerance_s, tolerance_s)
     tolerance_s = np.full(len(least), np.inf)
     return windows_of(anchors, tolerance_s, frames), tolerance_s
-
-
-def _crowded(windows: Windows, least: NDArray[np.intp], edge: int, frames: int) -> NDArray[np.bool_]:
-    """Return which words have no room in their windows, after the words before them [shape=(W,)]."""
-    crowded = np.zeros(len(least), bool)
-    earliest = edge
-    ends = np.minimum(windows.end, frames - edge).tolist()
-    for word, (first, end, count) in enumerate(zip(windows.first.tolist(), ends, least.tolist(), strict=True)):
-        begin = max(first, earliest)
-        crowded[word] = begin + count > end
-        earliest = min(begin + count, max(end, first))  # the words after it are judged as if it had room
-    return crowded
-
-
-def _widened(anchors: Anchors, tolerance_s: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return tolerances, doubled for some words, for all that share their times, and for their neighbours."""
-    near = np.convolve(chosen, np.ones(2 * NEIGHBOURS + 1), "same") > 0 if len(chosen) > 2 * NEIGHBOURS else chosen
-    near = near | np.isin(anchors.groups, anchors.groups[chosen])
-    return np.where(near, 2 * tolerance_s, tolerance_s)
 
 
 def pressed_words(placed: Sequence[PlacedWord], windows: Windows, frames: int) -> NDArray[np.bool_]:
@@ -264,7 +250,14 @@ def align_within(
     free = _free(placed, anchors, frames, search)
     if free is not None:
         return free
-    _warn_of_misfits(group_fits(placed, anchors.groups, frames), anchors)
+    last_fits = group_fits(placed, anchors.groups, frames)
+    wrong = np.flatnonzero(_beside(last_fits) < WORST_FIT)
+    if len(wrong):
+        known = anchors.start_s[(anchors.groups <= int(wrong[0])) & ~np.isnan(anchors.start_s)]
+        LOG.warning(
+            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
+            *(len(wrong), len(last_fits), float(known[-1]) if len(known) else 0.0),
+        )
     return placed, windows
 
 
@@ -297,32 +290,13 @@ def _free(
     return free, windows
 
 
-def _warn_of_misfits(fits: NDArray[np.float64], anchors: Anchors) -> None:
-    """Log a warning of the times whose words, and those beside them, fit the sound very badly."""
-    wrong = np.flatnonzero(_beside(fits) < WORST_FIT)
-    if len(wrong):
-        LOG.warning(
-            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
-            *(len(wrong), len(fits), _first_time(anchors, int(wrong[0]))),
-        )
-
-
 def _beside(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of each value and those beside it."""
     count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
     return np.convolve(values, np.ones(3))[1:-1] / count
 
 
-def _first_time(anchors: Anchors, group: int) -> float:
-    """Return the start of the words of one time, or of what is before them."""
-    known = anchors.start_s[(anchors.groups <= group) & ~np.isnan(anchors.start_s)]
-    return float(known[-1]) if len(known) else 0.0
-
-
 def least_frames(words: Sequence[Sequence[Sequence[str]]], counts: dict[str, int]) -> NDArray[np.intp]:
-    """Return the fewest frames of each word, given its pronunciations: the states of the shortest.
-
-    counts : the number of states by unit
-    """
+    """Return the fewest frames of each word, given its pronunciations: the states of the shortest."""
     of_words = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
     return np.array([of_words[id(word)] for word in words], np.intp)

@@ -91,17 +91,15 @@ def _whisper_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLi
     if about.language != ENGLISH:
         LOG.warning("whisper recognises the language %r, not English; its words are not used", about.language)
         return None
-    return [_whisper_line(segment) for segment in segments]
-
-
-def _whisper_line(segment: Any) -> TranscriptLine:
-    """Return a segment: from its words in time, or where there are none from its text."""
-    words: list[TimedWord] = []
-    for word in segment.words or ():
-        words += time_words(extract_spoken_text(word.word), float(word.start), float(word.end))
-    if not words:
-        words = [TimedWord(word.word) for word in time_words(extract_spoken_text(segment.text))]
-    return TranscriptLine(tuple(words), float(segment.start), float(segment.end))
+    lines = []
+    for segment in segments:
+        words: list[TimedWord] = []
+        for word in segment.words or ():
+            words += time_words(extract_spoken_text(word.word), float(word.start), float(word.end))
+        if not words:  # a segment of which the words have no times
+            words = [TimedWord(word.word) for word in time_words(extract_spoken_text(segment.text))]
+        lines.append(TranscriptLine(tuple(words), float(segment.start), float(segment.end)))
+    return lines
 
 
 @lru_cache(maxsize=1)

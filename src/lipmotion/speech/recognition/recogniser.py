@@ -26,8 +26,7 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, speaker_similarity
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
-from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
-from lipmotion.speech.recognition.network.network_search import NetworkSearch, phones_without_words
+from lipmotion.speech.recognition.general import CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
     installed_phone_recogniser,
@@ -43,7 +42,13 @@ from lipmotion.speech.recognition.recognised_speech import (
     recognition_of,
     spliced,
 )
-from lipmotion.speech.recognition.word_search import WordSearch, begun_decoding, free_labels
+from lipmotion.speech.recognition.word_search import (
+    WordSearch,
+    begun_decoding,
+    free_labels,
+    network_words,
+    phones_without_words,
+)
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
@@ -101,8 +106,6 @@ class Recogniser:
     ) -> Recognition:
         """Return the recognised phones of a recording in time, with the words that decided them.
 
-        audio, features : as of ``recognise``
-        each            : applies a function to many items, perhaps in several processes
         english         : whether English words are searched; in other languages, phones alone
         Words are recognised in every stretch of sound and aligned by our models: by a phone recogniser where it is sure
         (``speech.recognition.network``), else by pocketsphinx. Then ``auto`` compares their likelihood with that of the
@@ -122,8 +125,14 @@ class Recogniser:
                 for passage in audio.passages
             ]
             return joined_recognition(passages, features.duration_s)
-        similarity = self._similarity(audio)
-        known = self._knows_voice_and_words(similarity)
+        is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
+        similarity = speaker_similarity(self.own, audio) if is_judged else None
+        known = (
+            self.kind == "auto"
+            and similarity is not None
+            and similarity.score > OWN_VOICE_SCORE
+            and self.own.bigram.perplexity < SMALL_PERPLEXITY
+        )
         network = None if known else network_of(self.kind)
         if network is not None:
             found = posterior_stretches(network, audio, each)
@@ -135,7 +144,12 @@ class Recogniser:
         path = self._loop.network.best_path(log_likelihoods)
         labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
         if spoken is not None:
-            parts, recognised = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
+            aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
+            loud = find_loud_frames(audio.log_energy)
+            free = self._loop.network.emission[path]
+            parts, recognised = WordSearch(
+                hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words"
+            ).words_of(spoken)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
         return _recognition(labels, recognised, len(path), features.duration_s, similarity)
 
@@ -152,7 +166,7 @@ class Recogniser:
         loud = find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
-            parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
+            parts, recognised = network_words(hmm, log_likelihoods, loud, found)
         else:
             parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found), []
         labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
@@ -172,24 +186,6 @@ class Recogniser:
             return labels
         return [LabelledFrames(_first_frame(span.start_s), span.label.phone) for span in aligned]
 
-    def _word_search(
-        self, audio: AnalysedAudio, hmm: UnitHmm, log_likelihoods: LogLikelihoods, path: NDArray[np.intp]
-    ) -> WordSearch:
-        """Return the search for words in a recording whose phones without words have a path through ``_loop``."""
-        aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
-        loud = find_loud_frames(audio.log_energy)
-        free = self._loop.network.emission[path]
-        return WordSearch(hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words")
-
-    def _knows_voice_and_words(self, similarity: SpeakerSimilarity | None) -> bool:
-        """Return whether a voice is that of the own models, and their corpus one of few words."""
-        return (
-            self.kind == "auto"
-            and similarity is not None
-            and similarity.score > OWN_VOICE_SCORE
-            and self.own.bigram.perplexity < SMALL_PERPLEXITY
-        )
-
     def align(
         self,
         audio: Audio,
@@ -200,7 +196,6 @@ class Recogniser:
     ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
-        audio, features : as of ``recognise``
         words           : of the transcript, in lower case, and written forms (``1995``), in whose place the words stand
                           that are said
         anchors         : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
@@ -244,7 +239,6 @@ class Recogniser:
     def align_phones(self, audio: Audio, features: Features, phones: Timeline[Unit]) -> Timeline[Unit]:
         """Return known phones in time: forced alignment, with optional pauses where ``phones`` has silence.
 
-        audio, features : as of ``recognise``
         phones          : in order; their times are not used
         Raises AlignmentError: they do not fit into the recording.
         """
@@ -272,31 +266,18 @@ class Recogniser:
     def _log_likelihoods(
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
     ) -> tuple[UnitHmm, LogLikelihoods]:
-        """Return the models that are used, and the log likelihoods of a recording under them.
-
-        similarity : of the recording, if it is known
-        """
-        hmm, log_likelihoods = self._unpenalised(audio, similarity, aligning)
-        return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
-
-    def _unpenalised(
-        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, aligning: bool
-    ) -> tuple[UnitHmm, LogLikelihoods]:
+        """Return the models that are used, and the log likelihoods of a recording under them."""
         if self.kind == "own":
-            warp, _ = self._own_transform(audio, similarity)
-            return self.own, compute_log_likelihoods(self.own, self._own_features(audio, warp))
-        general_alone = self.kind == "general" or (aligning and self._has_few_gaussians)
-        warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
-        # own models without weight are not evaluated: any features will do, and those of a long recording are large
-        own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
-        general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
-        return self.combined.hmm, combined_log_likelihoods(self.combined, own, weight, general)
-
-    def _similarity(self, audio: AnalysedAudio) -> SpeakerSimilarity | None:
-        """Return the speaker similarity of a recording; None where nothing depends on it."""
-        if self.adaptation is not None or self.kind == "general":
-            return None
-        return speaker_similarity(self.own, audio)
+            hmm, warp = self.own, self._own_transform(audio, similarity)[0]
+            log_likelihoods = compute_log_likelihoods(hmm, self._own_features(audio, warp))
+        else:
+            hmm, general_alone = self.combined.hmm, self.kind == "general" or (aligning and self._has_few_gaussians)
+            warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
+            # own models without weight are not evaluated: any features will do, and those of a long one are large
+            own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
+            general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
+            log_likelihoods = combined_log_likelihoods(self.combined, own, weight, general)
+        return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
 
     def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:
         """Return the warp of the frequencies for the own models, and the weight of these models, 0 to 1."""
@@ -337,7 +318,6 @@ def _recognition(
     duration_s: float,
     similarity: SpeakerSimilarity | None,
 ) -> Recognition:
-    """Return a recognition of so many frames."""
     named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
     units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
     return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)
@@ -367,11 +347,13 @@ def _first_frame(start_s: float) -> int:
 def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
     """Return phones in time, each with its word.
 
-    labels : phones and words
     bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
     Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
     """
-    labels, bounds = _one_silence(labels, bounds)
+    first = [
+        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
+    ]
+    labels, bounds = [labels[i] for i in first], np.append(bounds[first], bounds[-1])
     edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
     edges[-1] = duration_s
     spans = []
@@ -384,13 +366,3 @@ def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_
             name = PAUSE if inside and end_s - start_s < SHORT_PAUSE_S else SILENCE
         spans.append(Span(start_s, end_s, Unit(name, word=word)))
     return Timeline(tuple(spans))
-
-
-def _one_silence(
-    labels: list[tuple[str, str]], bounds: NDArray[np.intp]
-) -> tuple[list[tuple[str, str]], NDArray[np.intp]]:
-    """Return labels and bounds in which silences that follow one another, as noise beside silence, are one."""
-    first = [
-        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
-    ]
-    return [labels[i] for i in first], np.append(bounds[first], bounds[-1])

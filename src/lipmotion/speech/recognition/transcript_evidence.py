@@ -235,10 +235,7 @@ def _traced(
     edges: Columns,
     heard: Array,
 ) -> _Path:
-    """Return the words and free stretches of the best path, which is followed from its end.
-
-    heard : how much more probable anything is than nothing, in every frame [shape=(T,)]
-    """
+    """Return the words and free stretches of the best path, which is followed from its end."""
     place, how = int(edges[-1]), int(arrivals[-1, -1])
     words: list[tuple[int, int] | None] = [None] * (len(edges) - 1)
     free: list[tuple[tuple[int, int], tuple[int, int]]] = []
@@ -337,5 +334,4 @@ def _taken_for() -> Array:
 
 
 def _silent_columns() -> list[int]:
-    """Return the columns of the blank, silence and pause."""
     return [number for number, phone in enumerate(PHONES) if is_silent(phone)] + [len(PHONES)]

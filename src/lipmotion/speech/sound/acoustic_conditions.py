@@ -1,18 +1,122 @@
-"""Acoustic conditions for training: recordings in noise, in rooms, over a telephone, from other voices."""
+"""Acoustic conditions: noise at a stated ratio; and for training, rooms, telephones, other voices."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.features.spectrum import spectrum
+from lipmotion.hmm.loudness import find_loud_frames
+from lipmotion.speech.features.mfcc import HOP, WINDOW, checked_samples, log_energy, spectrum
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.speech.sound.noise import spoken_samples
 from lipmotion.types import Audio, ConditionSpectrum
+
+NOISE_KINDS = ("white", "babble")
+FEWEST_TALKERS = 2
+"""One other talker is an interruption, not a babble."""
+SILENT_RMS = 1e-6
+"""Speech of a lower root mean square, full scale 1, is silence."""
+
+Noise = NDArray[np.float32]
+
+
+def noisy_audio(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:
+    """Return a recording with noise of a kind added to it.
+
+    kind    : one of ``NOISE_KINDS``
+    snr_db  : as ``add_noise`` measures it
+    talkers : recordings of the babble's talkers, other people than the one in ``audio``; white noise does not use them
+    Raises InputError: another kind, a talker that is the recording itself, or as ``add_noise`` and ``babble_noise``.
+    """
+    if kind not in NOISE_KINDS:
+        raise InputError(f"unknown noise {kind!r}; required one of: {', '.join(NOISE_KINDS)}")
+    count = len(checked_samples(audio))
+    if kind == "white":
+        return add_noise(audio, white_noise(count, seed), snr_db)
+    if any(np.array_equal(talker.samples, audio.samples) for talker in talkers):
+        raise InputError("the recording is one of the talkers of its own babble; leave its speaker out of the talkers")
+    return add_noise(audio, babble_noise(talkers, count, seed), snr_db)
+
+
+def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio:
+    """Return a recording with noise, scaled to a signal-to-noise ratio, added from start to end.
+
+    noise  : as many samples as the recording has [shape=(N,)], of any level
+    snr_db : 10 · log10 of the mean power of the recording over that of the noise, both over the samples of speech
+             (``spoken_samples``); noise that the recording already has counts as speech there
+    The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
+    Raises InputError: the ratio is not finite, the lengths differ, the noise is silent or not finite, or there is no
+    speech in the recording.
+    """
+    if not np.isfinite(snr_db):
+        raise InputError(f"the signal-to-noise ratio is {snr_db} dB, required a finite number")
+    spoken = spoken_samples(audio)
+    if noise.shape != audio.samples.shape:
+        raise InputError(f"the noise has shape {noise.shape}, required that of the recording, {audio.samples.shape}")
+    noise_power = float(np.square(noise[spoken], dtype=float).mean())
+    if not 0 < noise_power < np.inf:
+        raise InputError(f"the noise has a mean power of {noise_power} in speech; required above 0 and finite")
+    gain = np.sqrt(_power(audio, spoken) / noise_power) * 10 ** (-snr_db / 20)
+    return Audio((audio.samples + gain * noise).astype(np.float32), audio.rate_hz)
+
+
+def white_noise(samples: int, seed: int = 0) -> Noise:
+    """Return Gaussian noise of variance 1 [shape=(samples,)]. Raises InputError: fewer than 1 sample."""
+    _check_length(samples)
+    return np.random.default_rng(seed).standard_normal(samples, np.float32)
+
+
+def babble_noise(voices: Sequence[Audio], samples: int, seed: int = 0) -> Noise:
+    """Return the sum of several talkers, each with the same power [shape=(samples,)].
+
+    voices : at least ``FEWEST_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
+    Every recording begins at a random sample and is repeated from its start at its end. All have mean power 1 over
+    their samples of speech.
+    Raises InputError: too few recordings, another rate, a recording too short or silent, or fewer than 1 sample.
+    """
+    _check_length(samples)
+    if len(voices) < FEWEST_TALKERS:
+        raise InputError(f"a babble of {len(voices)} talkers; required at least {FEWEST_TALKERS}")
+    rng = np.random.default_rng(seed)
+    total = np.zeros(samples)
+    for voice in voices:
+        level = np.sqrt(_power(voice, spoken_samples(voice)))
+        start = int(rng.integers(len(voice.samples)))
+        total += np.resize(np.roll(voice.samples, -start), samples) / level
+    return total.astype(np.float32)
+
+
+def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
+    """Return which samples are speech [shape=(N,)]: the 10 ms around each frame that is loud for this recording.
+
+    A frame is loud where its log energy (25 ms), averaged over 11 frames, lies above the middle between the 10th and
+    the 95th percentile of the recording (``hmm.loudness.loud_frames``). Pauses do not count, so that a
+    signal-to-noise ratio does not depend on how long they are.
+    Raises InputError: not one channel of finite samples at 16 kHz, shorter than 25 ms, or silent.
+    """
+    samples = checked_samples(audio)
+    loud = find_loud_frames(log_energy(samples))
+    if not loud.any():  # a steady tone has no quiet frames
+        loud = np.ones_like(loud)
+    nearest = np.minimum((np.arange(len(samples)) + HOP // 2) // HOP, len(loud) - 1)
+    spoken: NDArray[np.bool_] = loud[nearest]
+    level = np.sqrt(_power(audio, spoken))
+    if level < SILENT_RMS:
+        raise InputError(f"the recording is silent (root mean square {level:.1g}); give one in which something is said")
+    return spoken
+
+
+def _power(audio: Audio, spoken: NDArray[np.bool_]) -> float:
+    return float(np.square(audio.samples[spoken], dtype=float).mean())
+
+
+def _check_length(samples: int) -> None:
+    if samples < 1:
+        raise InputError(f"{samples} samples of noise asked for, required at least 1")
+
 
 LARGEST_WARP, LARGEST_TEMPO = 0.16, 0.22
 """Natural logarithms of the largest factors: of the frequencies alone, and of frequencies and tempo together."""
@@ -39,7 +143,6 @@ def condition_spectra(
     """Return the spectrum of a recording as it is, and in ``count`` - 1 random conditions.
 
     voices : other recordings, whose voices, at other speeds, make the babble
-    seed   : the same arguments give the same spectra
     Raises InputError: as ``spectrum``.
     """
     result = [ConditionSpectrum(spectrum(audio).astype(np.float16), 1.0, 0.0)]
@@ -47,7 +150,10 @@ def condition_spectra(
         rng = np.random.default_rng([*seed, number])
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if rng.random() < WARP_PROBABILITY else 1.0
         tempo = float(np.exp(rng.uniform(-LARGEST_TEMPO, LARGEST_TEMPO))) if rng.random() < TEMPO_PROBABILITY else 1.0
-        varied, distortion = in_condition(_sped(audio, tempo), voices, rng)
+        sped = audio  # played ``tempo`` times as fast: tempo, pitch and formants change together
+        if tempo != 1.0 and len(samples := _resampled(audio.samples, tempo)) >= WINDOW:
+            sped = Audio(samples.astype(np.float32), audio.rate_hz)
+        varied, distortion = in_condition(sped, voices, rng)
         result.append(ConditionSpectrum(spectrum(varied, warp).astype(np.float16), tempo, distortion))
     return result
 
@@ -58,13 +164,21 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     Rooms are exponentially decaying noise, filters are smooth random curves or the band of a telephone. In one of five
     cases nothing is changed; nor is a recording without sound.
     """
-    samples, level = audio.samples.astype(float), _speech_power(audio)
+    samples, level = audio.samples.astype(float), 0.0
+    with suppress(InputError):  # a recording without sound
+        level = _power(audio, spoken_samples(audio))
     if level <= 0 or rng.random() < CLEAN_PROBABILITY:
         return audio, 0.0
     added = 0.0
     if rng.random() < ROOM_PROBABILITY:
         share = 10 ** (rng.uniform(*ROOM_DB) / 10)
-        samples, added = samples + _reverberation(samples, share, rng), share
+        from scipy.signal import fftconvolve
+
+        duration_s = rng.uniform(*ROOM_S)
+        response = rng.standard_normal(int(duration_s * SPEECH_RATE_HZ))
+        response *= 10 ** (-3 * np.arange(len(response)) / len(response))
+        response *= np.sqrt(share / np.square(response).sum())
+        samples, added = samples + fftconvolve(samples, response)[: len(samples)], share
     if rng.random() < NOISE_PROBABILITY:
         share = 10 ** (-rng.uniform(*NOISE_DB) / 10)
         noise = (
@@ -82,38 +196,9 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     return Audio(samples.astype(np.float32), audio.rate_hz), float(np.clip(distortion, 0, 1))
 
 
-def _sped(audio: Audio, tempo: float) -> Audio:
-    """Return a recording played ``tempo`` times as fast: tempo, pitch and formants change together."""
-    if tempo == 1.0:
-        return audio
-    samples = _resampled(audio.samples, tempo)
-    if len(samples) < WINDOW:
-        return audio
-    return Audio(samples.astype(np.float32), audio.rate_hz)
-
-
 def _resampled(samples: NDArray[np.floating], factor: float) -> Samples:
     count = max(int(len(samples) / factor), 1)
     return np.interp(np.arange(count) * factor, np.arange(len(samples)), samples)
-
-
-def _speech_power(audio: Audio) -> float:
-    """Return the mean power over speech; 0 for a recording without sound."""
-    try:
-        return float(np.square(audio.samples[spoken_samples(audio)], dtype=float).mean())
-    except InputError:
-        return 0.0
-
-
-def _reverberation(samples: Samples, share: float, rng: np.random.Generator) -> Samples:
-    """Return the reverberation of a room, with a share of the energy of the direct sound."""
-    from scipy.signal import fftconvolve
-
-    duration_s = rng.uniform(*ROOM_S)
-    response = rng.standard_normal(int(duration_s * SPEECH_RATE_HZ))
-    response *= 10 ** (-3 * np.arange(len(response)) / len(response))
-    response *= np.sqrt(share / np.square(response).sum())
-    return fftconvolve(samples, response)[: len(samples)]
 
 
 def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Samples:

@@ -37,9 +37,7 @@ class JoinedPieces(NamedTuple):
 def overlapped(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]], rate_hz: int) -> JoinedPieces:
     """Return pieces of sounds, one after the other, which overlap where their waveforms are most alike.
 
-    sounds   : the recording of each piece
     pieces_s : start and end of each piece in its recording, in seconds
-    rate_hz  : sampling rate of all recordings
     """
     half, reach = round(OVERLAP_S * rate_hz / 2), round(REACH_S * rate_hz)
     result = np.zeros(0)
@@ -71,10 +69,7 @@ def _cut(sound: Samples, start: int, end: int) -> NDArray[np.float64]:
 
 
 def _best_shift(tail: NDArray[np.float64], sound: Samples, start: int, reach: int) -> int:
-    """Return by how many samples later a piece begins so that its waveform is most like the end of the one before.
-
-    start : where it would begin
-    """
+    """Return by how many samples later a piece begins so that its waveform is most like the end of the one before."""
     area = _cut(sound, start - reach, start + reach + len(tail))
     products = np.correlate(area, tail, "valid")
     energies = np.convolve(np.square(area), np.ones(len(tail)), "valid")

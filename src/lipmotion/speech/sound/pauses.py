@@ -30,11 +30,17 @@ def levels_db(audio: Audio) -> Array:
     """Return the smoothed level of every 10 ms [shape=(floor(duration / 0.01),)], dB of full scale."""
     from scipy.ndimage import uniform_filter1d
 
-    size = round(STEP_S * audio.rate_hz)
-    frames = audio.samples[: len(audio.samples) // size * size].reshape(-1, size)
-    power = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
-    levels: Array = 10 * np.log10(np.maximum(power, 10 ** (QUIETEST_DB / 10)))
+    levels: Array = 10 * np.log10(
+        np.maximum(mean_powers(audio.samples, round(STEP_S * audio.rate_hz)), 10 ** (QUIETEST_DB / 10))
+    )
     return uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
+
+
+def mean_powers(samples: NDArray[np.float32], size: int) -> Array:
+    """Return the mean square of every ``size`` samples [shape=(N // size,)]."""
+    frames = samples[: len(samples) // size * size].reshape(-1, size)
+    powers: Array = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
+    return powers
 
 
 def levels_db_at(audio: Audio, times_s: Array) -> Array:
@@ -55,7 +61,17 @@ def spoken_spans(levels: Array) -> list[tuple[float, float]]:
     levels : of ``levels_db``
     Other sounds that are as loud as speech count as speech.
     """
-    loud = levels > _thresholds_db(levels)
+    size = round(BLOCK_S / STEP_S)
+    count = max(1, round(len(levels) / size))
+    values = []
+    for block in range(count):  # each with half a block on both sides
+        middle = (block + 0.5) * len(levels) / count
+        part = levels[max(0, round(middle - size)) : round(middle + size)]
+        low, high = np.percentile(part, [QUIET_PERCENTILE, LOUD_PERCENTILE]) if part.size else (0.0, 0.0)
+        flat = high - low < LEAST_RANGE_DB
+        values.append(QUIETEST_DB - 1 if flat else low + SPEECH_SHARE * (high - low))
+    middles = (np.arange(count) + 0.5) * len(levels) / count
+    loud = levels > np.interp(np.arange(len(levels)), middles, values)
     edges = np.flatnonzero(np.diff(np.r_[False, loud, False]))
     starts_s, ends_s = edges[::2] * STEP_S, edges[1::2] * STEP_S
     joined: list[tuple[float, float]] = []
@@ -74,18 +90,3 @@ def quietest_s(levels: Array, start_s: float, end_s: float) -> float:
     if not part.size:
         return (start_s + end_s) / 2
     return (max(first, 0) + int(np.argmin(part)) + 0.5) * STEP_S
-
-
-def _thresholds_db(levels: Array) -> Array:
-    """Return the level above which each frame is speech [shape=(T,)]."""
-    size = round(BLOCK_S / STEP_S)
-    count = max(1, round(len(levels) / size))
-    values = []
-    for block in range(count):  # each with half a block on both sides
-        middle = (block + 0.5) * len(levels) / count
-        part = levels[max(0, round(middle - size)) : round(middle + size)]
-        quiet, loud = np.percentile(part, [QUIET_PERCENTILE, LOUD_PERCENTILE]) if part.size else (0.0, 0.0)
-        flat = loud - quiet < LEAST_RANGE_DB
-        values.append(QUIETEST_DB - 1 if flat else quiet + SPEECH_SHARE * (loud - quiet))
-    middles = (np.arange(count) + 0.5) * len(levels) / count
-    return np.interp(np.arange(len(levels)), middles, values)

@@ -2,20 +2,138 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.sound_marks import BEEP, SoundMark, sound_marks
-from lipmotion.types import Audio
+from lipmotion.speech.features.mfcc import regression_delta
+from lipmotion.speech.sound.pauses import STEP_S, mean_powers
+from lipmotion.types import Audio, Features
+
+CLAP, BEEP = "clap", "beep"
+CLAP_STEP_S = 0.001
+"""Distance of the levels in which claps are looked for."""
+BEFORE_S, RISE_S = 0.06, 0.004
+"""A clap is louder within ``RISE_S`` than everything in ``BEFORE_S`` before it..."""
+LEAST_RISE_DB = 18.0
+"""...by this much..."""
+DECAY_S, LEAST_DECAY_DB = (0.15, 0.25), 15.0
+"""...and between these times after it, it has become this much quieter."""
+LEAST_LEVEL_DB = -15.0
+"""Claps have at least this level against the loudest millisecond of the recording."""
+APART_S = 0.3
+"""Where several marks are nearer to each other, the strongest counts."""
+MOST_MARKS = 20
+"""Most marks of a kind that are kept, the strongest."""
+BEEP_FRAME_S, BEEP_STEP_S = 0.032, 0.008
+LEAST_TONE_SHARE = 0.9
+"""Share of the energy of a beep that is in three neighbouring bands of its spectrum (96 Hz at 16 kHz)."""
+LEAST_BEEP_S, LEAST_BEEP_HZ = 0.1, 500.0
+LEAST_BEEP_LEVEL_DB = -30.0
+"""Beeps have at least this level against the loudest frame."""
+FLOOR = 1e-10
+BLOCK = 4096
+"""Frames whose spectrum is computed at once."""
+
+
+@dataclass(frozen=True)
+class SoundMark:
+    """A clap or a beep.
+
+    time_s      : when it begins
+    kind        : ``clap`` or ``beep``
+    strength_db : how much it stands out
+    hertz       : pitch of a beep, else 0
+    """
+
+    time_s: float
+    kind: str
+    strength_db: float
+    hertz: float = 0.0
+
+
+def sound_marks(audio: Audio) -> tuple[SoundMark, ...]:
+    """Return the claps and beeps of a recording, by time; there may be none, or sounds that only resemble them."""
+    found = [*_claps(audio), *_beeps(audio)]
+    return tuple(sorted(found, key=lambda mark: mark.time_s))
+
+
+def _claps(audio: Audio) -> list[SoundMark]:
+    from scipy.ndimage import maximum_filter1d
+
+    sharp = np.diff(audio.samples, prepend=audio.samples[:1])  # claps are brighter than speech
+    power = mean_powers(sharp, round(CLAP_STEP_S * audio.rate_hz))
+    before, rise = round(BEFORE_S / CLAP_STEP_S), round(RISE_S / CLAP_STEP_S)
+    early, late = (round(time_s / CLAP_STEP_S) for time_s in DECAY_S)
+    if len(power) < before + late + 1:
+        return []
+    level = 10 * np.log10(power + FLOOR)
+    loudest_before = maximum_filter1d(level, before, origin=(before - 1) // 2, mode="nearest")
+    peak = maximum_filter1d(level, rise, origin=-(rise // 2), mode="nearest")
+    sums = np.concatenate([[0.0], np.cumsum(power)])
+    begin = np.minimum(np.arange(len(power)) + early, len(power) - 1)
+    end = np.minimum(np.arange(len(power)) + late, len(power))
+    after = 10 * np.log10((sums[end] - sums[begin]) / np.maximum(end - begin, 1) + FLOOR)
+    rises = peak[1:] - loudest_before[:-1]
+    decays = (peak - after)[1:]
+    good = (rises >= LEAST_RISE_DB) & (decays >= LEAST_DECAY_DB) & (peak[1:] >= level.max() + LEAST_LEVEL_DB)
+    strength = np.minimum(rises, decays)
+    return [
+        SoundMark((frame + 1) * CLAP_STEP_S, CLAP, float(strength[frame]))
+        for frame in _strongest(np.flatnonzero(good), strength, APART_S / CLAP_STEP_S)
+    ]
+
+
+def _beeps(audio: Audio) -> list[SoundMark]:
+    size, step = round(BEEP_FRAME_S * audio.rate_hz), round(BEEP_STEP_S * audio.rate_hz)
+    count = (len(audio.samples) - size) // step + 1
+    if count < 1:
+        return []
+    windows = np.lib.stride_tricks.sliding_window_view(audio.samples, size)[::step]
+    tone, hertz, level = np.zeros(count), np.zeros(count), np.zeros(count)
+    taper = np.hanning(size).astype(np.float32)
+    for start in range(0, count, BLOCK):
+        frames = slice(start, min(start + BLOCK, count))
+        power = np.abs(np.fft.rfft(windows[frames] * taper, axis=1)) ** 2
+        bands = power[:, 1:-1] + power[:, :-2] + power[:, 2:]
+        best = bands.argmax(axis=1)
+        level[frames] = power.sum(axis=1)
+        tone[frames] = bands[np.arange(len(best)), best] / (level[frames] + FLOOR)
+        hertz[frames] = (best + 1) / BEEP_FRAME_S
+    level = 10 * np.log10(level + FLOOR)
+    good = (tone >= LEAST_TONE_SHARE) & (hertz >= LEAST_BEEP_HZ) & (level >= level.max() + LEAST_BEEP_LEVEL_DB)
+    same = np.concatenate([[False], good[1:] & good[:-1] & (np.abs(np.diff(hertz)) <= 1.01 / BEEP_FRAME_S), [False]])
+    starts = np.flatnonzero(same[1:] & ~same[:-1])
+    ends = np.flatnonzero(same[:-1] & ~same[1:])
+    least = LEAST_BEEP_S / BEEP_STEP_S
+    long = [(first, last) for first, last in zip(starts.tolist(), ends.tolist(), strict=True) if last - first >= least]
+    marks = []
+    for first, last in long:
+        frames = slice(first, last + 1)
+        time_s, pitch = (first * step + size / 2) / audio.rate_hz, float(np.median(hertz[frames]))
+        marks.append(SoundMark(time_s, BEEP, float(level[frames].mean()), pitch))
+    return sorted(marks, key=lambda mark: -mark.strength_db)[:MOST_MARKS]
+
+
+def _strongest(frames: NDArray[np.intp], strength: Array, apart: float) -> list[int]:
+    """Return the strongest of some frames, none nearer to a stronger one than ``apart`` frames."""
+    kept: list[int] = []
+    for frame in frames[np.argsort(-strength[frames], kind="stable")].tolist():
+        if len(kept) == MOST_MARKS:
+            break
+        if all(abs(frame - other) >= apart for other in kept):
+            kept.append(frame)
+    return kept
+
 
 Array = NDArray[np.float64]
 
 ALIKE = "the sound of both"
-STEP_S = 0.01
-"""Distance of the levels that are compared."""
 LEAST_OVERLAP_SHARE = 0.5
 """Share of the shorter recording that the other one must cover, where levels are compared."""
 SAME_S = 0.03
@@ -125,11 +243,9 @@ class _Likeness:
 
 def _levels(audio: Audio) -> Array:
     """Return the level of every 10 ms, without what is quieter than the quiet tenth [shape=(N,)]."""
-    size = round(STEP_S * audio.rate_hz)
-    frames = audio.samples[: len(audio.samples) // size * size].reshape(-1, size)
-    if not len(frames):
+    power = mean_powers(audio.samples, round(STEP_S * audio.rate_hz))
+    if not len(power):
         raise InputError(f"{audio.duration_s * 1000:.0f} ms of sound, required more than {STEP_S * 1000:.0f}")
-    power = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
     levels = np.log10(power + 1e-10)
     levels = np.maximum(levels, np.percentile(levels, 10))
     return levels - levels.mean()
@@ -215,3 +331,40 @@ def _cut(samples: NDArray[np.float32], begin: int, end: int) -> Array:
     inner = samples[max(begin, 0) : max(end, 0)].astype(np.float64)
     front = max(0, min(-begin, end - begin))
     return np.pad(inner, (front, max(0, end - begin - front - len(inner))))
+
+
+STATIC_FEATURES = 13
+"""The first columns of the features, which are used: c1–c12 and log energy; their context holds the deltas."""
+FRAME_OFFSETS = tuple(range(-15, 16, 3))
+"""The context of a frame, in frames from it: 150 ms before and after."""
+WEIGHTS = "lip-speed.json"
+
+
+def predicted_opening_speed(features: Features) -> Array:
+    """Return the predicted opening speed of the lips [shape=(T,)], in arbitrary units.
+
+    It is of no use as lip motion; the shift at which it correlates best with tracked lips is the offset of the video.
+    """
+    return context_features(features) @ _weights()
+
+
+def measured_opening_speed(opening: Array) -> Array:
+    """Return the opening speed of measured lips: the slope over ±2 frames [shape=(T,)].
+
+    opening : of the lips, frame by frame [shape=(T,)]
+    """
+    return regression_delta(opening.astype(np.float32)[:, None])[:, 0].astype(float)
+
+
+def context_features(features: Features) -> Array:
+    """Return the static features of every frame and its context [shape=(T, 143)]; the ends are repeated."""
+    static = features.values[:, :STATIC_FEATURES].astype(float)
+    frames = np.arange(len(static))[:, None] + np.array(FRAME_OFFSETS)
+    return static[np.clip(frames, 0, len(static) - 1)].reshape(len(static), -1)
+
+
+@cache
+def _weights() -> Array:
+    """Return the shipped weights of the prediction [shape=(143,)]."""
+    content = json.loads((resources.files("lipmotion") / "models" / WEIGHTS).read_text(encoding="utf-8"))
+    return np.array(content["weights"])

@@ -11,25 +11,76 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import shutil
 import sys
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
+import numpy as np
+
+from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.espeak_events import PART, SILENCE
-from lipmotion.speech.voices.espeak_times import corrected_phone_times
-from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap, complete_map
+from lipmotion.speech.voices.espeak_events import PART
+from lipmotion.speech.voices.espeak_events import SILENCE as NO_SOUND
 from lipmotion.speech.voices.programs import program_output
-from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
-from lipmotion.types import Span, Timeline
+from lipmotion.speech.voices.synthesiser import (
+    ESPEAK_PHONES,
+    PhoneMap,
+    SynthesisedSentence,
+    Synthesiser,
+    SyntheticVoice,
+    complete_map,
+)
+from lipmotion.types import Audio, Span, Timeline
+from lipmotion.types.languages import ENGLISH, LANGUAGES, foreign_letters
+from lipmotion.units import SILENCE, Lexicon, Pronunciation, list_phone_classes
+from lipmotion.units.ipa_phones import read_ipa
+from lipmotion.units.lexicon import SpokenForm
+
+CLOSING = list_phone_classes()["stop"] | list_phone_classes()["affricate"]
+VOWELS = list_phone_classes()["vowel"]
+CLOSURE_SHARE = 0.03
+"""Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
+LONGEST_CLOSURE_S = 0.06
+LATE_L_S, L_SHARE = 0.045, 0.45
+"""An l that is reported so shortly before its end is late; it then gets this share of the vowel and l together, as in
+the project's own alignments."""
+
+Starts = Sequence[tuple[str, float]]
+
+
+def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHONES) -> Timeline[str]:
+    """Return phones in time: each from its corrected start to that of the next, or to the end of the sound."""
+    labels = [label for label, _ in starts]
+    edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
+    closed = np.abs(audio.samples) < CLOSURE_SHARE * np.abs(audio.samples).max(initial=0)
+    for index in range(1, len(labels)):
+        before, here = _phone(labels[index - 1], phone_map), _phone(labels[index], phone_map)
+        if here in CLOSING and before != SILENCE:
+            burst = round(edges_s[index] * audio.rate_hz)
+            first = max(burst - round(LONGEST_CLOSURE_S * audio.rate_hz), 0)
+            loud = np.flatnonzero(~closed[first:burst])
+            closure_s = (first + int(loud[-1]) + 1 if len(loud) else first) / audio.rate_hz
+            edges_s[index] = max(closure_s if burst > first else edges_s[index], edges_s[index - 1])
+        elif here == "l" and before in VOWELS and edges_s[index + 1] - edges_s[index] < LATE_L_S:
+            length_s = edges_s[index + 1] - edges_s[index - 1]
+            edges_s[index] = min(edges_s[index], edges_s[index + 1] - L_SHARE * length_s)
+    spans = zip(edges_s, edges_s[1:], labels, strict=False)
+    return Timeline(tuple(Span(start_s, max(start_s, end_s), label) for start_s, end_s, label in spans))
+
+
+def _phone(label: str, phone_map: PhoneMap) -> str:
+    """Return the last phone of a label; empty for a label that is part of another phone or unknown."""
+    return (phone_map.get(label) or ("",))[-1]
+
 
 LOG = logging.getLogger("lipmotion")
 PACKAGE, WHEEL, EXTRA = "espeak-ng", "espeakng_loader", "text"
@@ -40,7 +91,7 @@ PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"
 DATA = "espeak-ng-data"
 STRESS_MARKS = "',%="
 """What version 1.52 writes before the vowel of a stressed syllable; 1.51 does not."""
-NO_IPA: PhoneMap = {SILENCE: ESPEAK_PHONES[SILENCE], PART: ESPEAK_PHONES[PART]}
+NO_IPA: PhoneMap = {NO_SOUND: ESPEAK_PHONES[NO_SOUND], PART: ESPEAK_PHONES[PART]}
 LARGEST_VOICE_BYTES = 1 << 16
 """Most bytes of a file that describes a voice."""
 Start = tuple[str, float, int]
@@ -96,18 +147,12 @@ def _others() -> tuple[SyntheticVoice, ...]:
     data = _data()
     if data is None:
         return ()
-    names = _languages(data)
-    return tuple(SyntheticVoice(name, "espeak-ng", f"espeak-{name}", name) for name in names)
-
-
-def _languages(data: Path) -> list[str]:
-    """Return the names of all languages in the data, without duplicates, in alphabetical order."""
     names = set()
     for path in (data / "lang").rglob("*"):
         if path.is_file() and path.stat().st_size <= LARGEST_VOICE_BYTES:
             lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
             names |= {line.split()[1].lower() for line in lines if line.startswith("language ") and line.split()[1:]}
-    return sorted(names)
+    return tuple(SyntheticVoice(name, "espeak-ng", f"espeak-{name}", name) for name in sorted(names))
 
 
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
@@ -145,10 +190,7 @@ def pronounced_words(words: Sequence[str], voice: str) -> list[str]:
 
 
 def _written_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:
-    """Return the words of a text in time: what stands between blanks. Words that are said as one (*on the*) are one.
-
-    places : of each phone, where its word, or a part of it, begins in the text
-    """
+    """Return the words of a text in time: what stands between blanks. Words that are said as one (*on the*) are one."""
     words = text.split()
     starts = [at for at in range(len(text)) if not text[at].isspace() and (at == 0 or text[at - 1].isspace())]
     numbers = [max(bisect_right(starts, place) - 1, 0) for place in places]
@@ -170,3 +212,67 @@ def _answer(printed: str) -> Any:
 
 
 ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _synthesise, ESPEAK_PHONES, _others, EXTRA)
+
+
+MAPPED_CONFIDENCE = 0.8
+"""Most confidence in words of another language: their phones are the nearest ones of English, on which models are
+trained. 0.80 of the phones of espeak-ng's sentences in nine languages are phones of English as well
+(docs/results/languages.md)."""
+
+
+@dataclass(frozen=True)
+class LanguageLexicon(Lexicon):
+    """Pronunciations of the words of a language that is not English: the user's, then those of espeak-ng.
+
+    language : its code, of ``LANGUAGES``
+
+    >>> LanguageLexicon({"perro": (("p", "eh", "r", "ow"),)}, "es").pronunciations("perro")
+    (('p', 'eh', 'r', 'ow'),)
+    """
+
+    language: str = ENGLISH
+
+    def known(self, word: str) -> bool:
+        """Return whether the word has a pronunciation: none is guessed. Raises as ``with_words``."""
+        return bool(self.spoken_forms(word))
+
+    def spoken_forms(self, word: str) -> tuple[SpokenForm, ...]:
+        """Return every pronunciation of a lower-case word, each phone with the word. Raises as ``with_words``."""
+        variants = self.user.get(word) or self.with_words((word,)).user[word]
+        return tuple(tuple((phone, word) for phone in variant) for variant in variants)
+
+    def with_words(self, words: Sequence[str]) -> LanguageLexicon:
+        """Return the same lexicon that holds the pronunciations of some words; espeak-ng is asked once for all.
+
+        Raises MissingDependencyError: espeak-ng is not installed, and the user's lexicon lacks a word.
+        Raises InputError: a word in letters that its language is not written in, or that has no phone.
+        """
+        missing = [word for word in dict.fromkeys(words) if word not in self.user]
+        return replace(self, user=self.user | _pronounced(missing, self.language)) if missing else self
+
+
+def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunciation, ...]]:
+    """Return the pronunciations of words, by word. Raises as ``LanguageLexicon.with_words``."""
+    spoken = LANGUAGES[language]
+    for word in words:
+        if letters := foreign_letters(word, language):
+            raise InputError(
+                f"no rules say how {shorten(repr(word))} is said in {spoken.name} ({shorten(letters)}): write it "
+                f"as it is spoken ({' or '.join(spoken.scripts).lower()} letters), add it to a lexicon file, or give "
+                "another language"
+            )
+    try:
+        said = zip(words, pronounced_words(words, spoken.voice or language), strict=True)
+        found: dict[str, tuple[Pronunciation, ...]] = {
+            word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in read_ipa(label)[0]),)
+            for word, ipa in said
+        }
+    except MissingDependencyError as error:
+        raise MissingDependencyError(
+            f"no pronunciation of {shorten(repr(words[0]))} in {spoken.name}: install espeak-ng "
+            f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
+        ) from error
+    silent = next((word for word, (phones,) in found.items() if not phones), None)
+    if silent is not None:
+        raise InputError(f"{shorten(repr(silent))} has no phone in {spoken.name}; add it to a lexicon file")
+    return found

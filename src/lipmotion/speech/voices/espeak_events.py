@@ -103,7 +103,6 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
 
 
 def _pronounced(library: Any, word: str) -> str:
-    """Return the phones of a word in IPA."""
     library.espeak_TextToPhonemes.restype = ctypes.c_char_p
     encoded = ctypes.create_string_buffer(word.encode())
     rest, phones = ctypes.c_void_p(ctypes.addressof(encoded)), []
@@ -111,13 +110,6 @@ def _pronounced(library: Any, word: str) -> str:
         clause = library.espeak_TextToPhonemes(ctypes.byref(rest), UTF_8, IPA | ord(DIVIDER) << 8)
         phones.append(clause.decode(errors="ignore"))
     return " ".join(phones)
-
-
-def _about(library: Any) -> dict[str, str]:
-    library.espeak_Info.restype = ctypes.c_char_p
-    data = ctypes.c_char_p()
-    version = library.espeak_Info(ctypes.byref(data))
-    return {"version": version.decode(), "data": os.path.realpath((data.value or b"").decode())}
 
 
 def main() -> None:
@@ -133,7 +125,10 @@ def main() -> None:
     if rate_hz <= 0:
         sys.exit("espeak-ng finds no data; apt install espeak-ng-data")
     if "voice" not in task:
-        json.dump(_about(library), sys.stdout)
+        library.espeak_Info.restype = ctypes.c_char_p
+        found = ctypes.c_char_p()
+        version = library.espeak_Info(ctypes.byref(found))
+        json.dump({"version": version.decode(), "data": os.path.realpath((found.value or b"").decode())}, sys.stdout)
         return
     voice = task["voice"].encode()
     if library.espeak_SetVoiceByName(voice) and library.espeak_SetVoiceByProperties(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import re
+import shutil
 import wave
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +15,109 @@ from lipmotion.errors import InputError, LipMotionError, MissingDependencyError,
 from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
-from lipmotion.speech.voices.festival import FESTIVAL
-from lipmotion.speech.voices.flite import FLITE
 from lipmotion.speech.voices.inventory_phones import inventory_timeline
-from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
+from lipmotion.speech.voices.programs import program_output
+from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSentence, Synthesiser, SyntheticVoice
 from lipmotion.storage.files import temporary_folder
-from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
+
+FLITE_PACKAGE = "flite"
+UNUSED = frozenset({"kal", "awb_time"})
+"""kal is kal16 at 8 kHz; awb_time can only say the time of day."""
+SPEAKERS = {"kal16": "kal"}
+
+
+def _flite_voices() -> tuple[SyntheticVoice, ...]:
+    if shutil.which("flite") is None:
+        return ()
+    names = program_output(["flite", "-lv"], FLITE_PACKAGE).partition(":")[2].split()
+    return tuple(SyntheticVoice(name, "flite", SPEAKERS.get(name, name)) for name in names if name not in UNUSED)
+
+
+def _say_with_flite(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
+    path = folder / "flite.wav"
+    for text in texts:
+        command = ["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text]
+        printed = program_output(command, FLITE_PACKAGE, folder=folder)
+        yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed), path)
+
+
+def parse_phone_ends(printed: str) -> Timeline[str]:
+    """Return phones in time from what ``flite -psdur`` prints: ``pau:0.220 k:0.346``, a line an utterance.
+
+    The number is the end of the phone in its utterance; a long text is several utterances.
+    Raises InputError: it prints something else.
+    """
+    spans, start_s = [], 0.0
+    for line in printed.splitlines():
+        first_s = start_s
+        for entry in line.split():
+            label, _, end = entry.partition(":")
+            try:
+                end_s = max(first_s + float(end), start_s)
+            except ValueError as error:
+                raise InputError(f"flite prints {entry!r}, required a phone and its end, as in 'k:0.346'") from error
+            spans.append(Span(start_s, end_s, label))
+            start_s = end_s
+    return Timeline(tuple(spans))
+
+
+FLITE = Synthesiser("flite", FLITE_PACKAGE, _flite_voices, _say_with_flite, ARPABET_PHONES)
+
+
+FESTIVAL_PACKAGE = "festival festvox-us-slt-hts"
+MARK = "-- sentence"
+LISTING = """(mapcar (lambda (name)
+  (let ((about (cadr (voice.description name))))
+    (format t "%s %s %s\\n" name (cadr (assoc 'language about)) (cadr (assoc 'dialect about)))))
+  (voice.list))"""
+SPEAKING = f"""(define (say text path)
+  (let ((utterance (utt.synth (eval (list 'Utterance 'Text text)))))
+    (format t "{MARK}\\n")
+    (mapcar (lambda (segment) (format t "%s %s %s\\n" (item.name segment) (item.feat segment "segment_start")
+                                      (item.feat segment "end")))
+            (utt.relation.items utterance 'Segment))
+    (utt.save.wave utterance path 'riff)))
+"""
+
+
+def _festival_voices() -> tuple[SyntheticVoice, ...]:
+    if shutil.which("festival") is None:
+        return ()
+    rows = [line.split() for line in program_output(["festival", "-b", LISTING], FESTIVAL_PACKAGE).splitlines()]
+    names = [row[0] for row in rows if row[1:] == ["english", "american"]]
+    speakers = (re.sub(r"_.*", "", re.sub(r"^cmu_us_", "", name)) for name in names)  # slt of cmu_us_slt_arctic_hts
+    return tuple(SyntheticVoice(name, "festival", who) for name, who in zip(names, speakers, strict=True))
+
+
+def _say_with_festival(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
+    paths = [folder / f"{number}.wav" for number in range(len(texts))]
+    script = folder / "say.scm"
+    calls = [f"(say {_quoted(text)} {_quoted(str(path))})" for text, path in zip(texts, paths, strict=True)]
+    script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
+    printed = program_output(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts), folder=folder)
+    parts = printed.split(f"{MARK}\n")[1:]
+    if len(parts) != len(texts):
+        raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
+    for path, part in zip(paths, parts, strict=True):
+        spans = []
+        for line in part.splitlines():
+            try:
+                label, start, end = line.split()
+                spans.append(Span(float(start), float(end), label))
+            except ValueError as error:
+                raise InputError(f"festival prints {line!r}, required a phone, its start and its end") from error
+        yield SynthesisedSentence(read_audio(path), Timeline(tuple(spans)), path)
+        path.unlink()
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+FESTIVAL = Synthesiser("festival", FESTIVAL_PACKAGE, _festival_voices, _say_with_festival, ARPABET_PHONES)
+
 
 LOG = logging.getLogger("lipmotion")
 SYNTHESISERS: dict[str, Synthesiser] = {synthesiser.name: synthesiser for synthesiser in (FLITE, FESTIVAL, ESPEAK_NG)}
@@ -131,21 +229,12 @@ def nothing_installed() -> MissingDependencyError:
     )
 
 
-def speak_sentence(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> tuple[Audio, Timeline[Unit]]:
-    """Return a sentence in a voice: the sound at 16 kHz, and its phones in time, from 0 s to its end.
-
-    lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
-    Raises the errors of ``speak_sentences``.
-    """
-    with closing(speak_sentences([text], voice, lexicon)) as sentences:
-        return next(sentences)
-
-
 def speak_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
 ) -> Generator[tuple[Audio, Timeline[Unit]], None, None]:
-    """Yield several sentences in a voice, as of ``speak_sentence``; where possible, one run of the program makes all.
+    """Yield sentences in a voice, each with its phones in time, from 0 s to its end; one run makes all where it can.
 
+    lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
     Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
     """
@@ -158,20 +247,6 @@ def voiced_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
 ) -> Generator[VoicedSentence, None, None]:
     """Yield several sentences in a voice, as ``speak_sentences``, each with the sound at the synthesiser's own rate."""
-    synthesiser = _synthesiser(voice)
-    words = [split_words(text) for text in texts]
-    known = (lexicon or Lexicon()) if voice.is_english else None
-    with temporary_folder() as folder:
-        plain = [" ".join(text.split()) for text in texts]
-        sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())
-        for said, its_words in zip(sentences, words, strict=True):
-            phone_map = said.phone_map or synthesiser.phone_map
-            written = its_words if said.words is None else said.words
-            units = inventory_timeline(said.phones, phone_map, written, known, said.audio.duration_s)
-            yield VoicedSentence(said.audio, units, said.sound)
-
-
-def _synthesiser(voice: SyntheticVoice) -> Synthesiser:
     synthesiser = SYNTHESISERS.get(voice.synthesiser)
     if synthesiser is None:
         raise InputError(f"unknown synthesiser {voice.synthesiser!r}; required one of: {', '.join(SYNTHESISERS)}")
@@ -182,7 +257,16 @@ def _synthesiser(voice: SyntheticVoice) -> Synthesiser:
         )
     if voice.name not in names and not _is_other(voice.name, synthesiser):
         raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
-    return synthesiser
+    words = [split_words(text) for text in texts]
+    known = (lexicon or Lexicon()) if voice.is_english else None
+    with temporary_folder() as folder:
+        plain = [" ".join(text.split()) for text in texts]
+        sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())
+        for said, its_words in zip(sentences, words, strict=True):
+            phone_map = said.phone_map or synthesiser.phone_map
+            written = its_words if said.words is None else said.words
+            units = inventory_timeline(said.phones, phone_map, written, known, said.audio.duration_s)
+            yield VoicedSentence(said.audio, units, said.sound)
 
 
 def _is_other(name: str, synthesiser: Synthesiser) -> bool:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import groupby
 
 from lipmotion.errors import InputError
-from lipmotion.speech.voices.phone_maps import PhoneMap
+from lipmotion.speech.voices.synthesiser import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, find_words, is_silent, list_phone_classes
 from lipmotion.units.phones import REDUCED_VOWELS, SHORT_PAUSE_S
@@ -34,14 +34,24 @@ def inventory_timeline(
 ) -> Timeline[Unit]:
     """Return the phones of a synthesised sentence in time, as forced alignment would label them.
 
-    labels     : of the synthesiser, in time
     phone_map  : labels to phones (``phone_maps``)
     words      : of the sentence; or what is written of it between blanks, in time, where the synthesiser tells
     lexicon    : pronunciations of the words (None: the sentence is not English, its words stay as they are written)
     duration_s : of the sound; what no label covers is silence
     Raises InputError: a label that is not in the map, or no phone at all.
     """
-    phones = _joined(_covered(_translated(labels, phone_map), duration_s))
+    said: list[tuple[str, float, float]] = []
+    for span in labels:
+        if span.label not in phone_map:
+            raise InputError(
+                f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(phone_map)}"
+            )
+        names = phone_map[span.label]
+        if not names and said:
+            said[-1] = (*said[-1][:2], span.end_s)
+        each_s = span.duration_s / max(len(names), 1)
+        said += [(phone, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, phone in enumerate(names)]
+    phones = _joined(_covered([(phone, start, end) for phone, start, end in said if end > start], duration_s))
     spoken = [phone for phone in phones if not is_silent(phone[0])]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")
@@ -86,10 +96,7 @@ def _pronunciation(word: str, lexicon: Lexicon) -> Pronunciation:
 
 
 def _with_written_words(phones: Phones, written: Timeline[str], lexicon: Lexicon | None) -> list[Unit]:
-    """Return the units of phones that are said within written words.
-
-    A text between blanks may be several words, or a number: these share its phones (``with_words``).
-    """
+    """Return the units of phones that are said within written words."""
     starts_s = [span.start_s for span in written]
     numbers = [max(bisect_right(starts_s, (start + end) / 2) - 1, 0) for _, start, end in phones]
     units: list[Unit] = []
@@ -131,28 +138,11 @@ def matches(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
 
 
 def _cost(phone: str, other: str) -> float:
-    """Return the cost of matching two phones."""
     if phone == other:
         return 0.0
     if REDUCED_VOWELS.get(phone, phone) == REDUCED_VOWELS.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:
         return OWN_FORM_COST
     return OWN_KIND_COST if (phone in VOWELS) == (other in VOWELS) else OTHER_KIND_COST
-
-
-def _translated(labels: Timeline[str], phone_map: PhoneMap) -> list[tuple[str, float, float]]:
-    """Return the phones of the labels, with start and end, s. Raises InputError: a label that is not in the map."""
-    phones: list[tuple[str, float, float]] = []
-    for span in labels:
-        if span.label not in phone_map:
-            raise InputError(
-                f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(phone_map)}"
-            )
-        names = phone_map[span.label]
-        if not names and phones:
-            phones[-1] = (*phones[-1][:2], span.end_s)
-        each_s = span.duration_s / max(len(names), 1)
-        phones += [(name, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, name in enumerate(names)]
-    return [(name, start, end) for name, start, end in phones if end > start]
 
 
 def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:

@@ -34,10 +34,7 @@ def program_output(
 ) -> str:
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.
 
-    package   : the Debian package with it
     sentences : how many it synthesises, which sets its limits
-    given     : its standard input
-    folder    : where it writes
     Raises MissingDependencyError: there is no such program. Raises InputError: it fails, takes too long, or prints or
     writes too much.
     """
@@ -82,11 +79,7 @@ def _started(
 
 
 def _wait(process: subprocess.Popen[bytes], name: str, sentences: int, sizes: Callable[[], tuple[int, int]]) -> None:
-    """Wait until a program has ended.
-
-    sizes : returns how many bytes it has printed, and how many it has written
-    Raises InputError: it does not end, or prints or writes too much.
-    """
+    """Wait until a program has ended."""
     limit_s, largest = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
     start = moved = time.monotonic()
     before = 0, 0
@@ -110,7 +103,6 @@ def _size(file: IO[bytes]) -> int:
 
 
 def _written(folder: Path | None) -> int:
-    """Return the size of the files in a folder."""
     total = 0
     with suppress(OSError):  # the program removes what it wrote
         for path in folder.iterdir() if folder else ():

@@ -6,12 +6,17 @@ which its phone is said, ``BLANK`` in all others.
 
 from __future__ import annotations
 
+import platform
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
+from hashlib import sha256
+from importlib import metadata, resources
+from importlib.util import find_spec
 from itertools import groupby
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +68,7 @@ class PhoneRecogniser(ABC):
 PHONE_RECOGNISERS: Registry[type[PhoneRecogniser]] = Registry(
     "phone recogniser",
     "lipmotion.phone_recognisers",
-    {"hama": "lipmotion.speech.recognition.network.hama:Hama"},
+    {"hama": "lipmotion.speech.recognition.network.posteriors:Hama"},
 )
 
 
@@ -163,8 +168,6 @@ class PosteriorStretch(NamedTuple):
 def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
     """Return the posteriors in all stretches of sound of a recording; they are computed once.
 
-    name : of the phone recogniser
-    each : applies a function to many items, perhaps in several processes
     Raises InputError, MissingDependencyError: as ``phone_recogniser``.
     """
 
@@ -249,7 +252,6 @@ def token_posteriors(name: str, audio: Audio, each: ParallelMap = map, *, dense:
 def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
     """Return natural logarithms of the posteriors of a stretch of sound [shape=(N, K)].
 
-    name    : of the phone recogniser
     samples : 16-bit integers at 16 kHz
     """
     numbers = from_sixteen_bits(np.frombuffer(samples, "<i2"))
@@ -267,3 +269,45 @@ def _phones_of(tokens: tuple[str, ...]) -> NDArray[np.float32]:
         if not phones:
             table[number, -1] = 1
     return table
+
+
+LIBRARIES = {("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "x86_64"), ("darwin", "arm64")}
+"""Systems and processors that the package has a library for."""
+WEIGHTS = "asr_waveform.hama"
+LEAST_SAMPLES = 1600
+"""Shorter sound is filled up with silence: the network has no row for it."""
+
+
+@final
+class Hama(PhoneRecogniser):
+    """The phone recogniser of the package ``hama`` (Apache-2.0)."""
+
+    name: ClassVar[str] = "hama"
+
+    def __init__(self) -> None:
+        self.tokens = tuple(_model().decoder_tokens)
+        weights = (resources.files("hama") / "assets" / WEIGHTS).read_bytes()
+        self.source = f"{self.name} {metadata.version(self.name)} {sha256(weights).hexdigest()[:12]}"
+
+    @classmethod
+    def is_installed(cls) -> bool:
+        """Return whether the package is installed, and has a library for this machine."""
+        return (sys.platform, platform.machine()) in LIBRARIES and find_spec("hama") is not None
+
+    def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return natural logarithms of the posteriors, as ``PhoneRecogniser.log_posteriors``."""
+        filled = np.pad(samples, (0, max(0, LEAST_SAMPLES - len(samples)))).astype(np.float32)
+        values, rows = _model().session.run(
+            ["log_probs", "out_lengths"],
+            {"waveform": filled[None], "waveform_lengths": np.array([len(filled)], np.int64)},
+        )
+        posteriors: NDArray[np.float32] = np.asarray(values, np.float32).reshape(-1, len(self.tokens))
+        return posteriors[: int(rows[0])]
+
+
+@cache
+def _model() -> Any:
+    """Return the network of this process; it is loaded once."""
+    from hama.asr import ASRModel
+
+    return ASRModel()

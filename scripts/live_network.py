@@ -1,0 +1,295 @@
+"""Makes the network of live speech, ``models/live.npz``: taught by what ``animate`` makes of whole recordings.
+
+    python scripts/live_network.py CORPUS VOICES TEXT
+
+CORPUS is a prepared corpus (GRID speaker s1), whose motion is measured; VOICES a folder of recordings (``speech-open``)
+and TEXT a folder of English pages, which flite, festival and espeak-ng speak: for these, ``animate`` with the shipped
+model is the teacher. Every recording is heard as it is, by other voices, and in the conditions of training.
+"""
+
+from __future__ import annotations
+
+import argparse
+import pickle
+import re
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion import Corpus, Request, animate, load_model
+from lipmotion.live.network import (
+    LAGS,
+    OUTPUTS,
+    RANGE,
+    SHAPE,
+    SPEECH_RANGE,
+    STEP_FRAMES,
+    STEP_S,
+    WEIGHTS,
+    BandMeans,
+    SoundFeatures,
+    silent_step,
+)
+from lipmotion.meshes.fitting.shape_weights import viseme_curves
+from lipmotion.meshes.model.shape_names import VISEMES_15
+from lipmotion.motion.articulation import ARTICULATORS, measure_articulators
+from lipmotion.motion.space import resample_track
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion.speech.features.mfcc import WINDOW
+from lipmotion.speech.sound.acoustic_conditions import in_condition
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
+from lipmotion.types import SPECTRUM_BANDS, Audio, Motion, Timeline, Track, Unit
+
+OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
+VOICES = [
+    *(["flite", "-voice", name, "-o", "{file}", "-t", "{text}"] for name in ("kal", "awb", "rms", "slt", "kal16")),
+    *(
+        ["espeak-ng", "-v", name, "-w", "{file}", "{text}"]
+        for name in ("en-us", "en-gb", "en-us+f2", "en-gb+m3", "en-us+f4", "en-gb-scotland+m7", "en-us+f5", "en-us+m1")
+    ),
+    *(
+        ["text2wave", "-eval", f"(voice_{name})", "-o", "{file}", "{page}"]
+        for name in ("kal_diphone", "cmu_us_slt_arctic_hts")
+    ),
+]
+SOUNDS = (".flac", ".wav", ".opus", ".mp3")
+SILENCE_S, LEAST_S, LONGEST_S = 0.8, 1.2, 20.0
+"""Silence after every recording, in which the mouth comes to rest; and how much of a long one is used."""
+GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 4
+"""What is heard: as loud as is drawn, as it is, by other vocal tracts, and half of the time in a condition."""
+VISEME_SCALE = 3.0
+"""What is said is learned with deviations about as large as those of the motion."""
+MICROPHONE_DB, MICROPHONE_KNOTS = 4.0, 6
+LARGEST_GAIN, CURVE_CLIPS = 1.6, 40
+PIECE_STEPS, HELD_OUT = 250, 20
+"""Steps of a piece for training; and one in so many recordings measures the errors instead."""
+WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
+Array = NDArray[np.float32]
+Lesson = tuple[Array, list[Array]]
+"""Targets of every step [shape=(N, 23)], and the features of the sound in several versions [each shape=(N, 82)]."""
+
+
+def main() -> None:
+    """Make the file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("voices", type=Path)
+    parser.add_argument("text", type=Path)
+    parser.add_argument("--split", default="train")
+    parser.add_argument("--prompts", type=Path, help="folder of recorded sentences, G.722 (asterisk-core-sounds-en)")
+    parser.add_argument("--minutes", type=float, default=20.0, help="of synthetic speech")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--steps", type=int, default=2400, help="of the optimiser")
+    parser.add_argument("--keep", type=Path, help="a file that keeps what was prepared")
+    parser.add_argument("--output", type=Path, default=OUTPUT)
+    options = parser.parse_args()
+    if options.keep is not None and options.keep.exists():
+        lessons = pickle.loads(options.keep.read_bytes())  # noqa: S301 - what a run before wrote
+    else:
+        lessons = list(prepare(options))
+        if options.keep is not None:
+            options.keep.write_bytes(pickle.dumps(lessons))
+    print(f"{len(lessons)} recordings, {sum(len(targets) for targets, _ in lessons) * STEP_S / 60:.1f} minutes")
+    typical = measure_bands(lessons)
+    sequences = [
+        [shift(hear(levels, typical, (number, version)), targets, typical) for version, levels in enumerate(versions)]
+        for number, (targets, versions) in enumerate(lessons)
+        if number % HELD_OUT
+    ]
+    weights = np.tile([*(WEIGHTS_OF[name] for name in ARTICULATORS), *np.ones(len(VISEMES_15))], len(LAGS))
+
+    def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
+        whole = sequences[number][int(rng.integers(len(sequences[number])))]
+        return cut(whole, int(rng.integers(max(len(whole.inputs) - PIECE_STEPS, 0) + 1)))
+
+    def report(step: int, error: float) -> None:
+        if step % 100 == 0:
+            print(step, round(error, 4), flush=True)
+
+    plan = TrainingPlan(options.steps, batch_size=16, rate=2e-3, dropout=0.1, seed=0)
+    network = SHAPE.initial(len(LAGS) * OUTPUTS, 0)
+    network = fit_network(network, draw, len(sequences), weights, plan, report)
+    network = network.with_parameters(
+        [*network.parameters[:-2], *(array / output_scale() for array in network.parameters[-2:])]
+    )
+    arrays = {name: array.astype(np.float16) for name, array in SHAPE.arrays(network).items()}
+    rounded = SHAPE.from_arrays(arrays, len(LAGS) * OUTPUTS)
+    count, predicted, wanted = len(ARTICULATORS), [], []
+    for number, (targets, versions) in enumerate(lessons[::HELD_OUT]):
+        sequence = shift(hear(versions[number % VERSIONS], typical, ()), targets, typical)
+        for rows, kept in ((rounded(sequence.inputs), predicted), (sequence.targets / output_scale(), wanted)):
+            kept.append(rows[: len(targets)].reshape(-1, len(LAGS), OUTPUTS)[:, :, :count])
+    people = np.concatenate([np.diff(targets[:, :count], 2, axis=0) for targets, _ in lessons])
+    guesses, truth = np.concatenate(predicted), np.concatenate(wanted)
+    arrays["variances"] = np.square(guesses - truth).mean(axis=0)
+    arrays["acceleration"] = np.square(people).mean(axis=0)
+    arrays["gains"] = np.clip(truth.std(axis=0) / guesses.std(axis=0), 1, LARGEST_GAIN)
+    arrays["typical"] = typical.astype(float)
+    arrays["curves"] = fit_curves(load_model(), Corpus.open(options.corpus))
+    correlations = [
+        [float(np.corrcoef(guesses[:, lag, n], truth[:, lag, n])[0, 1]) for n in range(count)]
+        for lag in range(len(LAGS))
+    ]
+    print("correlation of articulators by lag:", np.round(correlations, 3).tolist())
+    with options.output.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+    print(f"{options.output.name}: {options.output.stat().st_size} bytes")
+
+
+def fit_curves(model: Model, corpus: Corpus) -> NDArray[np.float64]:
+    """Return the ridge regression from 1, articulators and visemes to ARKit's weights of the mouth [shape=(24, 28)]."""
+    inputs, outputs = [], []
+    for name in corpus.names("train")[:CURVE_CLIPS]:
+        result = animate(Request(corpus.utterance(name).audio), model=model)
+        visemes = viseme_curves(result.units, result.motion.time_s)
+        said = np.stack([visemes[viseme] for viseme in VISEMES_15], axis=1)
+        articulators = standard_articulators(model, result.motion)
+        inputs.append(np.concatenate([np.ones((len(said), 1)), articulators, said], axis=1))
+        outputs.append(make_curves(result.motion, result.units, "arkit").values)
+    x, y = np.concatenate(inputs), np.concatenate(outputs)
+    return np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ y)
+
+
+def output_scale() -> Array:
+    """Return what the outputs are multiplied by in training [shape=(5 · 23,)]."""
+    return np.tile([*np.ones(len(ARTICULATORS)), *np.full(len(VISEMES_15), VISEME_SCALE)], len(LAGS)).astype(np.float32)
+
+
+def measure_bands(lessons: list[Lesson]) -> Array:
+    """Return the mean of every band in speech, relative to the level [shape=(40,)]."""
+    rows = np.concatenate([versions[0] for _, versions in lessons]).astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
+    mean: Array = rows[rows[:, -1] > -SPEECH_RANGE, :-1].mean(axis=0)
+    return mean
+
+
+def hear(levels: Array, typical: Array, seed: tuple[int, ...]) -> Array:
+    """Return the features of every step [shape=(N, 82)], through a microphone that is drawn; seed (): a flat one."""
+    rows = levels.astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
+    if seed:
+        rng = np.random.default_rng(seed)
+        knots = rng.normal(0, MICROPHONE_DB / 10 * np.log(10), MICROPHONE_KNOTS)
+        tone = np.interp(np.linspace(0, 1, SPECTRUM_BANDS), np.linspace(0, 1, MICROPHONE_KNOTS), knots)
+        rows = np.maximum(rows + np.append(tone, 0).astype(np.float32), -RANGE)
+    bands = BandMeans(typical)
+    return np.stack([bands.push(row) for row in rows]).reshape(len(levels), -1)
+
+
+def shift(inputs: Array, targets: Array, typical: Array) -> TrainingSequence:
+    """Return inputs, after the silence that the network begins with, with the targets of all lags, each as late."""
+    reach, steps = sum(SHAPE.dilations), len(inputs)
+    heard = np.concatenate([np.tile(silent_step(typical), (reach, 1)), inputs])
+    wanted = np.clip(np.arange(len(heard))[:, None] - np.array(LAGS), 0, steps - 1)
+    rows = targets[wanted].reshape(len(heard), -1) * output_scale()
+    return TrainingSequence(heard, rows, np.arange(len(heard)) < steps)
+
+
+def cut(whole: TrainingSequence, start: int) -> TrainingSequence:
+    """Return a piece, of which counts what the network hears all of."""
+    reach = sum(SHAPE.dilations)
+    piece = TrainingSequence(*(part[start : start + PIECE_STEPS + 2 * reach] for part in whole))
+    places = np.arange(len(piece.inputs))
+    return piece._replace(valid=piece.valid & (places < len(places) - reach) & ((start == 0) | (places >= reach)))
+
+
+def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
+    """Yield the lessons of all recordings."""
+    corpus = Corpus.open(options.corpus)
+    sounds = [read_audio(path) for path in sorted(options.voices.iterdir()) if path.suffix in SOUNDS]
+    jobs: list[tuple[Audio, Track | None, str | None]] = []
+    for name in corpus.names(options.split)[::2]:
+        utterance = corpus.utterance(name)
+        jobs.append((utterance.audio, utterance.track, " ".join(utterance.words or ())))
+    prompts = [read_audio(path) for path in sorted(options.prompts.glob("*.g722"))[::2]] if options.prompts else []
+    spoken = [audio for audio in (*sounds, *prompts) if audio.duration_s > LEAST_S]
+    spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
+    jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
+    with ProcessPoolExecutor(options.workers) as pool:
+        yield from pool.map(partial(teach, babble=sounds), jobs, range(len(jobs)), chunksize=8)
+
+
+def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list[Audio]) -> Lesson:
+    """Return the lesson of a recording: of its measured motion, where there is a track, else of what ``animate`` makes.
+
+    job : the recording, its track, its words
+    """
+    audio, tracked, words = job
+    model = load_model()
+    result = animate(Request(audio, transcript=words), model=model)
+    motion = result.motion
+    if tracked is not None:
+        measured, _ = resample_track(tracked, len(motion.values))
+        values = measured.values - measured.values.mean(axis=0) + motion.values.mean(axis=0)  # the pose is not heard
+        motion = replace(measured, values=values)
+    return make_lesson(model, audio, motion, result.units, babble, number)
+
+
+def synthesise(folder: Path, minutes: float) -> Iterator[Audio]:
+    """Yield sentences of pages, spoken by one voice after the other."""
+    words = " ".join(path.read_text("utf-8") for path in sorted(folder.rglob("*.md")))
+    sentences = list(re.findall(r"[A-Z][a-z]+ [a-z ,']{30,110}[a-z]\.", words.replace("\n", " ")))
+    rng, spoken_s = np.random.default_rng(0), 0.0
+    with tempfile.TemporaryDirectory() as kept:
+        file, page = Path(kept) / "a.wav", Path(kept) / "a.txt"
+        for number, place in enumerate(rng.permutation(len(sentences)).tolist()):
+            page.write_text(sentences[place], "utf-8")
+            known = {"file": str(file), "text": sentences[place], "page": str(page)}
+            command = [part.format(**known) for part in VOICES[number % len(VOICES)]]
+            subprocess.run(command, check=True, capture_output=True)
+            audio = read_audio(file)
+            spoken_s += audio.duration_s
+            yield audio
+            if spoken_s > 60 * minutes:
+                return
+    raise SystemExit(f"{folder}: {len(sentences)} sentences are {spoken_s / 60:.1f} minutes, required {minutes:g}")
+
+
+def make_lesson(
+    model: Model, audio: Audio, motion: Motion, units: Timeline[Unit], babble: list[Audio], seed: int
+) -> Lesson:
+    """Return the targets of a recording, silence after it, and what is heard in several versions."""
+    silence = np.zeros(int(SILENCE_S * audio.rate_hz), np.float32)
+    longer = Audio(np.concatenate([audio.samples, silence]), audio.rate_hz)
+    steps = int(longer.duration_s / STEP_S)
+    time_s = np.arange(steps) * STEP_S
+    articulators = standard_articulators(model, motion)
+    inside = np.stack([np.interp(time_s, motion.time_s, column) for column in articulators.T], axis=1)
+    visemes = np.stack([viseme_curves(units, time_s)[name] for name in VISEMES_15], axis=1)
+    visemes[time_s > audio.duration_s] = np.eye(len(VISEMES_15))[0]
+    targets = np.concatenate([inside, visemes], axis=1).astype(np.float32)
+    versions = []
+    for number in range(VERSIONS):
+        rng = np.random.default_rng([seed, number])
+        heard = longer if number < VERSIONS // 2 else in_condition(longer, babble, rng)[0]
+        warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if number else 1.0
+        gain = np.float32(10 ** (rng.uniform(*GAIN_DB) / 20))
+        samples = np.pad(heard.samples * gain, (0, WINDOW))
+        rows = np.stack(SoundFeatures(np.zeros(SPECTRUM_BANDS, np.float32), warp).list_levels(samples))[
+            : steps * STEP_FRAMES
+        ]
+        versions.append(rows.reshape(steps, -1).astype(np.float16))
+    return targets, versions
+
+
+def standard_articulators(model: Model, motion: Motion) -> NDArray[np.float64]:
+    """Return the articulators of motion in deviations from the pose of the table of a model [shape=(T, 8)]."""
+    prior, space = model.learned.prior, model.learned.space
+    poses = np.concatenate([prior.centre[None], prior.centre + prior.matrix])
+    rows, _ = space.restore(poses, np.zeros_like(poses))
+    names = [channel.name for channel in space.channels]
+    known, measured = measure_articulators(rows, names), measure_articulators(motion.values, motion.names)
+    base, *moved = np.stack([known[name] for name in ARTICULATORS], axis=1)
+    centred = np.stack([measured[name] for name in ARTICULATORS], axis=1) - base
+    return np.linalg.solve((np.array(moved) - base).T, centred.T).T
+
+
+if __name__ == "__main__":
+    main()

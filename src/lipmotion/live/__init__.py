@@ -1,0 +1,1 @@
+"""Speech as it comes: a microphone, the sound of a voice agent, a stream."""

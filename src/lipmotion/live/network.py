@@ -1,0 +1,180 @@
+"""The network of live speech: from sound as it comes to articulators and visemes, at once or a little later.
+
+At every step of 20 ms it says what the mouth is about to do, and, better, what it did a while ago: whoever can wait
+takes the later answer. It was taught by what ``animate`` makes of whole recordings
+(``scripts/live_network.py``); its articulators are in standard deviations, so that any model's face can follow them.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from functools import cache
+from importlib import resources
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.meshes.model.shape_names import VISEMES_15
+from lipmotion.motion.articulation import ARTICULATORS
+from lipmotion.motion.network_steps import ConvolutionalShape
+from lipmotion.speech.features.mfcc import BANDS, FFT_SIZE, HOP, WINDOW, mel_filters
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.stats.convolution import ConvolutionalNetwork
+from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS
+
+Array = NDArray[np.float32]
+WEIGHTS = "live.npz"
+STEP_FRAMES = 2
+"""Frames of 10 ms in a step."""
+STEP_S = STEP_FRAMES / FRAME_RATE_HZ
+LAGS = (-1, 2, 6, 14, 30)
+"""How many steps ago the answers of a step are about: for look-aheads of 0, 80, 160, 320 and 640 ms."""
+HEARD_S = (STEP_FRAMES - 1) / FRAME_RATE_HZ + WINDOW / 2 / SPEECH_RATE_HZ
+"""So much after its time the sound of a step has come."""
+OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)
+"""Values of an answer: articulators, and how probable each viseme is."""
+SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 128, (1, 2, 4, 8, 16, 1, 2, 4))
+"""It hears the last 1.5 s."""
+START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
+"""Natural logarithm of the power of loud speech that is assumed before anything is heard, and the least: sound that is
+quieter than this is not made louder."""
+FALL = 2.3 / (6 * FRAME_RATE_HZ)
+"""The level that is assumed falls by so much a frame, 10 dB in 6 s: who begins too loud is not lost afterwards."""
+ATTACK = 0.25
+"""Share of a frame in the power that raises the level: a click does not count as loud speech."""
+RANGE = 14.0
+"""Powers are floored so far below the level, 60 dB."""
+SPEECH_RANGE = 7.0
+"""Frames down to 30 dB under the level are speech, and teach how each band sounds in it."""
+KNOWN_FRAMES, REMEMBERED_FRAMES = 40, 300
+"""So many frames of speech the typical spectrum counts, to begin with; and so many are remembered."""
+SCALE = 4.0
+
+
+class SoundFeatures:
+    """The log mel spectrum of sound as it comes, relative to how loud speech has been, and to how each band sounds.
+
+    Samples are at 16 kHz, full scale 1. Frames are computed one by one: how the sound is cut into pieces changes no
+    bit. Frame n is heard when 25 ms around 10 · n ms have come; before the sound there is silence.
+    typical : the mean of every band in speech, relative to the level [shape=(40,)]
+    """
+
+    def __init__(self, typical: Array, warp: float = 1.0) -> None:
+        self._pending = np.zeros(WINDOW // 2 + 1, np.float32)
+        self._filters = mel_filters(warp, *BANDS)
+        self._window = np.hamming(WINDOW).astype(np.float32)
+        self._level, self._power = START_LEVEL, 0.0
+        self._bands = BandMeans(typical)
+
+    def push(self, samples: Array) -> list[Array]:
+        """Return the features of every frame that is complete [each shape=(41,)]."""
+        return [self._bands.push(row) for row in self.list_levels(samples)]
+
+    def list_levels(self, samples: Array) -> list[Array]:
+        """Return bands and the whole of every frame that is complete, relative to the level [each shape=(41,)]."""
+        self._pending = np.concatenate([self._pending, samples])
+        rows, start = [], 0
+        while start + WINDOW < len(self._pending):
+            rows.append(self._frame(self._pending[start : start + WINDOW + 1]))
+            start += HOP
+        self._pending = self._pending[start:]
+        return rows
+
+    def _frame(self, samples: Array) -> Array:
+        spectrum = np.fft.rfft((samples[1:] - np.float32(0.97) * samples[:-1]) * self._window, FFT_SIZE)
+        powers = (np.square(spectrum.real) + np.square(spectrum.imag)).astype(np.float32) @ self._filters
+        total = float(powers.sum()) + 1e-12
+        self._power += ATTACK * (total - self._power)
+        self._level = max(self._level - FALL, QUIETEST_LEVEL, float(np.log(self._power)))
+        row = np.log(np.append(powers + np.float32(1e-12), np.float32(total))) - np.float32(self._level)
+        result: Array = np.maximum(row, np.float32(-RANGE))
+        return result
+
+
+class BandMeans:
+    """Bands relative to their means in the speech that was heard: microphones and rooms differ in these.
+
+    typical : the means that are assumed before anything is heard [shape=(40,)]
+    """
+
+    def __init__(self, typical: Array) -> None:
+        self._means, self._frames = typical.astype(np.float32), KNOWN_FRAMES
+
+    def push(self, row: Array) -> Array:
+        """Return the features of a frame [shape=(41,)], from its levels, which also change the means."""
+        if row[-1] > -SPEECH_RANGE:
+            self._frames = min(self._frames + 1, REMEMBERED_FRAMES)
+            self._means = self._means + (row[:-1] - self._means) / np.float32(self._frames)
+        result: Array = np.append(row[:-1] - self._means, row[-1] + np.float32(SPEECH_RANGE)) / np.float32(SCALE)
+        return result
+
+
+def silent_step(typical: Array) -> Array:
+    """Return the features of a step of silence before any speech [shape=(82,)]."""
+    silent = np.full(SPECTRUM_BANDS + 1, -RANGE, np.float32)
+    return np.tile(BandMeans(typical).push(silent), STEP_FRAMES)
+
+
+class CausalSteps:
+    """A convolutional network that is run step by step: each layer keeps the inputs that it will still need.
+
+    It begins after as much silence as it hears: steps of ``silent`` [shape=(82,)].
+    """
+
+    def __init__(self, network: ConvolutionalNetwork, silent: Array) -> None:
+        self._network = network
+        widths = [len(layer.weights) // 3 for layer in network.layers]
+        self._waiting = [
+            deque([np.zeros(width, np.float32)] * (2 * dilation + 1), 2 * dilation + 1)
+            for width, dilation in zip(widths, network.dilations, strict=True)
+        ]
+        self._steps = 0
+        for _ in range(network.reach):
+            self.push(silent)
+
+    def push(self, inputs: Array) -> Array:
+        """Return the answers of this step: the network's outputs where it has heard all of it."""
+        states, heard = inputs, self._steps
+        self._steps += 1
+        for number, (layer, dilation) in enumerate(zip(self._network.layers, self._network.dilations, strict=True)):
+            waiting = self._waiting[number]
+            waiting.append(states)
+            heard -= dilation
+            if heard < 0:  # zeros stand before the first step
+                states = np.zeros(len(layer.biases), np.float32)
+                continue
+            stacked = np.concatenate([waiting[0], waiting[dilation], waiting[-1]])
+            result = np.maximum(stacked @ layer.weights + layer.biases, 0)
+            states = result if number == 0 else waiting[dilation] + result
+        outputs: Array = states @ self._network.output.weights + self._network.output.biases
+        return outputs
+
+
+class LiveNetwork(NamedTuple):
+    """The network, and what is known of its errors.
+
+    network      : its outputs are an answer for each of ``LAGS``
+    variances    : of the error of each articulator at each lag [shape=(5, 8)]
+    acceleration : variance of the second difference of each articulator from step to step, in people [shape=(8,)]
+    gains        : what makes the movements of each articulator at each lag as large as people's [shape=(5, 8)]
+    typical      : the mean of every band of the sound in speech, relative to its level [shape=(40,)]
+    curves       : from 1, articulators and visemes to ARKit's weights of the mouth [shape=(24, 28)]
+    """
+
+    network: ConvolutionalNetwork
+    variances: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    typical: NDArray[np.float64]
+    curves: NDArray[np.float64]
+
+
+@cache
+def live_network() -> LiveNetwork:
+    """Return the network of the package."""
+    path = resources.files("lipmotion") / "models" / WEIGHTS
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        arrays = dict(stored)
+    network = SHAPE.from_arrays({name: arrays[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)
+    return LiveNetwork(network, *(arrays[name].astype(float) for name in LiveNetwork._fields[1:]))

@@ -1,1 +1,0 @@
-"""The general models: speaker-independent English phone models that come with pocketsphinx, for our own decoder."""
